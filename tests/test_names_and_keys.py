@@ -72,3 +72,17 @@ def test_counts_find_what_they_look_for():
     tree = {Path("cli/a.py"): ast.parse("class A: ...\nclass A: ...\nx: dict[str, Any] = y['key']\n")}
     assert public_classes(tree)["A"] == ["cli/a.py", "cli/a.py"]
     assert (count(tree, is_anonymous_dictionary), count(tree, is_key, "cli"), count(tree, is_key, "nc")) == (1, 1, 0)
+
+
+def starts_the_command_line(tree):
+    """Whether a list of words begins a process of the command line: `python -m dbbstation`."""
+    words = [
+        [one.value for one in node.elts if isinstance(one, ast.Constant)]
+        for node in ast.walk(tree)
+        if isinstance(node, ast.List | ast.Tuple)
+    ]
+    return any("-m" in one and "dbbstation" in one for one in words)
+
+
+def test_nobody_but_the_demonstration_starts_the_command_line(trees):
+    assert [str(path) for path, tree in trees.items() if starts_the_command_line(tree)] == ["demo.py"]

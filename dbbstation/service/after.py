@@ -1,32 +1,23 @@
-"""What is done with a session once it is measured: calibrate, diagnose, write programs and report. Each is a command of the program."""
+"""What is done with a session once it is measured: calibrate, diagnose, write programs and report. Each is a task of the program."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import InputError
+from dbbstation.files.recordings.session import read_session
 from dbbstation.service.former_sessions import keep_models
+from dbbstation.service.job import SessionJob, SessionTask
 from dbbstation.service.work import BackgroundWork, WorkProgress
 from dbbstation.service.worked_out import DoneStep, counted, keep_steps, steps_before
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
     from pathlib import Path
 
     from dbbstation.service.former_sessions import Former
-
-
-class SessionTask(StrEnum):
-    """What can be done, in the order in which it is usual."""
-
-    CALIBRATE = "calibrate"
-    DIAGNOSE = "diagnose"
-    PROGRAMS = "programs"
-    REPORT = "report"
-    ACCEPTANCE = "acceptance"
 
 
 USUAL = (SessionTask.CALIBRATE, SessionTask.DIAGNOSE, SessionTask.PROGRAMS, SessionTask.REPORT)
@@ -45,7 +36,7 @@ class Result:
         progress: None: not begun.
         stage: what it does now.
         passed_s: time since it began, until it ended [s].
-        answer: what its command printed; empty until it is done.
+        answer: its result as JSON has it; empty until it is done.
         failure: what it said where it failed.
         path: what it wrote; None until it is done.
     """
@@ -65,7 +56,7 @@ class After:
         session: its folder.
         model: of an earlier calibration, that the circles are held against until this one has a model; None: none.
         settings: file of the shop's settings where one was named; None: those that are found.
-        start: starts a command; a process of its own.
+        start: begins a job, in a process of its own.
 
     Attributes:
         session: its folder.
@@ -79,7 +70,7 @@ class After:
         session: Path,
         model: Path | None = None,
         settings: Path | None = None,
-        start: Callable[[Sequence[str], Path], BackgroundWork] = BackgroundWork,
+        start: Callable[[SessionJob, Path], BackgroundWork] = BackgroundWork,
     ) -> None:
         self.session = session.absolute()
         self.results = {step: Result() for step in SessionTask}
@@ -196,30 +187,32 @@ class After:
         step = self._waiting.pop(0)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.results[step] = Result(WorkProgress.RUNNING)
-        self._running = step, self._start(self._arguments(step), self.folder)
+        self._running = step, self._start(self._job(step), self.folder)
 
-    def _arguments(self, step: SessionTask) -> list[str]:
-        settings = [] if self._settings is None else ["--settings", str(self._settings.absolute())]
-        session, out = str(self.session), ["--out", self._out(step), "--force"]
-        model = [] if self.model is None else ["--model", str(self.model)]
+    def _job(self, step: SessionTask) -> SessionJob:
+        job = SessionJob(
+            task=step,
+            beside=self.session.parent,
+            out=self._out(step),
+            session=self.session,
+            settings=None if self._settings is None else self._settings.absolute(),
+        )
         match step:
             case SessionTask.CALIBRATE | SessionTask.DIAGNOSE:
-                return [*settings, step.value, session, *out]
+                return job
             case SessionTask.PROGRAMS:
                 plan, machine = self._files()
-                return [*settings, "program", "--plan", plan, "--machine", machine, *model, *out]
+                return job.model_copy(update={"plan": plan, "machine": machine, "model": self.model})
             case SessionTask.REPORT:
-                return [*settings, "report", session, *model, *out]
+                return job.model_copy(update={"model": self.model})
             case SessionTask.ACCEPTANCE:
                 if self.former is None:
                     raise ValueError("no session was chosen to hold this one against")
-                return [*settings, "report", session, "--before", str(self.former.folder), *out]
+                return job.model_copy(update={"before": self.former.folder})
 
-    def _files(self) -> tuple[str, str]:
-        from dbbstation.files.recordings.session import read_session  # noqa: PLC0415 - read when it is needed, anew
-
+    def _files(self) -> tuple[Path, Path]:
         session = read_session(self.session)
-        return str(session.plan_path), str(session.machine_path)
+        return session.plan_path.absolute(), session.machine_path.absolute()
 
     def _done(self) -> dict[str, DoneStep]:
         """What was done; a comparison is not kept: the session that it is with is chosen anew."""

@@ -17,6 +17,7 @@ from dbbstation.service.bar_stated import fault_of
 from dbbstation.service.candidates import CandidateFormat, candidates
 from dbbstation.service.choice import Choice, Limits, Prepared, SetUpPart, prepare
 from dbbstation.service.held_line import HeldLine, HeldOpen
+from dbbstation.service.job import SessionJob, SessionTask
 from dbbstation.service.memory import VIRTUAL, Line, Memory
 from dbbstation.service.opening import opener
 from dbbstation.service.port_probe import ProbeOutcome, ports, probe
@@ -183,7 +184,7 @@ class Front:
             model: that they are compensated with; None: nominal programs.
 
         Raises:
-            StationError: what the command says.
+            StationError: what the task says.
             ValueError: plan or machine is missing.
         """
         plan, machine = choice.plan, choice.machine
@@ -193,10 +194,17 @@ class Front:
         if plan is None or machine is None or choice.folder is None:
             raise ValueError("plan, machine or folder is missing")
         folder = _not_there(choice.folder.parent, f"{choice.folder.name}-programs")
-        names = ["--plan", str(plan.absolute()), "--machine", str(machine.absolute()), "--out", str(folder.absolute())]
-        by_model = [] if model is None else ["--model", str(model.absolute())]
-        settings = [] if self.settings is None else ["--settings", str(self.settings)]
-        work = BackgroundWork([*settings, "program", *names, *by_model], self.under)
+        job = SessionJob(
+            task=SessionTask.PROGRAMS,
+            beside=self.under.absolute(),
+            out=str(folder.absolute()),
+            model=None if model is None else model.absolute(),
+            plan=plan.absolute(),
+            machine=machine.absolute(),
+            settings=None if self.settings is None else self.settings.absolute(),
+            force=False,
+        )
+        work = BackgroundWork(job, self.under)
         try:
             if work.wait() is not WorkProgress.DONE:
                 raise StationError(work.failure())

@@ -14,8 +14,9 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import format_for
 from dbbstation.quality.conformity import Conformity
-from dbbstation.service.after import After, SessionTask
+from dbbstation.service.after import After
 from dbbstation.service.choice import Choice
+from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Line
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.work import BackgroundWork, WorkProgress
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.job import JobFile
+    from dbbstation.service.job import SessionJob
 
 
 @dataclass(frozen=True)
@@ -109,13 +111,13 @@ class Answered:
 
 
 class JobAnswer:
-    """Holds the circles of a session against the job's tolerances, by the command `report`.
+    """Holds the circles of a session against the job's tolerances, by a report.
 
     Args:
         operated: the job.
         session: its folder.
         missing: runs of the plan that have no accepted recording, as people read them.
-        start: starts a command; a process of its own.
+        start: begins a job, in a process of its own.
     """
 
     def __init__(
@@ -123,7 +125,7 @@ class JobAnswer:
         operated: Operated,
         session: Path,
         missing: Sequence[str],
-        start: Callable[[Sequence[str], Path], BackgroundWork] = BackgroundWork,
+        start: Callable[[SessionJob, Path], BackgroundWork] = BackgroundWork,
     ) -> None:
         self._missing = tuple(missing)
         self._after = After(session, None, operated.tolerances_file(session), start)

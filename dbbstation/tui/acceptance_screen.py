@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from textual.content import Content
 
 from dbbstation.errors import StationError
-from dbbstation.service.after import SessionTask
 from dbbstation.service.background import Background
 from dbbstation.service.former_sessions import before_and_now
+from dbbstation.service.job import SessionTask
 from dbbstation.service.work import WorkProgress
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_lines import HEADING, in_force_line, test_line, way_back_lines, worst_lines

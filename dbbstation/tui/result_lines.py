@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.service.after import SessionTask
+from dbbstation.service.job import SessionTask
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_lines import worst_lines
 

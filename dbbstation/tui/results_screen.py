@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, ClassVar
 from textual.content import Content
 from textual.widgets import OptionList
 
-from dbbstation.service.after import USUAL, SessionTask
+from dbbstation.service.after import USUAL
+from dbbstation.service.job import SessionTask
 from dbbstation.service.work import WorkProgress
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_screen import AcceptanceScreen

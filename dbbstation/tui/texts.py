@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.service.after import SessionTask
 from dbbstation.service.choice import SetUpPart
+from dbbstation.service.job import SessionTask
 from dbbstation.service.order import Gate, Order
 from dbbstation.service.work import WorkProgress
 from dbbstation.station.states import State

@@ -13,8 +13,9 @@ import pytest
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
-from dbbstation.service.after import USUAL, After, SessionTask
+from dbbstation.service.after import USUAL, After
 from dbbstation.service.former_sessions import Former, InForce, before_and_now, former_sessions, keep_models
+from dbbstation.service.job import SessionJob, SessionTask
 from dbbstation.service.last_session import last_traces
 from dbbstation.service.work import WorkProgress
 from tests.plant.mechanisms.balls import CmmScatter
@@ -105,8 +106,8 @@ def test_the_model_in_force_before_is_copied_once_and_never_overwritten(shop: Pa
 def test_an_acceptance_is_the_report_of_both_sessions(shop: Path) -> None:
     begun: list[Scripted] = []
 
-    def start(arguments: list[str], folder: Path) -> Scripted:
-        begun.append(Scripted(arguments, folder))
+    def start(job: SessionJob, folder: Path) -> Scripted:
+        begun.append(Scripted(job, folder))
         return begun[-1]
 
     after = After(shop / "now", start=start)  # type: ignore[arg-type]
@@ -114,7 +115,7 @@ def test_an_acceptance_is_the_report_of_both_sessions(shop: Path) -> None:
     assert SessionTask.ACCEPTANCE not in USUAL
     after.accept(before_and_now(shop / "now").formers[1])
     (work,) = begun
-    assert work.arguments[:4] == ["report", str(shop / "now"), "--before", str(shop / "there")]
+    assert (work.job.task, work.job.session, work.job.before) == ("acceptance", shop / "now", shop / "there")
     work.progress = WorkProgress.DONE
     after.look()
     assert after.results[SessionTask.ACCEPTANCE].path == after.folder / "acceptance.html"

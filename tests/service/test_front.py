@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -20,10 +22,11 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.duration import circle_s
-from dbbstation.service.after import After, Result, SessionTask
+from dbbstation.service.after import After, Result
 from dbbstation.service.candidates import CandidateFormat, candidates
 from dbbstation.service.choice import Choice, SetUpPart
 from dbbstation.service.front import Front
+from dbbstation.service.job import SessionJob, SessionTask
 from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.service.port_probe import probe
@@ -217,39 +220,61 @@ def test_a_real_session_needs_the_bar_or_a_reason(front: Front) -> None:
     assert (waived.job.details.bar_waiver, waived.job.details.job) == ("a first look", "order 4711")
 
 
-def test_work_answers_with_what_its_command_prints(tmp_path: Path) -> None:
-    work = BackgroundWork(["evaluate", str(SMALL), "--model", str(tmp_path / "none.yaml")], tmp_path)
+def test_work_answers_with_its_result(session: Path, tmp_path: Path) -> None:
+    work = BackgroundWork(SessionJob(task=SessionTask.CALIBRATE, beside=tmp_path, out="model.yaml"), tmp_path)
     assert ended(work) is WorkProgress.FAILED
-    assert "none.yaml" in work.failure()
+    assert work.failure().splitlines() == [
+        "ValueError: the job has no session",
+        "this is a fault of dbbstation itself; the log shows what to report",
+    ]
     work.close()
-    work = BackgroundWork(["check", str(MACHINE)], tmp_path)
+    gone = SessionJob(task=SessionTask.REPORT, beside=tmp_path, out="report.html", session=tmp_path / "gone")
+    work = BackgroundWork(gone, tmp_path)
+    assert ended(work) is WorkProgress.FAILED
+    assert "gone" in work.failure()
+    assert "fault of dbbstation" not in work.failure()
+    work.close()
+    work = BackgroundWork(gone.model_copy(update={"session": session}), tmp_path)
     assert ended(work) is WorkProgress.DONE
-    assert "provenance" in work.answer()
+    assert work.answer()["report"] == "report.html"
+    assert "dbbstation report monday" in (tmp_path / "report.html").read_text("utf-8")
+    assert work.stage
     work.close()
 
 
-def test_work_can_be_ended(tmp_path: Path) -> None:
-    work = BackgroundWork(["demo", "--out", str(tmp_path / "demo")], tmp_path)
-    time.sleep(1.0)
-    assert work.progress is WorkProgress.RUNNING
+def test_work_can_be_ended(session: Path, tmp_path: Path) -> None:
+    work = BackgroundWork(
+        SessionJob(task=SessionTask.DIAGNOSE, beside=tmp_path, out="joint.yaml", session=session), tmp_path
+    )
+    end_s = time.monotonic() + PATIENCE_S
+    while not work.stage:
+        assert time.monotonic() < end_s
+        time.sleep(0.02)
     work.cancel()
     assert ended(work) is WorkProgress.CANCELLED
     work.close()
     assert work.passed_s < PATIENCE_S
+    assert list(tmp_path.glob("joint*")) == []
+
+
+def test_the_station_does_not_load_what_is_computed() -> None:
+    script = "import sys, dbbstation.service.front; sys.exit(','.join(m for m in sys.modules if m.startswith('dbbstation.tasks')))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.stderr.strip() == ""
 
 
 class Scripted:
-    """Stands where a command runs: ends as it is told to."""
+    """Stands where a job is done: ends as it is told to."""
 
     stage = "fit of 6 runs"
     passed_s = 1.0
 
-    def __init__(self, arguments: list[str], folder: Path) -> None:
-        self.arguments, self.folder = arguments, folder
+    def __init__(self, job: SessionJob, folder: Path) -> None:
+        self.job, self.folder = job, folder
         self.progress = WorkProgress.RUNNING
 
     def answer(self) -> dict[str, str]:
-        return {"from": self.arguments[0]}
+        return {"from": self.job.task}
 
     def failure(self) -> str:
         return "it failed"
@@ -264,8 +289,8 @@ class Scripted:
 def test_steps_after_a_session_follow_each_other_and_use_the_best_model(session: Path) -> None:
     begun: list[Scripted] = []
 
-    def start(arguments: list[str], folder: Path) -> Scripted:
-        begun.append(Scripted(arguments, folder))
+    def start(job: SessionJob, folder: Path) -> Scripted:
+        begun.append(Scripted(job, folder))
         return begun[-1]
 
     after = After(session, start=start)  # type: ignore[arg-type]
@@ -280,8 +305,8 @@ def test_steps_after_a_session_follow_each_other_and_use_the_best_model(session:
     results = session.parent / "monday-results"
     assert after.busy is None
     assert after.folder == results
-    assert [one.arguments[0] for one in begun] == ["calibrate", "program", "report"]
-    assert all(str(results / "model.yaml") in one.arguments for one in begun[1:])
+    assert [one.job.task for one in begun] == ["calibrate", "programs", "report"]
+    assert [one.job.model for one in begun] == [None, results / "model.yaml", results / "model.yaml"]
     assert after.results[SessionTask.REPORT].path == results / "report.html"
     after.do(SessionTask.DIAGNOSE, SessionTask.REPORT)
     after.look()

@@ -12,13 +12,13 @@ from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
-from dbbstation.service.after import After, SessionTask
+from dbbstation.service.after import After
+from dbbstation.service.job import SessionJob, SessionTask
 from dbbstation.service.verdicts import give_verdict
 from dbbstation.service.work import WorkProgress
 from dbbstation.station.commands import Judge
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
 VIRTUAL = shipped_folder("fixtures") / "sessions" / "virtual"
@@ -34,8 +34,8 @@ class Done:
 
     progress, stage, passed_s = WorkProgress.DONE, "", 2.5
 
-    def __init__(self, arguments: Sequence[str], folder: Path) -> None:
-        (folder / arguments[arguments.index("--out") + 1]).write_text("written", encoding="utf-8")
+    def __init__(self, job: SessionJob, folder: Path) -> None:
+        (folder / job.out).write_text("written", encoding="utf-8")
 
     def answer(self) -> dict[str, object]:
         return {"parameters": 42}

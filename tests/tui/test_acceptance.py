@@ -11,8 +11,9 @@ from textual.pilot import Pilot
 from textual.widgets import OptionList, Static
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.service.after import After, SessionTask
+from dbbstation.service.after import After
 from dbbstation.service.former_sessions import BeforeAndNow
+from dbbstation.service.job import SessionTask
 from dbbstation.service.work import WorkProgress
 from dbbstation.tui.acceptance_screen import AcceptanceScreen
 from dbbstation.tui.app import StationApp
@@ -78,7 +79,7 @@ def test_the_session_before_is_chosen_and_the_verdict_shown(after: After) -> Non
         assert after.busy is SessionTask.ACCEPTANCE
         assert "Comparing: fit of 6 runs" in texts_of(app, "#row-now")
         _, work = after._running
-        assert work.arguments[2:4] == ["--before", "/shop/monday"]
+        assert work.job.before == Path("/shop/monday")
         await pilot.press("h")  # not while it is being compared
         assert isinstance(app.screen, AcceptanceScreen)
         work.progress = WorkProgress.DONE

@@ -17,6 +17,7 @@ from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
 from dbbstation.service.front import Front
+from dbbstation.service.job import SessionJob
 from dbbstation.service.memory import Memory
 from dbbstation.service.operated import Answered, JobAnswer, answer_of, read_operated
 from dbbstation.service.work import WorkProgress
@@ -29,7 +30,7 @@ from tests.tui.test_app import Waits
 from tests.tui.test_session_flow import below, now, rows
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    pass
 
 FIXTURES = shipped_folder("fixtures")
 PLANS = shipped_folder("protocols") / "plans"
@@ -50,9 +51,9 @@ class Reported:
     progress, stage, passed_s = WorkProgress.DONE, "", 1.0
     kind = "within"
 
-    def __init__(self, arguments: Sequence[str], folder: Path) -> None:
-        assert arguments[0] == "--settings"
-        self.settings = read_settings([Path(arguments[1])])
+    def __init__(self, job: SessionJob, folder: Path) -> None:
+        assert job.settings is not None
+        self.settings = read_settings([job.settings])
         (folder / "report.html").write_text("a report", encoding="utf-8")
 
     def answer(self) -> dict[str, object]:

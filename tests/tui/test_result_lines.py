@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.service.after import SessionTask
+from dbbstation.service.job import SessionTask
 from dbbstation.tui import texts
 from dbbstation.tui.result_lines import result_lines
 from tests.cli.conftest import call

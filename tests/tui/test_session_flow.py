@@ -19,9 +19,9 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
-from dbbstation.service.after import SessionTask
 from dbbstation.service.choice import SetUpPart
 from dbbstation.service.front import Front
+from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Memory
 from dbbstation.service.work import WorkProgress
 from dbbstation.station.programs import RunProgram

@@ -20,11 +20,12 @@ import pytest
 
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.reading import Reading
-from dbbstation.service.after import After, Result, SessionTask
+from dbbstation.service.after import After, Result
 from dbbstation.service.bar_calibration import Calibrated
 from dbbstation.service.choice import Choice, Prepared
 from dbbstation.service.former_sessions import BeforeAndNow, Former, InForce
 from dbbstation.service.front import Front
+from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order
 from dbbstation.service.session_list import SessionLine

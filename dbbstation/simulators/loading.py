@@ -18,7 +18,7 @@ from dbbstation.diagnosis.simulator.own import PortSource
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
 from dbbstation.files.gateway import content_of
-from dbbstation.files.own_classes import classes_in_files, module_name
+from dbbstation.files.own_classes import classes_in_files, module_name, own_instances
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
 
 if TYPE_CHECKING:
@@ -128,32 +128,15 @@ def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
     Raises:
         InputError: faults of the files; a port that is not there.
     """
-    faults: list[Problem] = []
-    found: dict[str, PortSource] = {}
-    for one_of in classes_in_files(files, PortSource, CONTRACT, faults) if files else ():  # type: ignore[type-abstract]
-        kind, place = one_of.kind, one_of.place
-        lacking = [name for name in ("name", "port") if not hasattr(kind, name)]
-        lacking += sorted(getattr(kind, "__abstractmethods__", ()))
-        if lacking:
-            faults.append(Problem(place.file, place.line, 0, f"{kind.__name__} lacks {', '.join(lacking)}", CONTRACT))
-            continue
-        try:
-            one = kind()
-            if one.port in file.ports:
-                _try_once(one, file.ports[one.port].signals)
-        except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
-            line = line_in(error, place.file) or place.line
-            faults.append(Problem(place.file, line, 0, f"{kind.__name__}: {in_words(error)}", CONTRACT))
-            continue
+
+    def fault_of(one: PortSource) -> tuple[str, str] | None:
         if one.port not in file.ports:
-            what = f"`{one.port}` of {kind.__name__} is no port; there are {', '.join(file.ports)}"
-            faults.append(Problem(place.file, place.line, 0, what, "name one of them"))
-        elif one.name in found:
-            faults.append(Problem(place.file, place.line, 0, f"the name `{one.name}` is taken", "give it another name"))
-        found[one.name] = one
-    if faults:
-        raise InputError(faults)
-    return list(found.values())
+            there = ", ".join(file.ports)
+            return f"`{one.port}` of {type(one).__name__} is no port; there are {there}", "name one of them"
+        _try_once(one, file.ports[one.port].signals)
+        return None
+
+    return own_instances(files, PortSource, CONTRACT, ("name", "port"), fault_of)  # type: ignore[type-abstract]
 
 
 def know(files: Sequence[Path]) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import InputError
+from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.service.former_sessions import keep_models
 from dbbstation.service.job import SessionJob, SessionTask
@@ -85,9 +86,8 @@ class After:
         self._counted = ""
         before = steps_before(self.session)
         if before is not None:
-            self._folder, done = before
-            self._counted = counted(self.session)
-            for name, one in done.items():
+            self._folder, self._counted = before.folder, before.counted
+            for name, one in before.steps.items():
                 path = self._folder / one.path
                 self.results[SessionTask(name)] = Result(WorkProgress.DONE, "", one.passed_s, one.answer, "", path)
 
@@ -95,9 +95,7 @@ class After:
     def folder(self) -> Path:
         """Folder of the results: made with the first step, never one that was there before."""
         if self._folder is None:
-            parent, name = self.session.parent, f"{self.session.name}-results"
-            numbered = (parent / (name if k == 1 else f"{name}-{k}") for k in range(1, 1000))
-            self._folder = next(path for path in numbered if not path.exists())
+            self._folder = unused_path(self.session.parent, f"{self.session.name}-results")
         return self._folder
 
     @property
@@ -162,9 +160,10 @@ class After:
             return
         if progress is WorkProgress.DONE:
             result.answer, result.path = work.answer(), self.folder / self._out(step)
-            keep_steps(self.folder, self.session, self._done())
             with suppress(InputError):
-                self._counted = self._counted or counted(self.session)
+                now = counted(self.session)
+                keep_steps(self.folder, now, self._done())
+                self._counted = self._counted or now
         elif progress is WorkProgress.FAILED:
             result.failure = work.failure()
         work.close()

@@ -9,6 +9,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
+from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
 from dbbstation.service.after import JOINT, KINEMATIC, After
@@ -119,7 +120,7 @@ class Front:
 
     def new_folder(self, name: str = "session") -> Path:
         """Return a folder for a new session that is not there yet."""
-        return _not_there(self.under, name)
+        return unused_path(self.under, name)
 
     def files(self, part: SetUpPart) -> tuple[Path, ...]:
         """Return the files that can be chosen for a part."""
@@ -193,7 +194,7 @@ class Front:
             plan, machine = session.plan_path, session.machine_path
         if plan is None or machine is None or choice.folder is None:
             raise ValueError("plan, machine or folder is missing")
-        folder = _not_there(choice.folder.parent, f"{choice.folder.name}-programs")
+        folder = unused_path(choice.folder.parent, f"{choice.folder.name}-programs")
         job = SessionJob(
             task=SessionTask.PROGRAMS,
             beside=self.under.absolute(),
@@ -263,7 +264,7 @@ class Front:
 
     def new_bar_file(self) -> Path:
         """Return a file for a calibration of the bar that is not there yet."""
-        return _not_there(self.under, f"bar-{datetime.now().astimezone():%Y-%m-%d}", ".yaml")
+        return unused_path(self.under, f"bar-{datetime.now().astimezone():%Y-%m-%d}", ".yaml")
 
     def open(self, choice: Choice, prepared: Prepared) -> Opened:
         """Switch on what is virtual, remember the choice, and return what runs the sequence.
@@ -348,12 +349,6 @@ class NoNumberError(ValueError):
     def __init__(self, name: str, text: str) -> None:
         self.name, self.text = name, text
         super().__init__(f"{name}: `{text}` is no number")
-
-
-def _not_there(folder: Path, name: str, suffix: str = "") -> Path:
-    """Return a path of that name that does not exist, with a number where it has to."""
-    numbered = (folder / f"{name if k == 1 else f'{name}-{k}'}{suffix}" for k in range(1, 10_000))
-    return next(path for path in numbered if not path.exists())
 
 
 def _number(values: Mapping[str, str], name: str) -> float:

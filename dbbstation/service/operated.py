@@ -10,6 +10,7 @@ from dbbstation.errors import InputError
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.formats.settings_schema import SettingsFile
+from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import format_for
@@ -89,8 +90,7 @@ class Operated:
 
     def _new_folder(self) -> Path:
         name = f"{self.path.stem}-{datetime.now().astimezone():%Y-%m-%d}"
-        numbered = (self.sessions / (name if k == 1 else f"{name}-{k}") for k in range(1, 10_000))
-        return next(path for path in numbered if not path.exists())
+        return unused_path(self.sessions, name)
 
 
 @dataclass(frozen=True)

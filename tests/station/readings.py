@@ -50,5 +50,5 @@ def still(length_mm: float | None, seconds: float, begin_s: float = 0.0) -> list
 
 def kinds(events: Iterable[Event]) -> list[str]:
     """Names of events, without those that only carry samples or states."""
-    quiet = {"StateChanged", "ReadingsSeen", "SamplesRecorded", "Progress"}
+    quiet = {"StateChanged", "ReadingsSeen", "SamplesRecorded", "RunProgress"}
     return [name for event in events if (name := type(event).__name__) not in quiet]

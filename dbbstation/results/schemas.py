@@ -7,6 +7,7 @@ from typing import Any
 from dbbstation.results.calibration import CalibrationResult
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.diagnosis import DiagnosisResult
+from dbbstation.results.drive import DriveResult
 from dbbstation.results.evaluation import EvaluationResult
 from dbbstation.results.mismatch import MismatchResult
 from dbbstation.results.prediction import PredictionResult
@@ -18,6 +19,7 @@ RESULTS: dict[str, type] = {
     "circles": CirclesResult,
     "compensate": ProgramsResult,
     "diagnose": DiagnosisResult,
+    "drive": DriveResult,
     "evaluate": EvaluationResult,
     "mismatch": MismatchResult,
     "predict": PredictionResult,

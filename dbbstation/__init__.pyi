@@ -7,6 +7,7 @@ from dbbstation.tasks.diagnose import diagnose as diagnose
 from dbbstation.tasks.evaluate import evaluate as evaluate
 from dbbstation.tasks.known import known_sources as known_sources
 from dbbstation.tasks.load import load as load
+from dbbstation.tasks.mismatch import mismatch as mismatch
 from dbbstation.tasks.models import read_model as read_model
 from dbbstation.tasks.models import write_model as write_model
 from dbbstation.tasks.predict import predict as predict

@@ -35,7 +35,7 @@ Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
-class Found(Generic[Base]):
+class FoundClass(Generic[Base]):
     """A class that is not the package's.
 
     Attributes:
@@ -73,12 +73,12 @@ def classes_of(module: ModuleType, base: type[Base]) -> list[type[Base]]:
     return [member for member in members if issubclass(member, base) and not member.__name__.startswith("_")]
 
 
-def installed(group: str, base: type[Base], faults: list[Problem]) -> list[Found[Base]]:
+def installed(group: str, base: type[Base], faults: list[Problem]) -> list[FoundClass[Base]]:
     """Classes that entry points of installed packages name; what cannot be loaded is added to `faults`."""
     found = []
     for point in loaded(group, faults):
         if isclass(point.value) and issubclass(point.value, base):
-            found.append(Found(point.value, point.place, point.remedy))
+            found.append(FoundClass(point.value, point.place, point.remedy))
         else:
             what = f"{point.named} is no class that derives from {base.__name__}"
             faults.append(Problem(point.place.file, 0, 0, what, point.remedy))

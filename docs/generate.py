@@ -162,7 +162,7 @@ def _sources() -> str:
 
 def _sizes(source: ErrorSource, machine: Machine) -> list[str]:
     """What a diagnosis takes from a source beforehand: plausible sizes and how exact the formula is."""
-    amplitudes = [parameter for parameter in source.parameters(machine) if not parameter.shape]
+    amplitudes = [parameter for parameter in source.parameters(machine) if not parameter.grid]
     sizes = dict.fromkeys(f"{p.plausible:g} {p.unit}" for p in amplitudes)
     share = source.form_uncertainty
     exact = f"real machines depart from it by {100 * share:g} % of the effect (one standard deviation)"

@@ -12,7 +12,7 @@ from scipy.stats import binom
 from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis, analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import Budget, SetUpKnowledge, budgets, pair_budgets
 from dbbstation.circles.path import Filter
-from dbbstation.circles.quantity import ABSOLUTE, Quantity
+from dbbstation.circles.quantity import ABSOLUTE, BudgetQuantity
 from dbbstation.circles.quick_look import quick_look
 from dbbstation.circles.signatures import Signature
 from dbbstation.plan.bar import Bar
@@ -223,14 +223,14 @@ def _turn(machine: SerialMachine, direction: Direction, ball_mm: tuple[float, ..
 def _of_one(read: CircleAnalysis, true: CircleAnalysis, known: SetUpKnowledge, seed: int) -> Iterator[tuple[str, bool]]:
     for quantity, budget in budgets(read, known).items():
         yield _row(quantity), _holds(budget, _truth(true, quantity))
-    for quantity in sorted(ABSOLUTE - {Quantity.D}):
+    for quantity in sorted(ABSOLUTE - {BudgetQuantity.D}):
         nothing = budgets(read, UNKNOWN, [quantity])[quantity]
         yield f"{_row(quantity)}, bar not known: {SURE}", nothing.u_um is None
     chosen = FILTERS[seed % len(FILTERS)]
-    budget = budgets(refiltered(read, chosen), known, [Quantity.G])[Quantity.G]
+    budget = budgets(refiltered(read, chosen), known, [BudgetQuantity.G])[BudgetQuantity.G]
     yield GAUSSIAN, _holds(budget, refiltered(true, chosen).g_um)
     sharp_read, sharp_true = refiltered(read, Filter.UPR_30), refiltered(true, Filter.UPR_30)
-    for quantity, budget in budgets(sharp_read, known, [Quantity.G, Quantity.G_LS]).items():
+    for quantity, budget in budgets(sharp_read, known, [BudgetQuantity.G, BudgetQuantity.G_LS]).items():
         yield f"{quantity}, 30 UPR", _holds(budget, _truth(sharp_true, quantity))
     size = sizes_of(sharp_read, known)[CircleFigure.CENTRE_DEVIATION]
     yield "centre deviation", abs(size.um - 1e3 * float(np.hypot(*true.centre_mm))) <= COVERAGE_FACTOR * size.known_um
@@ -238,10 +238,10 @@ def _of_one(read: CircleAnalysis, true: CircleAnalysis, known: SetUpKnowledge, s
 
 def _of_both(read: PairAnalysis, true: PairAnalysis, known: SetUpKnowledge) -> Iterator[tuple[str, bool]]:
     truth = {
-        Quantity.G_BOTH: true.g_um,
-        Quantity.G_BOTH_LS: true.g_least_squares_um,
-        Quantity.D: true.d_um,
-        Quantity.H: true.h_um,
+        BudgetQuantity.G_BOTH: true.g_um,
+        BudgetQuantity.G_BOTH_LS: true.g_least_squares_um,
+        BudgetQuantity.D: true.d_um,
+        BudgetQuantity.H: true.h_um,
     }
     for quantity, budget in pair_budgets(read, known).items():
         yield _row(quantity), _holds(budget, truth[quantity])
@@ -273,20 +273,20 @@ def _of_look(read: Sequence[CircleAnalysis], machine: SerialMachine) -> Iterator
             yield f"{one.signature}, not seen: below", true <= one.below
 
 
-def _row(quantity: Quantity) -> str:
-    return "centre" if quantity in {Quantity.X, Quantity.Y} else str(quantity)
+def _row(quantity: BudgetQuantity) -> str:
+    return "centre" if quantity in {BudgetQuantity.X, BudgetQuantity.Y} else str(quantity)
 
 
-def _truth(true: CircleAnalysis, quantity: Quantity) -> float:
+def _truth(true: CircleAnalysis, quantity: BudgetQuantity) -> float:
     return {
-        Quantity.G: true.g_um,
-        Quantity.G_LS: true.g_least_squares_um,
-        Quantity.F_MAX: true.f_centred.largest_um,
-        Quantity.F_MIN: true.f_centred.least_um,
-        Quantity.RADIUS: true.radius_error_um,
-        Quantity.MEAN_RADIAL: true.mean_radial_error_um,
-        Quantity.X: 1e3 * true.centre_mm[0],
-        Quantity.Y: 1e3 * true.centre_mm[1],
+        BudgetQuantity.G: true.g_um,
+        BudgetQuantity.G_LS: true.g_least_squares_um,
+        BudgetQuantity.F_MAX: true.f_centred.largest_um,
+        BudgetQuantity.F_MIN: true.f_centred.least_um,
+        BudgetQuantity.RADIUS: true.radius_error_um,
+        BudgetQuantity.MEAN_RADIAL: true.mean_radial_error_um,
+        BudgetQuantity.X: 1e3 * true.centre_mm[0],
+        BudgetQuantity.Y: 1e3 * true.centre_mm[1],
     }[quantity]
 
 

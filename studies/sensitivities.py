@@ -15,13 +15,14 @@ from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.diagnosis.drive.summary import drive_summary
 from dbbstation.diagnosis.table.mismatch import find_mismatch
-from dbbstation.diagnosis.table.summary import mismatch_summary
 from dbbstation.files.recordings.drive_csv import read_drive
 from dbbstation.processes import each
+from dbbstation.results.of_mismatch import mismatch_result
+from dbbstation.results.serialise import plain
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnose import default_candidates
 from dbbstation.tasks.load import load_sessions
-from dbbstation.tasks.tables import Asked, load_tables
+from dbbstation.tasks.tables import TableOptions, load_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -260,8 +261,8 @@ def _pair_answer(a: Path, b: Path) -> Answer:
 
 
 def _table_answer(path: Path, measured: str, simulated: str) -> Answer:
-    table = load_tables([path], Asked(measured, simulated)).table
-    summary = mismatch_summary(find_mismatch(table))
+    table = load_tables([path], TableOptions(measured, simulated)).table
+    summary = plain(mismatch_result(find_mismatch(table)))
     answer = _answer(summary["findings"], _values({one["name"]: one["after"] for one in summary["parameters"]}))
     for one in summary["parameters"]:
         answer.verdicts[f"{one['name']}, as far as is known of it"] = "beyond" if one["far"] else "within"

@@ -27,7 +27,7 @@ sources state of theirs is for a change from one session to another."""
 
 
 @dataclass(frozen=True, eq=False)
-class Term:
+class ParameterSet:
     """One set of parameters of one source.
 
     Attributes:
@@ -64,7 +64,7 @@ class Layout:
     """
 
     machine: Machine
-    terms: tuple[Term, ...]
+    terms: tuple[ParameterSet, ...]
     known: Columns
     nominal: NDArray[np.float64]
 
@@ -76,7 +76,7 @@ class Layout:
     def columns_of(self, source: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Columns of a source's amplitudes, of all its sets, and those of its parameters of shape."""
         numbered = [
-            (term.columns.start + k, bool(parameter.shape))
+            (term.columns.start + k, bool(parameter.grid))
             for term in self.terms
             if term.source.name == source
             for k, parameter in enumerate(term.parameters)
@@ -98,7 +98,7 @@ class Layout:
             x: values of all columns, shape (k,).
         """
         share = [
-            0.0 if parameter.shape or term.source.name in GEOMETRY else term.source.form_uncertainty
+            0.0 if parameter.grid or term.source.name in GEOMETRY else term.source.form_uncertainty
             for term in self.terms
             for parameter in term.parameters
         ]
@@ -127,7 +127,7 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
     Raises:
         ModelError: a source needs what machine file or recordings lack.
     """
-    terms: list[Term] = []
+    terms: list[ParameterSet] = []
     prior: list[float] = []
     random: list[bool] = []
     motions = [observation.motion() for observation in observations]
@@ -139,13 +139,13 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
             stated = source.stated_mm(motion)
             if stated is not None and not np.any(stated > 0.0):
                 continue
-            terms.append(Term(source, shared, parameters, slice(len(prior), len(prior) + len(parameters))))
+            terms.append(ParameterSet(source, shared, parameters, slice(len(prior), len(prior) + len(parameters))))
             sizes = [_prior(p) for p in parameters] if stated is None else [float(size) for size in stated]
-            prior += [p.plausible if p.shape else size for p, size in zip(parameters, sizes, strict=True)]
+            prior += [p.plausible if p.grid else size for p, size in zip(parameters, sizes, strict=True)]
             random += [stated is not None] * len(parameters)
     every = [p for term in terms for p in term.parameters]
     scale = np.array([p.plausible for p in every])
-    nominal = np.array([p.shape[len(p.shape) // 2] if p.shape else 0.0 for p in every])
+    nominal = np.array([p.grid[len(p.grid) // 2] if p.grid else 0.0 for p in every])
     return Layout(machine, tuple(terms), Columns(np.array(prior), scale, np.array(random, dtype=bool)), nominal)
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.circles.noise import CircleNoise
-    from dbbstation.circles.reversals import Harmonic, Step
+    from dbbstation.circles.reversals import Harmonic, ReversalStep
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.circle import RawCircle
     from dbbstation.trace.passes import Passes
@@ -79,9 +79,9 @@ class CircleAnalysis:
     mean_radial_error_um: float
     f_centred: Deviations
     f_commanded: Deviations
-    steps: tuple[Step, ...]
+    steps: tuple[ReversalStep, ...]
     harmonics: tuple[Harmonic, ...]
-    closure: Step | None
+    closure: ReversalStep | None
     passes: Passes | None
     feed_mm_min: tuple[float, float] | None
     noise: CircleNoise

@@ -10,7 +10,7 @@ import numpy as np
 
 from dbbstation.circles.estimates import estimate_of, pair_estimate
 from dbbstation.circles.noise import FEWEST_SAMPLES, ROUNDING
-from dbbstation.circles.quantity import ABSOLUTE, Quantity
+from dbbstation.circles.quantity import ABSOLUTE, BudgetQuantity
 from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
 
 
-class Cause(StrEnum):
+class BudgetTerm(StrEnum):
     """Terms of a budget."""
 
     NOISE = "noise of the readings"
@@ -71,8 +71,8 @@ class Budget:
         why_not: why it has no uncertainty; empty where it has one.
     """
 
-    quantity: Quantity
-    terms_um: Mapping[Cause, float]
+    quantity: BudgetQuantity
+    terms_um: Mapping[BudgetTerm, float]
     missing: tuple[str, ...]
     value_um: float
     as_read_um: float
@@ -92,11 +92,11 @@ class Budget:
 TOO_FEW = f"fewer than {FEWEST_SAMPLES} samples do not separate noise from form"
 """Why a range of few samples has no uncertainty."""
 
-RANGES = (Quantity.G, Quantity.G_LS, Quantity.F_MAX, Quantity.F_MIN)
+RANGES = (BudgetQuantity.G, BudgetQuantity.G_LS, BudgetQuantity.F_MAX, BudgetQuantity.F_MIN)
 """Figures of one circle that are extremes of its path."""
 
 
-def budget_of(one: CircleAnalysis, quantity: Quantity, known: SetUpKnowledge) -> Budget:
+def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> Budget:
     """Return the budget of a figure of one circle.
 
     Args:
@@ -110,119 +110,130 @@ def budget_of(one: CircleAnalysis, quantity: Quantity, known: SetUpKnowledge) ->
     sigma = one.noise.sigma_um
     if quantity in ABSOLUTE:
         # The mean of readings is along the bar, the radius in the plane of the circle.
-        scale = 1.0 if quantity is Quantity.MEAN_RADIAL else along
-        value = one.mean_radial_error_um if quantity is Quantity.MEAN_RADIAL else one.radius_error_um
+        scale = 1.0 if quantity is BudgetQuantity.MEAN_RADIAL else along
+        value = one.mean_radial_error_um if quantity is BudgetQuantity.MEAN_RADIAL else one.radius_error_um
         length = _length_terms(one, known, scale)
-        terms = {Cause.NOISE: scale * sigma / np.sqrt(len(one.raw)), **length.terms}
+        terms = {BudgetTerm.NOISE: scale * sigma / np.sqrt(len(one.raw)), **length.terms}
         return Budget(quantity, terms, (*length.missing, *NOT_STATED), value, value, known.not_absolute)
-    axis = 0 if quantity is Quantity.X else 1
+    axis = 0 if quantity is BudgetQuantity.X else 1
     across_um = 1e3 * one.centre_mm[1 - axis]
     value = 1e3 * one.centre_mm[axis]
     terms = {
-        Cause.NOISE: along * sigma * np.sqrt(2.0 / len(one.raw)),
-        Cause.ANGLE: abs(across_um) * np.radians(one.raw.start_uncertainty_deg),
+        BudgetTerm.NOISE: along * sigma * np.sqrt(2.0 / len(one.raw)),
+        BudgetTerm.ANGLE: abs(across_um) * np.radians(one.raw.start_uncertainty_deg),
         # A drift c over the turn is a sawtooth, whose first harmonic is c / pi across the start.
-        Cause.CLOSURE: _closure_um(one) / np.pi / np.sqrt(3.0),
+        BudgetTerm.CLOSURE: _closure_um(one) / np.pi / np.sqrt(3.0),
     }
     missing = [*NOT_STATED]
     if known.u_ball_um is None:
-        missing.insert(0, Cause.MOUNTING.value)
+        missing.insert(0, BudgetTerm.MOUNTING.value)
     else:
-        terms[Cause.MOUNTING] = known.u_ball_um
+        terms[BudgetTerm.MOUNTING] = known.u_ball_um
     return Budget(quantity, terms, tuple(missing), value, value)
 
 
-def _range(one: CircleAnalysis, quantity: Quantity, known: SetUpKnowledge) -> Budget:
+def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> Budget:
     """Budget of an extreme of the path, or of the difference of two."""
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
     terms = _of_extremes(one, 1 if quantity in ABSOLUTE else 2)
     missing, why = NOT_STATED, ""
     if quantity in ABSOLUTE:
         length = _length_terms(one, known, along)
-        terms |= {Cause.NOISE: along * one.noise.sigma_um / np.sqrt(len(one.raw)), **length.terms}
+        terms |= {BudgetTerm.NOISE: along * one.noise.sigma_um / np.sqrt(len(one.raw)), **length.terms}
         missing, why = (*length.missing, *NOT_STATED), known.not_absolute
     found = estimate_of(one, quantity)
     if found is None:
         read = _as_read(one)[quantity]
         return Budget(quantity, terms, missing, read, read, TOO_FEW)
-    terms[Cause.NOISE] = float(np.hypot(found.u_um, terms.get(Cause.NOISE, 0.0)))
+    terms[BudgetTerm.NOISE] = float(np.hypot(found.u_um, terms.get(BudgetTerm.NOISE, 0.0)))
     return Budget(quantity, terms, missing, found.value_um, found.as_read_um, why)
 
 
-def _of_extremes(one: CircleAnalysis, extremes: int) -> dict[Cause, float]:
+def _of_extremes(one: CircleAnalysis, extremes: int) -> dict[BudgetTerm, float]:
     """Terms that one extreme of the path has, or the difference of two, whatever its noise."""
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
     root = float(np.sqrt(extremes))
     return {
-        Cause.RESOLUTION: root * along * one.noise.resolution_um / ROUNDING,
-        Cause.CLOSURE: root * _closure_um(one) / ROUNDING,
+        BudgetTerm.RESOLUTION: root * along * one.noise.resolution_um / ROUNDING,
+        BudgetTerm.CLOSURE: root * _closure_um(one) / ROUNDING,
     }
 
 
-def _as_read(one: CircleAnalysis) -> dict[Quantity, float]:
+def _as_read(one: CircleAnalysis) -> dict[BudgetQuantity, float]:
     return {
-        Quantity.G: one.g_um,
-        Quantity.G_LS: one.g_least_squares_um,
-        Quantity.F_MAX: one.f_centred.largest_um,
-        Quantity.F_MIN: one.f_centred.least_um,
+        BudgetQuantity.G: one.g_um,
+        BudgetQuantity.G_LS: one.g_least_squares_um,
+        BudgetQuantity.F_MAX: one.f_centred.largest_um,
+        BudgetQuantity.F_MIN: one.f_centred.least_um,
     }
 
 
-OF_ONE = (*RANGES, Quantity.RADIUS, Quantity.MEAN_RADIAL, Quantity.X, Quantity.Y)
-OF_BOTH = (Quantity.G_BOTH, Quantity.G_BOTH_LS, Quantity.D, Quantity.H)
+OF_ONE = (*RANGES, BudgetQuantity.RADIUS, BudgetQuantity.MEAN_RADIAL, BudgetQuantity.X, BudgetQuantity.Y)
+OF_BOTH = (BudgetQuantity.G_BOTH, BudgetQuantity.G_BOTH_LS, BudgetQuantity.D, BudgetQuantity.H)
 
 
 @with_one_thread
 def budgets(
-    one: CircleAnalysis, known: SetUpKnowledge, quantities: Iterable[Quantity] = OF_ONE
-) -> dict[Quantity, Budget]:
+    one: CircleAnalysis, known: SetUpKnowledge, quantities: Iterable[BudgetQuantity] = OF_ONE
+) -> dict[BudgetQuantity, Budget]:
     """Return the budgets of figures of a circle, all or some; arguments as of `budget_of`."""
     return {quantity: budget_of(one, quantity, known) for quantity in quantities}
 
 
 @with_one_thread
-def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[Quantity, Budget]:
+def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[BudgetQuantity, Budget]:
     """Return the budgets of G(b), D and H of a circle in both directions on one mounting.
 
     Args:
         pair: the circle in both directions.
         known: what the session states; bar and ball are the same in both.
     """
-    radius = [budget_of(one, Quantity.RADIUS, known) for one in (pair.one, pair.other)]
-    noise = float(np.hypot(radius[0].terms_um[Cause.NOISE], radius[1].terms_um[Cause.NOISE])) / 2.0
-    shared: dict[Cause, float] = {cause: size for cause, size in radius[0].terms_um.items() if cause is not Cause.NOISE}
-    d_terms = {Cause.NOISE: noise, **shared}
-    found = {quantity: _pair_range(pair, quantity) for quantity in (Quantity.G_BOTH, Quantity.G_BOTH_LS, Quantity.H)}
-    found[Quantity.D] = Budget(Quantity.D, d_terms, radius[0].missing, pair.d_um, pair.d_um, known.not_absolute)
+    radius = [budget_of(one, BudgetQuantity.RADIUS, known) for one in (pair.one, pair.other)]
+    noise = float(np.hypot(radius[0].terms_um[BudgetTerm.NOISE], radius[1].terms_um[BudgetTerm.NOISE])) / 2.0
+    shared: dict[BudgetTerm, float] = {
+        cause: size for cause, size in radius[0].terms_um.items() if cause is not BudgetTerm.NOISE
+    }
+    d_terms = {BudgetTerm.NOISE: noise, **shared}
+    found = {
+        quantity: _pair_range(pair, quantity)
+        for quantity in (BudgetQuantity.G_BOTH, BudgetQuantity.G_BOTH_LS, BudgetQuantity.H)
+    }
+    found[BudgetQuantity.D] = Budget(
+        BudgetQuantity.D, d_terms, radius[0].missing, pair.d_um, pair.d_um, known.not_absolute
+    )
     return {quantity: found[quantity] for quantity in OF_BOTH}
 
 
-def _pair_range(pair: PairAnalysis, quantity: Quantity) -> Budget:
+def _pair_range(pair: PairAnalysis, quantity: BudgetQuantity) -> Budget:
     each = [_of_extremes(one, 2) for one in (pair.one, pair.other)]
     turned = float(np.hypot(pair.one.raw.start_uncertainty_deg, pair.other.raw.start_uncertainty_deg))
     terms = {
         cause: float(np.sqrt(np.mean([terms[cause] ** 2 for terms in each])))
-        for cause in (Cause.RESOLUTION, Cause.CLOSURE)
+        for cause in (BudgetTerm.RESOLUTION, BudgetTerm.CLOSURE)
     }
-    terms[Cause.ANGLE] = _slope_um_per_deg(pair) * turned
-    read = {Quantity.G_BOTH: pair.g_um, Quantity.G_BOTH_LS: pair.g_least_squares_um, Quantity.H: pair.h_um}[quantity]
+    terms[BudgetTerm.ANGLE] = _slope_um_per_deg(pair) * turned
+    read = {
+        BudgetQuantity.G_BOTH: pair.g_um,
+        BudgetQuantity.G_BOTH_LS: pair.g_least_squares_um,
+        BudgetQuantity.H: pair.h_um,
+    }[quantity]
     found = pair_estimate(pair, quantity)
     if found is None:
         return Budget(quantity, terms, NOT_STATED, read, read, TOO_FEW)
-    terms[Cause.NOISE] = found.u_um
+    terms[BudgetTerm.NOISE] = found.u_um
     return Budget(quantity, terms, NOT_STATED, found.value_um, read)
 
 
 @dataclass
 class _Draft:
-    terms: dict[Cause, float] = field(default_factory=dict)
+    terms: dict[BudgetTerm, float] = field(default_factory=dict)
     missing: list[str] = field(default_factory=list)
 
 
 def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, scale: float) -> _Draft:
     """What bar and height of the ball do to lengths in the plane of the circle, or along the bar."""
     draft = _Draft()
-    for cause, size in ((Cause.BAR, known.u_bar_um), (Cause.TEMPERATURE, known.u_temperature_um)):
+    for cause, size in ((BudgetTerm.BAR, known.u_bar_um), (BudgetTerm.TEMPERATURE, known.u_temperature_um)):
         if size is None:
             draft.missing.append(cause.value)
         else:
@@ -231,7 +242,7 @@ def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, scale: float) -> _
         draft.missing.append("height of the tool tip above the ball")
         if known.u_ball_z_um is not None:
             rise = abs(float(np.tan(np.radians(one.raw.circle.elevation_deg))))
-            draft.terms[Cause.MOUNTING] = rise * known.u_ball_z_um
+            draft.terms[BudgetTerm.MOUNTING] = rise * known.u_ball_z_um
     return draft
 
 

@@ -20,7 +20,7 @@ from dbbstation.circles.extremes import (
 )
 from dbbstation.circles.form import form_and_noise
 from dbbstation.circles.path import path_of
-from dbbstation.circles.quantity import Quantity
+from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.strip import strip_widths
 from dbbstation.plan.circle import FULL_TURN_DEG
 
@@ -35,7 +35,7 @@ CLEAR = 2.0
 """Standard uncertainties from which a drift over the turn counts as form: less is noise."""
 
 
-def estimate_of(one: CircleAnalysis, quantity: Quantity) -> Estimate | None:
+def estimate_of(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate | None:
     """Return G, G(LS), Fmax or Fmin of a circle; None where it has too few samples to separate noise from form.
 
     Args:
@@ -50,23 +50,23 @@ def estimate_of(one: CircleAnalysis, quantity: Quantity) -> Estimate | None:
     return found[quantity]
 
 
-_FOUND: WeakKeyDictionary[CircleAnalysis, dict[Quantity, Estimate]] = WeakKeyDictionary()
+_FOUND: WeakKeyDictionary[CircleAnalysis, dict[BudgetQuantity, Estimate]] = WeakKeyDictionary()
 _DRAWN: WeakKeyDictionary[CircleAnalysis, tuple[NDArray[np.float64], DrawnPath]] = WeakKeyDictionary()
 """Worked out once: tables, budgets and tolerances ask for them."""
 
 
-def _estimate(one: CircleAnalysis, quantity: Quantity) -> Estimate:
+def _estimate(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate:
     _, drawn = _drawn(one)
     radius_um, deviation_um = one.radius_error_um, 1e3 * one.path.least_squares.deviation_mm
     match quantity:
-        case Quantity.G:
+        case BudgetQuantity.G:
             return estimated([drawn], strip_widths, one.g_um)
-        case Quantity.G_LS:
+        case BudgetQuantity.G_LS:
             return estimated([drawn], range_of, one.g_least_squares_um)
-        case Quantity.F_MAX:
+        case BudgetQuantity.F_MAX:
             found = estimated([drawn], greatest_of, float(deviation_um.max()))
             return Estimate(radius_um + found.value_um, found.u_um, radius_um + found.as_read_um)
-        case Quantity.F_MIN:
+        case BudgetQuantity.F_MIN:
             found = estimated([drawn], least_of, float(-deviation_um.min()))
             return Estimate(radius_um - found.value_um, found.u_um, radius_um - found.as_read_um)
         case _:
@@ -93,7 +93,7 @@ def _drawn(one: CircleAnalysis) -> tuple[NDArray[np.float64], DrawnPath]:
     return _DRAWN[one]
 
 
-def pair_estimate(pair: PairAnalysis, quantity: Quantity) -> Estimate | None:
+def pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate | None:
     """Return G(b), G(b)(LS) or H of both directions; None where one has too few samples to separate noise from form.
 
     Args:
@@ -108,11 +108,11 @@ def pair_estimate(pair: PairAnalysis, quantity: Quantity) -> Estimate | None:
     return found[quantity]
 
 
-_OF_PAIRS: WeakKeyDictionary[PairAnalysis, dict[Quantity, Estimate]] = WeakKeyDictionary()
+_OF_PAIRS: WeakKeyDictionary[PairAnalysis, dict[BudgetQuantity, Estimate]] = WeakKeyDictionary()
 
 
-def _pair_estimate(pair: PairAnalysis, quantity: Quantity) -> Estimate:
-    if quantity is Quantity.H:
+def _pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate:
+    if quantity is BudgetQuantity.H:
         return _hysteresis(pair)
     paths = []
     split = np.split(1e3 * pair.together.least_squares.deviation_mm, [len(pair.one.raw)])
@@ -121,7 +121,7 @@ def _pair_estimate(pair: PairAnalysis, quantity: Quantity) -> Estimate:
         # Seen from the circle of both, radius and centre of each are form.
         beside_um = deviation_um - 1e3 * one.path.least_squares.deviation_mm
         paths.append(drawn.with_form(form_um + beside_um))
-    if quantity is Quantity.G_BOTH:
+    if quantity is BudgetQuantity.G_BOTH:
         return estimated(paths, strip_widths, pair.g_um)
     return estimated(paths, range_of, pair.g_least_squares_um)
 

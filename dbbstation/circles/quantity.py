@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 
 
-class Quantity(StrEnum):
+class BudgetQuantity(StrEnum):
     """What a budget is for."""
 
     G = "G"
@@ -22,5 +22,7 @@ class Quantity(StrEnum):
     H = "H"
 
 
-ABSOLUTE = frozenset({Quantity.F_MAX, Quantity.F_MIN, Quantity.RADIUS, Quantity.MEAN_RADIAL, Quantity.D})
+ABSOLUTE = frozenset(
+    {BudgetQuantity.F_MAX, BudgetQuantity.F_MIN, BudgetQuantity.RADIUS, BudgetQuantity.MEAN_RADIAL, BudgetQuantity.D}
+)
 """Figures that rest on the bar's length, not on its changes alone."""

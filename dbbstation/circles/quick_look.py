@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 from scipy.optimize import minimize_scalar
 
 from dbbstation.circles.noise import LEAST_UM
-from dbbstation.circles.signatures import Shape, Signature, cyclic_shapes, shapes_of
+from dbbstation.circles.signatures import Signature, SignatureColumn, cyclic_shapes, shapes_of
 from dbbstation.inference.harmonics import LOW, basis, misfit
 from dbbstation.threads import with_one_thread
 from dbbstation.trace.average import means, sector_of
@@ -117,7 +117,7 @@ class _Turn:
 class _Fit:
     """Least squares of all shapes, and of what is fitted with them: centre, radius and form."""
 
-    shapes: tuple[Shape, ...]
+    shapes: tuple[SignatureColumn, ...]
     value: NDArray[np.float64]
     unit_covariance: NDArray[np.float64]
     left_um: NDArray[np.float64]

@@ -31,7 +31,7 @@ FEWEST = 6
 
 
 @dataclass(frozen=True)
-class Step:
+class ReversalStep:
     """How much the path rises from before a place to behind it, in the sense of travel.
 
     Attributes:
@@ -60,7 +60,9 @@ class Harmonic:
     peak_deg: float
 
 
-def step_at(raw: RawCircle, deviation_um: NDArray[np.float64], theta_deg: float, sigma_um: float) -> Step | None:
+def step_at(
+    raw: RawCircle, deviation_um: NDArray[np.float64], theta_deg: float, sigma_um: float
+) -> ReversalStep | None:
     """Return the step of a path at a place, by straight lines on both its sides.
 
     Args:
@@ -80,16 +82,16 @@ def step_at(raw: RawCircle, deviation_um: NDArray[np.float64], theta_deg: float,
     if any(end is None for end in ends):
         return None
     (before, u_before), (behind, u_behind) = (end for end in ends if end is not None)
-    return Step(theta_deg, behind - before, float(np.hypot(u_before, u_behind)))
+    return ReversalStep(theta_deg, behind - before, float(np.hypot(u_before, u_behind)))
 
 
-def closure_of(raw: RawCircle, deviation_um: NDArray[np.float64], sigma_um: float) -> Step | None:
+def closure_of(raw: RawCircle, deviation_um: NDArray[np.float64], sigma_um: float) -> ReversalStep | None:
     """Return how far the end of a turn lies outside of its beginning; None where too few samples lie there."""
     beginning = _line_at(raw.phi_deg, deviation_um, 1.0, sigma_um, near_deg=0.0)
     end = _line_at(raw.phi_deg - FULL_TURN_DEG, deviation_um, -1.0, sigma_um, near_deg=0.0)
     if beginning is None or end is None:
         return None
-    return Step(raw.circle.start_deg, end[0] - beginning[0], float(np.hypot(beginning[1], end[1])))
+    return ReversalStep(raw.circle.start_deg, end[0] - beginning[0], float(np.hypot(beginning[1], end[1])))
 
 
 def _line_at(

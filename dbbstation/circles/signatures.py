@@ -34,7 +34,7 @@ ENDS = {"+X": 0.0, "+Y": 90.0, "-X": 180.0, "-Y": 270.0}
 
 
 @dataclass(frozen=True)
-class Shape:
+class SignatureColumn:
     """One column of the fit.
 
     Attributes:
@@ -48,7 +48,9 @@ class Shape:
     unit: str
 
 
-def shapes_of(theta_deg: NDArray[np.float64], circle: Circle, spike_deg: float) -> dict[Shape, NDArray[np.float64]]:
+def shapes_of(
+    theta_deg: NDArray[np.float64], circle: Circle, spike_deg: float
+) -> dict[SignatureColumn, NDArray[np.float64]]:
     """Return the deviations that unit sizes cause [µm], shape (n,) each.
 
     - Squareness β, positive where the axes include more than 90 degrees: e_x = -β y, hence -β R/2 sin 2θ.
@@ -68,18 +70,18 @@ def shapes_of(theta_deg: NDArray[np.float64], circle: Circle, spike_deg: float) 
     cosine, sine = np.cos(theta), np.sin(theta)
     feed_um_ms = circle.feed_mm_min / 60.0
     found = {
-        Shape(Signature.SQUARENESS, "", "µm/m"): -5e-4 * radius_mm * np.sin(2.0 * theta),
-        Shape(Signature.SCALE, "", "µm/m"): 5e-4 * radius_mm * np.cos(2.0 * theta),
-        Shape(Signature.SERVO, "", "ms"): 0.5 * sign * feed_um_ms * np.sin(2.0 * theta),
+        SignatureColumn(Signature.SQUARENESS, "", "µm/m"): -5e-4 * radius_mm * np.sin(2.0 * theta),
+        SignatureColumn(Signature.SCALE, "", "µm/m"): 5e-4 * radius_mm * np.cos(2.0 * theta),
+        SignatureColumn(Signature.SERVO, "", "ms"): 0.5 * sign * feed_um_ms * np.sin(2.0 * theta),
     }
     along = {"X": (cosine, -sign * sine), "Y": (sine, sign * cosine)}
     for end in ENDS:
         at, speed = along[end[1]]
         share = 0.5 * (1.0 + at) if end[0] == "+" else 0.5 * (1.0 - at)
-        found[Shape(Signature.BACKLASH, end, "µm")] = -0.5 * np.sign(speed) * at * share
+        found[SignatureColumn(Signature.BACKLASH, end, "µm")] = -0.5 * np.sign(speed) * at * share
     for end, end_deg in ENDS.items():
         behind = np.mod(sign * (theta_deg - end_deg), 360.0)
-        found[Shape(Signature.SPIKE, end, "µm")] = np.where(
+        found[SignatureColumn(Signature.SPIKE, end, "µm")] = np.where(
             behind < spike_deg, np.sin(np.pi * np.minimum(behind / spike_deg, 1.0)), 0.0
         )
     return found

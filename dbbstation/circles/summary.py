@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.circles.quantity import Quantity
+from dbbstation.circles.quantity import BudgetQuantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, Deviations, PairAnalysis
     from dbbstation.circles.budget import Budget
     from dbbstation.circles.quick_look import QuickLook
-    from dbbstation.circles.reversals import Step
+    from dbbstation.circles.reversals import ReversalStep
 
 
-def circle_summary(one: CircleAnalysis, budgets: Mapping[Quantity, Budget]) -> dict[str, Any]:
+def circle_summary(one: CircleAnalysis, budgets: Mapping[BudgetQuantity, Budget]) -> dict[str, Any]:
     """Figures of one circle, lengths in µm unless the key says otherwise; None where something cannot be determined."""
     x, y = one.centre_mm
     return {
@@ -29,9 +29,9 @@ def circle_summary(one: CircleAnalysis, budgets: Mapping[Quantity, Budget]) -> d
         "feed_mm_min": one.raw.circle.feed_mm_min,
         "samples": len(one.raw),
         "samples_lost": one.lost,
-        "g_um": budgets[Quantity.G].value_um,
-        "g_least_squares_um": budgets[Quantity.G_LS].value_um,
-        "f_um": {"max": budgets[Quantity.F_MAX].value_um, "min": budgets[Quantity.F_MIN].value_um},
+        "g_um": budgets[BudgetQuantity.G].value_um,
+        "g_least_squares_um": budgets[BudgetQuantity.G_LS].value_um,
+        "f_um": {"max": budgets[BudgetQuantity.F_MAX].value_um, "min": budgets[BudgetQuantity.F_MIN].value_um},
         "f_about_commanded_centre_um": _deviations(one.f_commanded),
         "radius_error_um": one.radius_error_um,
         "mean_radial_error_um": one.mean_radial_error_um,
@@ -55,19 +55,19 @@ def circle_summary(one: CircleAnalysis, budgets: Mapping[Quantity, Budget]) -> d
     }
 
 
-def pair_summary(pair: PairAnalysis, budgets: Mapping[Quantity, Budget]) -> dict[str, Any]:
+def pair_summary(pair: PairAnalysis, budgets: Mapping[BudgetQuantity, Budget]) -> dict[str, Any]:
     """Figures of both directions of a circle [µm]."""
     return {
-        "g_um": budgets[Quantity.G_BOTH].value_um,
-        "g_least_squares_um": budgets[Quantity.G_BOTH_LS].value_um,
+        "g_um": budgets[BudgetQuantity.G_BOTH].value_um,
+        "g_least_squares_um": budgets[BudgetQuantity.G_BOTH_LS].value_um,
         "d_um": pair.d_um,
-        "h_um": budgets[Quantity.H].value_um,
+        "h_um": budgets[BudgetQuantity.H].value_um,
         "h_deg": pair.h_deg,
         "uncertainty": budget_summary(budgets),
     }
 
 
-def budget_summary(budgets: Mapping[Quantity, Budget]) -> dict[str, Any]:
+def budget_summary(budgets: Mapping[BudgetQuantity, Budget]) -> dict[str, Any]:
     """Standard uncertainty u, its terms, what is missing, and the figure with its noise, by figure [µm]; u is None where why_not says why."""
     return {
         str(quantity): {
@@ -109,7 +109,7 @@ def _deviations(both: Deviations) -> dict[str, float]:
     return {"max": both.largest_um, "min": both.least_um}
 
 
-def _step(step: Step) -> dict[str, float]:
+def _step(step: ReversalStep) -> dict[str, float]:
     return {"theta_deg": step.theta_deg, "height_um": step.height_um, "u_um": step.u_um}
 
 

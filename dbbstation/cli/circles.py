@@ -220,7 +220,7 @@ def _print_budgets(summary: Mapping[str, Any]) -> None:
 
 def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
     from dbbstation.cli.output import print_table
-    from dbbstation.quality.finding import Verdict
+    from dbbstation.quality.finding import FindingVerdict
 
     rows: list[list[object]] = [
         [
@@ -242,7 +242,7 @@ def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
         f"{run['test']} {run['direction']} {run['repeat']}: {finding['name']}: {finding['text']}"
         for run in runs
         for finding in run["findings"]
-        if finding["verdict"] == Verdict.WRONG
+        if finding["verdict"] == FindingVerdict.WRONG
     ]
     echo("\n".join(wrong) if wrong else "nothing is wrong")
 

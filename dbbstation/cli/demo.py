@@ -32,8 +32,9 @@ def demo(*, out: Path | None, seed: int, as_json: bool) -> None:
     from dbbstation.cli.output import print_json, say
     from dbbstation.demo import run_demo
     from dbbstation.errors import OutputError
+    from dbbstation.files.places import unused_path
 
-    folder = out or _unused(Path("dbbstation-demo"))
+    folder = out or unused_path(Path(), "dbbstation-demo")
     if folder.exists():
         raise OutputError("the folder exists already", where=str(folder), remedy="name another with --out")
     on_terminal = sys.stderr.isatty()
@@ -50,12 +51,6 @@ def demo(*, out: Path | None, seed: int, as_json: bool) -> None:
         print_json({"folder": str(folder), "runs": result.runs, "diagnosis": result.diagnosis})
     else:
         _print(result)
-
-
-def _unused(folder: Path) -> Path:
-    """Return the folder, or the first of its names with a number that does not exist."""
-    names = [folder, *(folder.with_name(f"{folder.name}-{k}") for k in range(2, 1000))]
-    return next(name for name in names if not name.exists())
 
 
 FIGURES = ("centre_deviation_um", "mean_radial_error_um", "circularity_30_upr_um")

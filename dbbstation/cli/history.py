@@ -73,14 +73,14 @@ def history(
     from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.files.recordings.table_csv import table_csv
     from dbbstation.history.summary import TIDY, history_summary, tidy_rows
-    from dbbstation.history.trend import Asked
+    from dbbstation.history.trend import TrendOptions
     from dbbstation.tasks.history import load_history
 
     refuse_outputs([page, out], force=force)
     if out is not None:
         refuse_existing_table(out, force=force)
     settings = shop_settings()
-    asked = Asked(COVERAGE_FACTOR, settings.tolerances, false_alarms, tests, exclude)
+    asked = TrendOptions(COVERAGE_FACTOR, settings.tolerances, false_alarms, tests, exclude)
     with count_bar("sessions") as progress:
         found = load_history(folder, asked, source_files, rebuild=rebuild, progress=progress)
     _say(found)

@@ -11,7 +11,7 @@ from dbbstation.cli.output import echo, log_said
 from dbbstation.quality.summary import findings_summary
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, GoTo, Note, Pause, Quit, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.commands import Accept, AddNote, GoTo, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.states import State
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class Talk:
         """Say what the event means."""
         if isinstance(event, events.RunAnnounced):
             self._centre = _OF_MACHINE if event.ball.place_known else _OF_SET_UP
-        if isinstance(event, events.Progress):
+        if isinstance(event, events.RunProgress):
             self._progress(event)
             return
         for line in _lines(event, self._centre):
@@ -85,7 +85,7 @@ class Talk:
             doubtful = self._wrong and event.state is State.COMPLETE
             self._say(f"  {_ASKED_OF_WRONG if doubtful else _ASKED[event.state]}")
 
-    def _progress(self, event: events.Progress) -> None:
+    def _progress(self, event: events.RunProgress) -> None:
         share = min(event.swept_deg / event.of_deg, 1.0)
         if self._terminal:
             done = round(share * _BAR_WIDTH)
@@ -228,16 +228,16 @@ def _command_of(line: str) -> Command | None:
     if word.lower() == "a" and rest.strip():
         return Accept(rest.strip())
     if word.lower() == "n" and rest.strip():
-        return Note(rest.strip())
+        return AddNote(rest.strip())
     if word.lower() == "t" and rest.strip():
         return _temperature(rest.strip())
     return _WORDS.get(word[:1].lower())
 
 
-def _temperature(text: str) -> Note | None:
+def _temperature(text: str) -> AddNote | None:
     """Temperature of the shop as a note; None where it is no number or no shop has it."""
     degc = shop_degc(text)
-    return None if degc is None else Note(ambient_temp_c=degc)
+    return None if degc is None else AddNote(ambient_temp_c=degc)
 
 
 def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: PLR0911 - a line per event, nothing nested

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.effects import LIKELY, SURELY_FOUND, first_names, parts_with_gain, residual_text, with_uncertainty
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.number_options import number_language, number_options
 from dbbstation.cli.output import echo
@@ -14,8 +16,7 @@ from dbbstation.cli.output import echo
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from dbbstation.diagnosis.table.mismatch import Mismatch
-    from dbbstation.tasks.tables import Tabulated
+    from dbbstation.results.mismatch import EffectResult, MismatchResult
 
 
 @click.command()
@@ -116,14 +117,15 @@ def mismatch(
       dbbstation mismatch run.csv --simulator model.yaml --out missing.py --figure before_after.svg
       dbbstation mismatch tank.csv --measured level_m --simulated level_sim_m --known valve=0.02 --free level_at_start
     """
-    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.diagnosis.table.mismatch import find_mismatch
-    from dbbstation.diagnosis.table.summary import mismatch_summary
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.provenance import refuse_existing_table, write_table
-    from dbbstation.tasks.tables import Asked, load_sources, load_tables, stated_uncertainties, stated_variables
+    from dbbstation.files.recordings.table_csv import table_csv
+    from dbbstation.tasks.mismatch import STAGES, STAGES_WHOLE
+    from dbbstation.tasks.mismatch import mismatch as compared
+    from dbbstation.tasks.tables import stated_uncertainties, stated_variables
 
     numbers = number_language(decimal, separator) if decimal or separator else None
     _refuse_mixed(
@@ -155,38 +157,33 @@ def mismatch(
         refuse_existing_table(out, force=force)
     if figure is not None:
         refuse_existing(figure, force=force)
-    asked = Asked(
-        measured,
-        simulated,
-        stated_variables(variables) if variables else None,
-        run,
-        time,
-        numbers,
-        known=stated_uncertainties(known) if known else {},
-        free=tuple(name.strip() for name in free.split(",")) if free else (),
-        has_offset=not no_offset,
-    )
-    tabulated = load_tables(data, asked)
-    for note in tabulated.notes:
-        say(f"note: {note}")
-    sources, lacking = load_sources(source_files, tabulated.table)
-    for name, why in lacking.items():
-        say(f"note: {name} cannot be asked: {why}")
     with stage_bar("comparison", STAGES_WHOLE if no_held_out else STAGES) as progress:
-        found = find_mismatch(tabulated.table, sources, hold_out=not no_held_out, lacking=lacking, progress=progress)
-    summary = mismatch_summary(found)
+        result = compared(
+            data,
+            measured,
+            simulated,
+            variables=stated_variables(variables) if variables else None,
+            run=run,
+            time=time,
+            source_files=source_files,
+            known_u=stated_uncertainties(known) if known else None,
+            free=tuple(name.strip() for name in free.split(",")) if free else (),
+            has_offset=not no_offset,
+            hold_out=not no_held_out,
+            numbers=numbers,
+            progress=progress,
+            say=lambda text: say(f"note: {text}"),
+        )
     if out is not None:
-        write_table(out, _corrected(tabulated, found), provenance(), force=force)
-        summary["out"] = str(out)
-    if figure is not None:
-        from dbbstation.report.mismatch_figure import mismatch_figure
-
-        write_bytes(figure, mismatch_figure(found, format_of(figure)), force=force)
-        summary["figure"] = str(figure)
+        write_table(out, table_csv(list(result.table), list(result.table.values())), provenance(), force=force)
+        result = replace(result, out=str(out))
+    if figure is not None and result.drawing is not None:
+        write_bytes(figure, result.drawing(format_of(figure)), force=force)
+        result = replace(result, figure=str(figure))
     if as_json:
-        print_json(summary)
+        print_result(result)
     else:
-        _print(summary)
+        _print(result)
 
 
 def _refuse_mixed(simulator: Path | None, of_tables: Mapping[str, object], of_simulators: Mapping[str, object]) -> None:
@@ -199,100 +196,75 @@ def _refuse_mixed(simulator: Path | None, of_tables: Mapping[str, object], of_si
         raise click.UsageError(f"{given[0]} {what}")
 
 
-STAGES = {"look": 0, "sets of causes": 8, "held-out part": 15}
-STAGES_WHOLE = {"look": 0, "sets of causes": 50}
-"""Stages of a comparison with the held-out test and without it, and the share of its time that has passed by then [%]."""
-
-CORRECTED, LEFT = "corrected", "left"
-"""Columns that `--out` adds."""
-
-
-def _corrected(tabulated: Tabulated, found: Mismatch) -> str:
-    """Text of the table with the corrected simulation and what it leaves."""
-    from dbbstation.files.recordings.table_csv import table_csv
-
-    corrected = found.table.simulated + found.explained
-    unit = f"_{found.table.unit.replace('µ', 'u')}" if found.table.unit else ""
-    names = [*tabulated.names, f"{CORRECTED}{unit}", f"{LEFT}{unit}"]
-    columns = [tabulated.columns[name] for name in tabulated.names]
-    return table_csv(names, [*columns, corrected.tolist(), (found.table.measured - corrected).tolist()])
-
-
-def _print(summary: Mapping[str, Any]) -> None:
+def _print(result: MismatchResult) -> None:
     from dbbstation.cli.output import print_table
 
-    unit, held_out = summary["unit"], summary["held_out_rms"]
-    if held_out and held_out["worse"]:
+    unit, held_out = result.unit, result.held_out_rms
+    if held_out and held_out.worse:
         echo(
-            f"Held-out rows are predicted worse than as simulated: {held_out['after']:.3g} corrected, {held_out['as_simulated']:.3g} "
+            f"Held-out rows are predicted worse than as simulated: {held_out.after:.3g} corrected, {held_out.as_simulated:.3g} "
             f"{unit} rms as simulated. Nothing is identified.\n".replace("  ", " ")
         )
     print_table(
         ["variable", "kind", "unit", "from", "to"],
-        [
-            [v["name"], v["kind"], v["unit"] or "none", f"{v['low']:.5g}", f"{v['high']:.5g}"]
-            for v in summary["variables"]
-        ],
+        [[v.name, v.kind, v.unit or "none", f"{v.low:.5g}", f"{v.high:.5g}"] for v in result.variables],
     )
     echo()
-    _print_whether(summary)
-    there = [f for f in summary["findings"] if f["verdict"] in SURELY_FOUND]
-    equivalent = {name for f in there for name in f["equivalent"]}
-    likely = [f for f in summary["findings"] if f["verdict"] == "ambiguous" and f["probability"] >= LIKELY]
-    likely = [f for f in likely if f["name"] not in equivalent]
+    _print_whether(result)
+    there = [f for f in result.findings if f.verdict in SURELY_FOUND]
+    equivalent = {name for f in there for name in f.equivalent}
+    likely = [f for f in result.findings if f.verdict == "ambiguous" and f.probability >= LIKELY]
+    likely = [f for f in likely if f.name not in equivalent]
     there += likely
     if there:
         echo()
         _print_findings(there, unit)
-    _print_cancelling(summary)
-    _print_parameters(summary)
+    _print_cancelling(result)
+    _print_parameters(result)
     if held_out:
         echo(
-            f"\nheld-out error: {held_out['as_simulated']:.3g} as simulated, {held_out['before']:.3g} refitted, "
-            f"{held_out['after']:.3g} {unit} rms corrected; over {len(held_out['folds'])} parts, everything chosen anew "
+            f"\nheld-out error: {held_out.as_simulated:.3g} as simulated, {held_out.before:.3g} refitted, "
+            f"{held_out.after:.3g} {unit} rms corrected; over {len(held_out.folds)} parts, everything chosen anew "
             "without each of them"
         )
-    elif any(f["verdict"] == "identified" for f in there):
+    elif any(f.verdict == "identified" for f in there):
         echo("\nheld-out parts were not asked for: whether what is identified predicts other rows was not tested.")
     echo()
-    _print_left(summary)
+    _print_left(result)
     for verdict in ("not-testable", "ruled-out"):
-        names = [f["name"] for f in summary["findings"] if f["verdict"] == verdict]
+        names = [f.name for f in result.findings if f.verdict == verdict]
         if names:
-            echo(f"{verdict}: {_few(names)}")
-    if summary["next"]:
+            echo(f"{verdict}: {first_names(names)}")
+    if result.next:
         echo("\nmeasure next:")
-        for step in summary["next"]:
-            echo(f"  {step['text']}")
+        for step in result.next:
+            echo(f"  {step.text}")
 
 
-def _print_whether(summary: Mapping[str, Any]) -> None:
+def _print_whether(result: MismatchResult) -> None:
     """Is there a mismatch, how large, beside which noise, led by which variable."""
-    unit, noise, rms = summary["unit"], summary["noise"], summary["residual_rms"]
-    offset = summary["offset"]
-    if offset and offset["significant"]:
-        echo(f"Measured less simulated is {_number(offset)} on average; this is fitted and is not counted below.")
-    if not summary["mismatch"]:
-        echo(f"No mismatch: what differs, {rms['before']:.3g} {unit} rms, is noise.".replace("  ", " "))
-    else:
+    unit, noise, rms = result.unit, result.noise, result.residual_rms
+    offset = result.offset
+    if offset and offset.significant:
         echo(
-            f"There is a mismatch: {rms['before']:.3g} {unit} rms, of which {rms['after']:.3g} {unit} is not explained."
+            f"Measured less simulated is {with_uncertainty(offset)} on average; this is fitted and is not counted below."
         )
+    if not result.mismatch:
+        echo(f"No mismatch: what differs, {rms.before:.3g} {unit} rms, is noise.".replace("  ", " "))
+    else:
+        echo(f"There is a mismatch: {rms.before:.3g} {unit} rms, of which {rms.after:.3g} {unit} is not explained.")
     fitted = (
-        ""
-        if noise["measured_in_order"]
-        else "; fitted jointly, since nothing says in which order the rows were measured"
+        "" if noise.measured_in_order else "; fitted jointly, since nothing says in which order the rows were measured"
     )
-    alike = f", {noise['rows_as_one']:.3g} rows count as one" if noise["rows_as_one"] > 1.0 else ""
-    if noise["degrees_of_freedom"]:
-        alike += f", long tails (Student's t, {noise['degrees_of_freedom']:g} degrees of freedom)"
-    if noise["grows_with"]:
-        alike += f", its variance grows with {noise['grows_with']}"
-    echo(f"noise of one row: {noise['sigma']:.3g} {unit}{alike}{fitted}")
-    if summary["led_by"]:
+    alike = f", {noise.rows_as_one:.3g} rows count as one" if noise.rows_as_one > 1.0 else ""
+    if noise.degrees_of_freedom:
+        alike += f", long tails (Student's t, {noise.degrees_of_freedom:g} degrees of freedom)"
+    if noise.grows_with:
+        alike += f", its variance grows with {noise.grows_with}"
+    echo(f"noise of one row: {noise.sigma:.3g} {unit}{alike}{fitted}")
+    if result.led_by:
         led = ", ".join(
-            f"{s['variable']} {100 * s['share']:.0f} % ({100 * s['lost']:.0f} %)"
-            for s in summary["led_by"][:MOST_LEADING]
+            f"{s.variable} {100 * s.share:.0f} % ({100 * s.lost:.0f} %)" for s in result.led_by[:MOST_LEADING]
         )
         echo(f"led by (of all that is explained, what follows it alone; in brackets what is lost without it): {led}")
 
@@ -301,45 +273,33 @@ MOST_LEADING = 4
 """Variables that are said to lead a mismatch, at the most."""
 
 
-def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
+def _print_findings(there: Sequence[EffectResult], unit: str) -> None:
     from dbbstation.cli.output import print_table
 
-    tested = any(f["gains"] for f in there)
+    tested = any(f.gains for f in there)
     rows = [
         [
-            f["name"],
-            f["verdict"],
-            f"{f['probability']:.3f}",
-            f"{f['log_bayes_factor']:.0f}",
-            f"{f['rms']:.2g}",
-            f"{100 * f['confounded']:.0f} %",
-            *([_gained(f)] if tested else []),
+            f.name,
+            f.verdict,
+            f"{f.probability:.3f}",
+            f"{f.log_bayes_factor:.0f}",
+            f"{f.rms:.2g}",
+            f"{100 * f.confounded:.0f} %",
+            *([parts_with_gain(f.gains, acts=f.acts)] if tested else []),
         ]
         for f in there
     ]
     head = ["effect", "verdict", "probability", "log Bayes factor", f"{unit} rms".strip(), "concealed"]
     print_table([*head, *(["parts with a gain"] if tested else [])], rows)
     for f in there:
-        if f["verdict"] == "ambiguous" and len(there) > MOST_TOLD:
+        if f.verdict == "ambiguous" and len(there) > MOST_TOLD:
             continue
-        echo(f"\n{f['name']}")
-        values = ", ".join(f"{name} {_number(value)}" for name, value in f["values"].items())
-        if values and len(f["values"]) <= MOST_VALUES:
+        echo(f"\n{f.name}")
+        values = ", ".join(f"{name} {with_uncertainty(value)}" for name, value in f.values.items())
+        if values and len(f.values) <= MOST_VALUES:
             echo(f"  {values}")
-        echo(f"  {f['text']}")
+        echo(f"  {f.text}")
 
-
-def _gained(finding: Mapping[str, Any]) -> str:
-    """In how many held-out parts an effect brought something; nothing where that decides nothing."""
-    gains = finding["gains"]
-    return f"{gains['with_gain']} of {len(gains['parts'])}" if gains and finding["acts"] == "always" else ""
-
-
-SURELY_FOUND = ("identified", "happened", "does-not-predict")
-"""Verdicts of effects that these rows show for sure."""
-
-LIKELY = 0.5
-"""Probability from which on an effect that is not certain is printed; all of them are in the JSON."""
 
 MOST_TOLD = 12
 """Effects from which on only those that are certain are printed in full."""
@@ -348,23 +308,23 @@ MOST_VALUES = 6
 """Values of an effect that are printed; those of a curve say little by themselves, and are in the JSON."""
 
 
-def _print_cancelling(summary: Mapping[str, Any]) -> None:
-    cancelling, unit = summary["cancelling"], summary["unit"]
+def _print_cancelling(result: MismatchResult) -> None:
+    cancelling, unit = result.cancelling, result.unit
     if cancelling:
-        parts = ", ".join(f"{name} {rms:.2g}" for name, rms in cancelling["rms"].items())
-        echo(f"\nEffects cancel each other: {parts}, together {cancelling['rms_of_sum']:.2g} {unit} rms.")
+        parts = ", ".join(f"{name} {rms:.2g}" for name, rms in cancelling.rms.items())
+        echo(f"\nEffects cancel each other: {parts}, together {cancelling.rms_of_sum:.2g} {unit} rms.")
 
 
-def _print_parameters(summary: Mapping[str, Any]) -> None:
-    parameters = summary["parameters"][0 if summary["offset"] is None else 1 :]
+def _print_parameters(result: MismatchResult) -> None:
+    parameters = result.parameters[0 if result.offset is None else 1 :]
     if not parameters:
         return
     echo("\nparameters of the simulation, fitted anew:")
     for p in parameters:
-        before, after = _number(p["before"]), _number(p["after"])
-        echo(f"  {p['name']}: {before} alone, {after} beside what was found; R² {p['confounded']:.2f} with it")
-        if p["far"]:
-            echo(f"    {TOO_FAR_STATED if p['stated'] else TOO_FAR}")
+        before, after = with_uncertainty(p.before), with_uncertainty(p.after)
+        echo(f"  {p.name}: {before} alone, {after} beside what was found; R² {p.confounded:.2f} with it")
+        if p.far:
+            echo(f"    {TOO_FAR_STATED if p.stated else TOO_FAR}")
 
 
 TOO_FAR = (
@@ -376,28 +336,8 @@ TOO_FAR_STATED = (
 )
 
 
-def _print_left(summary: Mapping[str, Any]) -> None:
-    left = summary["left"]
-    if left["is_noise"]:
-        echo("Nothing is left beyond noise.")
-    else:
-        worst = min(left["looks"], key=lambda look: look["probability"])
-        where = f", {worst['where']}" if worst["where"] else ""
-        echo(f"Something is left beyond noise: {worst['name']}{where}, {worst['rms']:.2g} {summary['unit']}.")
-    if not summary["second_start_agrees"]:
-        odds = summary["second_start_log_odds"]
+def _print_left(result: MismatchResult) -> None:
+    echo(residual_text(result.left, result.unit))
+    if not result.second_start_agrees:
+        odds = result.second_start_log_odds
         echo(f"A search that begins with nothing ends at another set of effects, of log odds {odds:+.0f} to this one.")
-
-
-def _few(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:MOST_NAMES])
-    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
-
-
-MOST_NAMES = 6
-
-
-def _number(number: Mapping[str, Any]) -> str:
-    u = number["uncertainty"]
-    known = f"{number['value']:.4g} ± {u:.2g}" if u is not None else f"{number['value']:.4g}"
-    return f"{known} {number['unit']}".rstrip()

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.diagnosis.simulator.answer import Answer
+    from dbbstation.diagnosis.simulator.answer import SimulatorComparison
     from dbbstation.files.formats.number_language import NumberLanguage
 
 
@@ -33,7 +33,7 @@ def mismatch_with_simulator(
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.diagnosis.simulator.answer import find
-    from dbbstation.diagnosis.simulator.model import Ask
+    from dbbstation.diagnosis.simulator.model import SimulationRequest
     from dbbstation.diagnosis.simulator.summary import simulator_summary
     from dbbstation.files.atomic import refuse_existing, write_bytes, write_text
     from dbbstation.files.provenance import refuse_existing_table, write_table
@@ -50,7 +50,7 @@ def mismatch_with_simulator(
     model = loaded.model
     with Runs(loaded, most=most_runs) as runs:
         values = [parameter.value for parameter in model.parameters]
-        one_s = runs.allow([Ask(k, model.of_run(k, values)) for k in range(len(model.runs))])
+        one_s = runs.allow([SimulationRequest(k, model.of_run(k, values)) for k in range(len(model.runs))])
         limit = f"; that is what {MOST_SECONDS / 60.0:.0f} minutes hold" if most_runs is None else ""
         say(f"note: a simulation takes {one_s:.2g} s, {runs.most} are allowed at the most{limit} (--most-runs)")
         with stage_bar("comparison", STAGES if hold_out else STAGES_WHOLE) as progress:
@@ -87,7 +87,7 @@ STAGES_WHOLE = {"refit": 0, "look": 5, "sets of causes": 20}
 """Stages of a comparison with the held-out test and without it, and the share of its time that has passed by then [%]."""
 
 
-def _corrected(answer: Answer) -> str:
+def _corrected(answer: SimulatorComparison) -> str:
     """Text of a table of all rows: run, time, and of each output measured, simulated, refitted and corrected values."""
     from dbbstation.files.recordings.table_csv import table_csv
 

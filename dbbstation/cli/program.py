@@ -7,14 +7,13 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
-from dbbstation.cli.circle_options import approach_of, circle_options
+from dbbstation.cli.circle_options import circle_options
 from dbbstation.cli.correction import largest_correction_option
 from dbbstation.cli.keeping import keeping_options
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
 from dbbstation.nc.limits import CIRCLE_CHORD_MM
-from dbbstation.tasks.chosen import chosen_of
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
@@ -92,45 +91,31 @@ def program(
     from dbbstation.cli.programs import print_programs
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.cli.unknown_causes import say_unknown_causes
-    from dbbstation.files.atomic import write_folder
-    from dbbstation.files.formats.machine import read_machine
-    from dbbstation.files.formats.plan import read_plan
-    from dbbstation.files.own_dialects import dialect_given
     from dbbstation.files.own_sources import every_source
-    from dbbstation.nc.export import circle_programs
-    from dbbstation.results.programs import programs_result
-    from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
+    from dbbstation.tasks.circle_programs import write_circle_programs
 
-    written_in = dialect_given(dialect)
-    plan, machine = read_plan(plan_file), read_machine(machine_file)
-    inverse = None
-    if model_file is not None:
-        inverse = inverse_of(
-            model_file,
-            every_source(source_files),
-            time_s=time_s,
-            largest_mm=largest_mm,
+    with count_bar("programs") as writing:
+        result = write_circle_programs(
+            plan_file,
+            machine_file,
+            out,
+            dialect=dialect,
+            model=model_file,
+            tests=tests,
+            exclude=exclude,
+            step_deg=step_deg,
+            clearance_mm=None if bar_stays_on else clearance_mm,
+            chord_um=chord_um,
             prefer=prefer,
             accept_chord_um=accepted_um,
+            time_s=time_s,
+            largest_correction_mm=largest_mm,
+            force=force,
+            known=None if model_file is None else every_source(source_files),
+            provenance=provenance,
+            progress=lambda _text, done=0, of=0: writing(done, of),
+            say=lambda text: say(f"note: {text}"),
         )
-        say_unknown_causes(inverse.model)
-    with count_bar("programs") as writing:
-        programs = circle_programs(
-            plan,
-            machine,
-            written_in,
-            inverse=inverse,
-            origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse, provenance()),
-            tests=chosen_of(plan.name, plan.tests, tests, exclude),
-            step_deg=step_deg,
-            chord_mm=chord_um / 1e3,
-            approach=approach_of(clearance_mm, bar_stays_on=bar_stays_on),
-            progress=writing,
-        )
-    write_folder(out, {each.name: each.text for each in programs}, force=force)
-    written = [(str(out / each.name), each) for each in programs]
-    digest = None if model_file is None else sha256_of(model_file)
-    print_programs(programs_result(written, written_in, None if inverse is None else machine, digest), as_json=as_json)
+    print_programs(result, as_json=as_json)
     if not as_json:
-        say(f"{len(programs)} programs written to {out}, all within the machine's travel")
+        say(f"{len(result.programs)} programs written to {out}, all within the machine's travel")

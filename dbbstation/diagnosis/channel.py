@@ -52,7 +52,7 @@ DRAWS = 4
 """Draws of white noise from which it is seen how much of the noise a model takes out."""
 
 
-class Channel:
+class CircleChannel:
     """Everything that a diagnosis compares.
 
     Args:
@@ -126,7 +126,7 @@ class Channel:
         """The form of a cause that has all its amplitudes, at the same point and without slack."""
         if not len(variant.whole):
             return replace(variant, slack=variant.slack[:0], slack_sd=variant.slack_sd[:0])
-        sizes = [p.plausible for p in self.source_of(name, variant).parameters(self.machine) if not p.shape]
+        sizes = [p.plausible for p in self.source_of(name, variant).parameters(self.machine) if not p.grid]
         plausible = np.tile(sizes, len(variant.whole) // len(sizes))
         return Variant(variant.whole, plausible, variant.nonlinear, law=variant.law)
 
@@ -219,8 +219,8 @@ class Channel:
         source = self.sources[name, law]
         readings = self.readings if fit is self.calibration else [fit.model.bar(motion) for motion in self.motions]
         parameters = source.parameters(self.machine)
-        shaped = [k for k, p in enumerate(parameters) if p.shape]
-        amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
+        shaped = [k for k, p in enumerate(parameters) if p.grid]
+        amplitudes = [k for k, p in enumerate(parameters) if not p.grid]
         shared = [source.shared_by(motion) for motion in self.motions]
         derivatives = [
             reading.by_source(source, self.machine, values[own]) for reading, own in zip(readings, shared, strict=True)
@@ -241,7 +241,7 @@ class Channel:
         size = [values[own][amplitudes] / np.array([parameters[k].plausible for k in amplitudes]) for own in values]
         at = max(float(np.sqrt(np.mean(np.square(size)))), 1e-12)
         # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
-        covered = [len(p.shape) / (1.0 if p.listed else 2.5) for p in (parameters[k] for k in shaped)]
+        covered = [len(p.grid) / (1.0 if p.listed else 2.5) for p in (parameters[k] for k in shaped)]
         weight = -float(np.log(max(float(np.prod(covered)), 1.0)))
         self._refined[name, law] = tuple(
             replace(
@@ -318,10 +318,10 @@ class Channel:
     def _on_a_grid(self, source: ErrorSource) -> tuple[Variant, ...]:
         """Variants of a source at all points of the grid of its nonlinear parameters."""
         parameters = source.parameters(self.machine)
-        amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
-        shaped = [k for k, p in enumerate(parameters) if p.shape]
+        amplitudes = [k for k, p in enumerate(parameters) if not p.grid]
+        shaped = [k for k, p in enumerate(parameters) if p.grid]
         shared = [source.shared_by(motion) for motion in self.motions]
-        points = list(product(*(parameters[k].shape for k in shaped)))
+        points = list(product(*(parameters[k].grid for k in shaped)))
         points = [point for point in points if source.shows(self.motions, point)] or points[:1]
         found: list[Variant] = []
         for point in points:
@@ -346,7 +346,7 @@ class Channel:
             shared: set of each run.
             nonlinear: the point.
         """
-        amplitudes = [p for p in source.parameters(self.machine) if not p.shape]
+        amplitudes = [p for p in source.parameters(self.machine) if not p.grid]
         sets = list(dict.fromkeys(shared))
         count = len(amplitudes)
         samples = np.zeros((self.runs[-1].stop, count * len(sets)))
@@ -371,7 +371,7 @@ class Channel:
 
 def _spacing(parameter: Parameter, value: float) -> float:
     """Spacing of the grid of a nonlinear parameter about a value."""
-    grid = np.sort(np.array(parameter.shape))
+    grid = np.sort(np.array(parameter.grid))
     if len(grid) == 1:
         return parameter.plausible
     if parameter.listed:

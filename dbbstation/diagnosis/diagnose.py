@@ -30,7 +30,7 @@ from dbbstation.threads import with_one_thread
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.diagnosis.explained import Explained, Settled
+    from dbbstation.diagnosis.explained import Explained, SettledCircles
     from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.remainder import Remainder
@@ -175,7 +175,7 @@ def _where(observations: Sequence[Observation], found: Remainder) -> tuple[float
     return size_um, f"Most of it is in {run} about {np.degrees(found.pulse_phase_rad):.0f} degrees, {size_um:.2g} µm."
 
 
-def rough_formulas(settled: Settled) -> list[str]:
+def rough_formulas(settled: SettledCircles) -> list[str]:
     """Named causes whose slack the recordings call for: the joint fit, which has none, leaves it."""
     evidence = settled.comparison.log_evidence(settled.best.members)
     found = []

@@ -58,7 +58,7 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
     """Columns of what the formula of a source may be off by, over all runs, shape (n, q)."""
     if source.form_uncertainty == 0.0:
         return np.zeros((sum(len(run.derivative) for run in runs), 0))
-    amplitude = np.array([not p.shape for p in source.parameters(machine)])
+    amplitude = np.array([not p.grid for p in source.parameters(machine)])
     effects: list[NDArray[np.float64]] = []
     along: list[list[NDArray[np.float64]]] = []
     signs: list[NDArray[np.float64]] = []
@@ -87,12 +87,12 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
 def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
     """What grows over time by one law may have further stages: its effect with other time constants, shape (n, q)."""
     parameters = source.parameters(machine)
-    amplitude = np.array([not p.shape for p in parameters])
+    amplitude = np.array([not p.grid for p in parameters])
     if source.varies_with != "time" or amplitude.all():
         return np.zeros((sum(len(run.derivative) for run in runs), 0))
     first = int(np.flatnonzero(~amplitude)[0])
     found = []
-    for constant in parameters[first].shape[::STAGES_APART]:
+    for constant in parameters[first].grid[::STAGES_APART]:
         pieces = []
         for run in runs:
             other = run.values.copy()

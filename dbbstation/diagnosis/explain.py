@@ -15,8 +15,8 @@ from dbbstation.calibration.fit.calibrate import Calibration, calibrate, default
 from dbbstation.calibration.outliers.robust import MOST, calibrate_robust
 from dbbstation.calibration.outliers.strange_runs import in_place_after_all
 from dbbstation.calibration.outliers.stray_balls import set_free
-from dbbstation.diagnosis.channel import Channel
-from dbbstation.diagnosis.explained import MOST_MEMBERS, Explained, Settled
+from dbbstation.diagnosis.channel import CircleChannel
+from dbbstation.diagnosis.explained import MOST_MEMBERS, Explained, SettledCircles
 from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
@@ -91,7 +91,7 @@ def _with_set_up(
     """Compare; set free what balls and bars are certainly off, one after the other, and compare again."""
     while True:
         progress("candidates")
-        channel = Channel(before, sources)
+        channel = CircleChannel(before, sources)
         settled = _settle(channel, progress)
         explained = Explained(before, outliers, channel, misfit_of(before, settled.noise), settled)
         off = [m for m in settled.best.members if m.cause.setup]
@@ -106,7 +106,7 @@ def _with_set_up(
         del channel, settled, explained  # their columns fill as much memory as the next ones will
 
 
-def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
+def _settle(channel: CircleChannel, progress: Callable[[str], None]) -> SettledCircles:
     """Compare; lay out likely causes at their best values and compare again; fit jointly; until nothing changes.
 
     The most probable hypothesis and its rivals are laid out with tangents and slack before anything is added to them: what
@@ -134,7 +134,7 @@ def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
             return _without_a_name(channel, unmodelled, noise, scatter)
         best = _steady(posterior, fitted)
         seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[:SEEDS])}
-        settled = Settled(
+        settled = SettledCircles(
             fit, posterior, best, comparison, causes, unmodelled, noise, misfit_of(fit, noise), refused, scatter=scatter
         )
         usual = _usual_scatter(fit) if any(m.cause.setup for m in best.members) else scatter
@@ -173,7 +173,7 @@ def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
 
 
 def _listed(
-    channel: Channel, unmodelled: Unmodelled, comparison: ModelComparison, refused: Collection[str]
+    channel: CircleChannel, unmodelled: Unmodelled, comparison: ModelComparison, refused: Collection[str]
 ) -> tuple[Cause, ...]:
     """Causes that are compared: those with a name, faults of the set-up, and effects that none of the former has among its forms."""
     known = named_already(comparison, unmodelled.causes, channel.forms(but_for=refused))
@@ -181,7 +181,7 @@ def _listed(
     return (*(c for c in channel.named if c.name not in refused), *channel.set_up, *nameless)
 
 
-def _without_a_name(channel: Channel, unmodelled: Unmodelled, noise: Spectrum, scatter: float) -> Settled:
+def _without_a_name(channel: CircleChannel, unmodelled: Unmodelled, noise: Spectrum, scatter: float) -> SettledCircles:
     """What is said where nothing listed explains the recordings: the base fit, and the strongest unmodelled effect beside it.
 
     Names of a set that has grown to its limit were wrong wherever that was tried.
@@ -197,10 +197,12 @@ def _without_a_name(channel: Channel, unmodelled: Unmodelled, noise: Spectrum, s
     )
     causes = (*channel.named, *channel.set_up, *unmodelled.causes)
     left = misfit_of(fit, noise)
-    return Settled(fit, posterior, alone, comparison, causes, unmodelled, noise, left, at_limit=True, scatter=scatter)
+    return SettledCircles(
+        fit, posterior, alone, comparison, causes, unmodelled, noise, left, at_limit=True, scatter=scatter
+    )
 
 
-def _negative(fit: Calibration, channel: Channel) -> dict[str, str]:
+def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:
     """Causes of a joint fit whose values are negative beyond their uncertainty though they cannot be, and what to say of it."""
     base = {term.source.name for term in channel.calibration.layout.terms}
     found = {}
@@ -217,7 +219,7 @@ def _negative(fit: Calibration, channel: Channel) -> dict[str, str]:
     return found
 
 
-def _fitted_as_named(channel: Channel, settled: Settled) -> Settled:
+def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> SettledCircles:
     """Return it with a joint fit of just the causes that its hypothesis names, where the rounds ended on another one.
 
     Two hypotheses may take turns: each is the more probable one about the fit of the other.
@@ -257,7 +259,7 @@ AS_PROBABLE = 1.0
 """Log odds within which one hypothesis is as probable as another: the exact fits of both would say the same of it."""
 
 
-def _joint(channel: Channel, comparison: ModelComparison, best: Hypothesis) -> Calibration | None:
+def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis) -> Calibration | None:
     """Fit base and named causes together, exactly, from the amplitudes of the comparison; None where that fails."""
     members = [member for member in best.members if member.cause.named]
     if not members:
@@ -285,7 +287,7 @@ def _joint(channel: Channel, comparison: ModelComparison, best: Hypothesis) -> C
 
 
 def _estimated(
-    channel: Channel, comparison: ModelComparison, hypothesis: Hypothesis
+    channel: CircleChannel, comparison: ModelComparison, hypothesis: Hypothesis
 ) -> list[NDArray[np.float64] | None]:
     """Values of all parameters of each named member, of the first set where there are several."""
     values = comparison.estimates(hypothesis.members).values
@@ -297,14 +299,14 @@ def _estimated(
             continue
         source = channel.source_of(member.cause.name, member.variant)
         parameters = source.parameters(channel.machine)
-        shaped = np.array([bool(p.shape) for p in parameters])
+        shaped = np.array([bool(p.grid) for p in parameters])
         whole = channel.to_whole(member.variant) @ own[: len(member.variant.columns)]
         full = np.empty(len(parameters))
         full[~shaped] = whole[: int((~shaped).sum())]
         tangents = own[len(member.variant.columns) :][: int(shaped.sum())] if len(member.variant.slack) else 0.0
         full[shaped] = np.array(member.variant.nonlinear) + tangents
         for k in np.flatnonzero(shaped):
-            full[k] = np.clip(full[k], min(parameters[k].shape), max(parameters[k].shape))
+            full[k] = np.clip(full[k], min(parameters[k].grid), max(parameters[k].grid))
         found.append(full)
     return found
 
@@ -315,7 +317,7 @@ def _values_in(fit: Calibration, name: str) -> dict[str, NDArray[np.float64]]:
 
 
 def _lay_out(
-    channel: Channel,
+    channel: CircleChannel,
     beside: BesideBase,
     best: Hypothesis,
     member: Member,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
-    from dbbstation.diagnosis.channel import Channel
+    from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.unmodelled import Unmodelled
     from dbbstation.inference.harmonics import Misfit, Spectrum
     from dbbstation.inference.hypotheses import Hypothesis, Posterior
@@ -26,7 +26,7 @@ called in for what they leave: hypotheses grew to 61 members. Sessions that the 
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class SettledCircles:
     """What the comparison came to.
 
     Attributes:
@@ -90,6 +90,6 @@ class Explained:
 
     before: Calibration
     outliers: tuple[Outlier, ...]
-    channel: Channel
+    channel: CircleChannel
     first: Misfit
-    settled: Settled
+    settled: SettledCircles

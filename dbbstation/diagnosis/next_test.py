@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.channel import Channel
+    from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.explained import Explained
     from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.diagnosis.workspace import WorkspaceError
@@ -116,7 +116,7 @@ def next_tests(
 
 
 def propose(
-    channel: Channel, asked: Sequence[tuple[ErrorSource, Variant]], noise_mm: float, most: int = MOST_PROPOSED
+    channel: CircleChannel, asked: Sequence[tuple[ErrorSource, Variant]], noise_mm: float, most: int = MOST_PROPOSED
 ) -> tuple[NextTest, ...]:
     """Return the fewest tests that together change what can be said of a source, or halve its uncertainty.
 
@@ -205,9 +205,9 @@ def _worth_it(now: NDArray[np.float64], then: NDArray[np.float64]) -> bool:
 
 
 def _in_words(
-    channel: Channel, source: ErrorSource, variant: Variant, proposal: Proposal, before: float, after: float
+    channel: CircleChannel, source: ErrorSource, variant: Variant, proposal: Proposal, before: float, after: float
 ) -> NextTest:
-    parameter = next(p for p in source.parameters(channel.machine) if not p.shape)
+    parameter = next(p for p in source.parameters(channel.machine) if not p.grid)
     unit = float(variant.plausible[0])
     x, y, z = proposal.circle.ball_mm
     a, b, _ = proposal.circle.tilt_deg
@@ -217,7 +217,7 @@ def _in_words(
     return NextTest(proposal.text, circle, source.name, before * unit, after * unit, parameter.unit)
 
 
-def _proposals(channel: Channel, needs: frozenset[Need]) -> list[Proposal]:
+def _proposals(channel: CircleChannel, needs: frozenset[Need]) -> list[Proposal]:
     """Circles about the balls of the plan that the machine can run: at other tilts and elevations, feeds and times."""
     seen: dict[str, Observation] = {}
     for observation in channel.observations:
@@ -256,7 +256,7 @@ def _reachable(machine: Machine, circle: Circle) -> bool:
     return True
 
 
-def _ends_s(channel: Channel) -> float:
+def _ends_s(channel: CircleChannel) -> float:
     """Return the end of the last run, on the clock of its session [s]; zero where times are unknown."""
     clocks = [o.started_s + float(o.raw.t_s[-1]) for o in channel.observations if o.started_s is not None]
     return max(clocks, default=0.0)
@@ -286,7 +286,7 @@ def _motions(proposal: Proposal, ends_s: float) -> list[Motion]:
 
 
 def _rows(
-    channel: Channel, asked: Sequence[tuple[ErrorSource, Variant]], motion: Motion, columns: int
+    channel: CircleChannel, asked: Sequence[tuple[ErrorSource, Variant]], motion: Motion, columns: int
 ) -> NDArray[np.float64]:
     """What a proposed run would say of all columns, compressed to few rows, shape (r, columns).
 
@@ -297,9 +297,9 @@ def _rows(
     place = len(channel.base.prior)
     for source, variant in asked:
         parameters = source.parameters(channel.machine)
-        amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
+        amplitudes = [k for k, p in enumerate(parameters) if not p.grid]
         values = np.zeros(len(parameters))
-        values[[k for k, p in enumerate(parameters) if p.shape]] = variant.nonlinear
+        values[[k for k, p in enumerate(parameters) if p.grid]] = variant.nonlinear
         derivative = reading.by_source(source, channel.machine, values)
         # A source of the measurement has further sets, of other sessions and mountings, which this run does not touch.
         rows[:, place : place + len(amplitudes)] = derivative[:, amplitudes]

@@ -28,6 +28,6 @@ def refitted(
     begin = {
         term.source.name: like.x[term.columns]
         for term in layout.terms
-        if any(parameter.shape for parameter in term.parameters)
+        if any(parameter.grid for parameter in term.parameters)
     }
     return calibrate(layout.machine, observations, [*sources, *more], {**begin, **(start or {})})

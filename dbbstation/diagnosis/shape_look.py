@@ -28,7 +28,7 @@ from dbbstation.diagnosis.shapes import (
     Samples,
     Shape,
 )
-from dbbstation.inference.forms import Bump, Form, Lobes, PlaneStep, Step, Wave, WaveOfTurn
+from dbbstation.inference.forms import Bump, Form, Lobes, PlaneStep, StepForm, Wave, WaveOfTurn
 from dbbstation.inference.square_root import free_directions
 from dbbstation.machine.geometry import STRUTS
 
@@ -83,7 +83,7 @@ PLACE_MM = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Sums:
+class DirectionalSums:
     """Sums over the pieces of one variable, for what moves in d directions.
 
     Attributes:
@@ -123,7 +123,7 @@ def _solved(rest: NDArray[np.float64], taken: NDArray[np.float64], gains: NDArra
     return np.asarray((right * np.linalg.solve(normal, right)).sum(axis=(1, 2)))
 
 
-class Look:
+class TemplateScan:
     """What a fit leaves of all runs, and what its base can do, in units of noise.
 
     Args:
@@ -160,7 +160,7 @@ class Look:
 
     def sums(
         self, variable: str, strut: int | None, moves: str, pieces: Callable[[NDArray[np.float64]], NDArray[np.int64]]
-    ) -> Sums:
+    ) -> DirectionalSums:
         """Add up over pieces of a variable, given the piece of each value."""
         values = np.concatenate([run.values[variable] for run in self._runs])
         gain = np.vstack([run.gain[moves] for run in self._runs])
@@ -177,7 +177,7 @@ class Look:
 
         at = added(values.reshape(many, -1)) / number[:, None]
         products = (gain[:, :, None] * gain[:, None, :]).reshape(many, -1)
-        return Sums(
+        return DirectionalSums(
             at=at[:, 0] if values.ndim == 1 else at,
             rest=added(gain * self._rest[:, None]),
             gains=added(products).reshape(-1, directions, directions),
@@ -185,7 +185,7 @@ class Look:
         )
 
 
-def looked_for(look: Look, extent: Ranges) -> list[Shape]:
+def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
     """Return the shapes that the readings follow best, some of every kind that the runs can show."""
     found: list[Shape] = []
     for strut in range(1, STRUTS + 1):
@@ -245,7 +245,7 @@ def _bumps(low: float, high: float) -> list[Form]:
 def _steps(low: float, high: float, count: int = _STEPS) -> list[Form]:
     """Steps that are sharp, anywhere but at the very ends."""
     wide = (high - low) / count
-    return [Step(float(at), wide / 4.0) for at in np.linspace(low, high, count + 1)[2:-2]] if wide > 0.0 else []
+    return [StepForm(float(at), wide / 4.0) for at in np.linspace(low, high, count + 1)[2:-2]] if wide > 0.0 else []
 
 
 def _lines(places: NDArray[np.float64]) -> list[Form]:
@@ -259,7 +259,7 @@ def _lines(places: NDArray[np.float64]) -> list[Form]:
 
 
 def _best(
-    variable: str, kind: str, strut: int | None, moves: str, sums: Sums, forms: Sequence[Form], apart: float
+    variable: str, kind: str, strut: int | None, moves: str, sums: DirectionalSums, forms: Sequence[Form], apart: float
 ) -> list[Shape]:
     """Return the forms that explain most, of those that explain more than their neighbours in the list."""
     if not forms:
@@ -276,7 +276,9 @@ def _peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
     return np.asarray(peaks[np.argsort(-explained[peaks])][:most])
 
 
-def _waves(variable: str, strut: int | None, moves: str, sums: Sums, grid: NDArray[np.float64]) -> list[Shape]:
+def _waves(
+    variable: str, strut: int | None, moves: str, sums: DirectionalSums, grid: NDArray[np.float64]
+) -> list[Shape]:
     """Return waves of a grid of frequencies, made finer about the best ones."""
     if len(grid) == 0:
         return []
@@ -288,7 +290,7 @@ def _finer(
     variable: str,
     strut: int | None,
     moves: str,
-    sums: Sums,
+    sums: DirectionalSums,
     grid: NDArray[np.float64],
     explained: NDArray[np.float64],
 ) -> list[Shape]:
@@ -312,7 +314,9 @@ def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArr
     return np.stack([np.cos(phase), np.sin(phase)], axis=2)
 
 
-def _waves_of_time(strut: int | None, moves: str, sums: Sums, low: float, width: float, extent: float) -> list[Shape]:
+def _waves_of_time(
+    strut: int | None, moves: str, sums: DirectionalSums, low: float, width: float, extent: float
+) -> list[Shape]:
     """Waves of time at all frequencies at once, by Fourier transformation of the sums."""
     place = np.floor((sums.at - low) / width).astype(np.int64)
     size = next_fast_len(2 * (int(place.max()) + 1), real=True)

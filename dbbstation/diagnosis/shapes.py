@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dbbstation.inference.forms import Form, Hats, Lobes, Plane, Proportional, Sign, Spring, Wave
+from dbbstation.inference.forms import Form, LinearSplines, Lobes, Plane, Proportional, SignForm, Spring, Wave
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
 from dbbstation.sources.contract import Effect
@@ -356,7 +356,7 @@ def shapes(extent: Ranges) -> list[Shape]:
     ]
     if "angle" in extent.low:
         found.append(Shape("angle", "", None, READING, Lobes(LOBES)))
-        turned = Hats(extent.low["angle since the start"], extent.high["angle since the start"])
+        turned = LinearSplines(extent.low["angle since the start"], extent.high["angle since the start"])
         found.append(Shape("angle since the start", "", None, READING, turned))
     return found
 
@@ -365,10 +365,10 @@ def _usual(name: str, extent: Ranges, strut: int | None) -> Form:
     """Usual form of a curve over a variable, for one strut or for all."""
     low, high = extent.low[name], extent.high[name]
     if name == "strut-speed-sign":
-        return Sign()
+        return SignForm()
     if name in {"strut-speed", "strut-acceleration"}:
         return Proportional(float(np.max(np.abs([low, high]))))
     if name in OF_STRUTS and strut is not None:
-        return Hats(low[strut - 1], high[strut - 1])
+        return LinearSplines(low[strut - 1], high[strut - 1])
     # All struts alike follow one curve: the same length or force does the same to each.
-    return Hats(low.min(), high.max())
+    return LinearSplines(low.min(), high.max())

@@ -19,7 +19,7 @@ import numpy as np
 from dbbstation.diagnosis.findings import Curve, CurvePoint
 from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, READING, TABLE, TOOL, TOWARDS, UNITS
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.forms import HATS, Hats, Plane, PlaneStep
+from dbbstation.inference.forms import SPLINES, LinearSplines, Plane, PlaneStep
 from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.square_root import free_directions
 
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.channel import Channel
-    from dbbstation.diagnosis.explained import Settled
+    from dbbstation.diagnosis.channel import CircleChannel
+    from dbbstation.diagnosis.explained import SettledCircles
     from dbbstation.diagnosis.shapes import Samples, Shape
 
 LINE_OUT = "less the straight line that fits it best over the readings: joints and reference length make that"
@@ -56,7 +56,7 @@ AXES = {
 """How a direction is told, by what moves."""
 
 
-def curve_of(channel: Channel, settled: Settled, member: Member) -> Curve:
+def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) -> Curve:
     """Return the curve of an unmodelled effect, with others of the most probable hypothesis that follow the same.
 
     A dent between two widths of the catalogue is two bumps in one place: their sum is the error of that strut.
@@ -126,7 +126,7 @@ def _summed(
     return at, np.hstack([shape.form.columns(at) @ _convention(runs, shape)[0] for shape in shapes])
 
 
-def _not_followed(settled: Settled, together: Sequence[Member]) -> float:
+def _not_followed(settled: SettledCircles, together: Sequence[Member]) -> float:
     """Structured sum of squares that the curve leaves to all other curves together, over what it explains itself.
 
     A curve with a kink between two points, or another error beside this one, spoils the values more than noise does:
@@ -185,7 +185,7 @@ def _along(runs: Sequence[Samples], shape: Shape, found: NDArray[np.float64]) ->
 def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[NDArray[np.float64], str]:
     """Matrix that takes what is conventional out of the amplitudes of a curve, and what that is."""
     count = shape.form.count
-    if not isinstance(shape.form, Hats) or shape.moves not in MEAN_OUT:
+    if not isinstance(shape.form, LinearSplines) or shape.moves not in MEAN_OUT:
         return np.eye(count), ""
     straight = shape.variable == "strut-length"
     line = _line(np.linspace(-1.0, 1.0, count), _weights(runs, shape), int(straight))
@@ -231,7 +231,7 @@ def _values(shape: Shape, run: Samples) -> NDArray[np.float64]:
 
 def _weights(runs: Sequence[Samples], shape: Shape) -> NDArray[np.float64]:
     """How many readings lie about each point of a piecewise linear curve, shape (7,)."""
-    return np.asarray(sum(shape.form.columns(_values(shape, run)).reshape(-1, HATS).sum(axis=0) for run in runs))
+    return np.asarray(sum(shape.form.columns(_values(shape, run)).reshape(-1, SPLINES).sum(axis=0) for run in runs))
 
 
 def _extent(runs: Sequence[Samples], shape: Shape, flat: NDArray[np.float64] | None) -> tuple[float, float]:

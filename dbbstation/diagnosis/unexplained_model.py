@@ -36,7 +36,7 @@ KEPT_AS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class JointFitWithCurve:
     """A joint fit of everything that has a name and the curve that has none.
 
     Attributes:
@@ -82,7 +82,7 @@ class Kept:
         )
 
 
-def keep_unexplained(curve: Curve | None, after: Calibration) -> Kept:
+def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCurve:
     """Fit what has a name and the curve that has none together.
 
     Args:
@@ -107,7 +107,7 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> Kept:
     part = _part(source, to_all, curve.strut)
     begin = {} if curve.period_mm is None else {source.name: _wave(curve, machine)}
     fit = refitted(after, after.observations, [part], begin)
-    return Kept(source, fit, to_all, curve)
+    return JointFitWithCurve(source, fit, to_all, curve)
 
 
 def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
@@ -145,7 +145,7 @@ def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) ->
     """Return a source that has the parameters of one strut, or one set for all struts, and does what the whole does."""
     first = int(np.flatnonzero(to_all.any(axis=1))[0])
 
-    class Part(ErrorSource):
+    class TiedSource(ErrorSource):
         """The whole source with parameters tied."""
 
         name = whole.name
@@ -169,7 +169,7 @@ def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) ->
             """Derivative of that."""
             return whole.derivative(motion, machine, to_all @ values).times(to_all)
 
-    return Part()
+    return TiedSource()
 
 
 def _wave(curve: Curve, machine: Machine) -> NDArray[np.float64]:

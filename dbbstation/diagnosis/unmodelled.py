@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
-from dbbstation.diagnosis.shape_look import Look, looked_for
+from dbbstation.diagnosis.shape_look import TemplateScan, looked_for
 from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Samples, Shape, ranges, samples_of, shapes
 from dbbstation.inference.model_comparison import Cause, Variant
 from dbbstation.inference.square_root import with_random
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.diagnosis.channel import Channel
+    from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.inference.model_comparison import Member
 
 FAMILY_ODDS = float(np.log(0.1 / 0.9))
@@ -36,7 +36,7 @@ class Unmodelled:
         causes: with their columns in the channel.
     """
 
-    channel: Channel
+    channel: CircleChannel
     runs: list[Samples] = field(init=False)
     shapes: dict[str, Shape] = field(default_factory=dict)
     causes: list[Cause] = field(default_factory=list)
@@ -64,7 +64,7 @@ class Unmodelled:
         own = channel.columns
         base = (np.hstack([own.base[rows], own.samples[rows][:, taken]]) for rows in channel.runs)
         noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
-        look = Look(self.runs, list(fit.residual_mm), base, known, channel.held, noise_mm)
+        look = TemplateScan(self.runs, list(fit.residual_mm), base, known, channel.held, noise_mm)
         self._add(looked_for(look, ranges(self.runs)))
 
     def _add(self, more: Sequence[Shape]) -> None:

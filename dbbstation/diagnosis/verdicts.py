@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.explained import Explained, Settled
+    from dbbstation.diagnosis.explained import Explained, SettledCircles
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.model_comparison import Cause, Member, Variant
     from dbbstation.inference.verdict import Gains
@@ -52,7 +52,7 @@ class _Judge:
     def __init__(self, explained: Explained, anew: ChosenAnew | None) -> None:
         self._anew = anew
         self._channel = explained.channel
-        self._settled: Settled = explained.settled
+        self._settled: SettledCircles = explained.settled
         self._best = explained.settled.best
         self._named = {cause.name: cause for cause in explained.settled.causes if cause.named}
         self._alternatives = Alternatives(
@@ -263,7 +263,7 @@ class _Judge:
         spread = self._channel.to_whole(member.variant)
         values = spread @ found.values[:own]
         covariance = spread @ found.covariance[:own, :own] @ spread.T
-        amplitudes = [p for p in source.parameters(self._channel.machine) if not p.shape]
+        amplitudes = [p for p in source.parameters(self._channel.machine) if not p.grid]
         return {
             p.name: Value(float(values[k]), float(np.sqrt(max(covariance[k, k], 0.0))), p.unit)
             for k, p in enumerate(amplitudes)

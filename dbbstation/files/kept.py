@@ -65,7 +65,7 @@ def stamp_of(path: Path) -> Stamp:
 
 
 @dataclass(frozen=True)
-class Noted:
+class NotedAnchor:
     """An anchor as it was noted.
 
     Attributes:
@@ -98,7 +98,7 @@ class Kept:
     def __init__(self, folder: Path, *, begin_anew: bool = False) -> None:
         self.problem = ""
         self._rows: dict[str, _Row] = {}
-        self._noted: dict[str, Noted] = {}
+        self._noted: dict[str, NotedAnchor] = {}
         self._by_hash: dict[str, str] = {}
         self._file = index_file(folder)
         self._base: sqlite3.Connection | None = None
@@ -146,11 +146,11 @@ class Kept:
             del self._rows[name]
         self._write("DELETE FROM kept WHERE name = ?", [(name,) for name in sorted(gone)])
 
-    def noted(self, name: str) -> Noted | None:
+    def noted(self, name: str) -> NotedAnchor | None:
         """Return the anchor that was noted of a file, whatever became of it since; None where none was."""
         return self._noted.get(name)
 
-    def note(self, name: str, noted: Noted) -> None:
+    def note(self, name: str, noted: NotedAnchor) -> None:
         """Note the anchor of a file. It outlasts a change of the file, and an index that is begun anew on purpose."""
         self._noted[name] = noted
         self._write("INSERT OR REPLACE INTO noted VALUES (?, ?, ?)", [(name, noted.anchor, noted.at)])
@@ -212,7 +212,7 @@ class Kept:
         }
         self._by_hash = {row.sha256: row.text for row in self._rows.values()}
         noted = self._base.execute("SELECT name, anchor, at FROM noted").fetchall()
-        self._noted = {str(name): Noted(str(anchor), str(at)) for name, anchor, at in noted}
+        self._noted = {str(name): NotedAnchor(str(anchor), str(at)) for name, anchor, at in noted}
 
     def _forget(self) -> None:
         for path in (self._file, self._file.with_name(self._file.name + "-journal")):

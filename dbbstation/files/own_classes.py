@@ -13,13 +13,13 @@ from inspect import isabstract
 from types import ModuleType
 from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.catalogue import Found, classes_of, in_words, line_in
-from dbbstation.errors import Problem
+from dbbstation.catalogue import FoundClass, classes_of, in_words, line_in
+from dbbstation.errors import InputError, Problem
 from dbbstation.files.places import real_path
 from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
 Base = TypeVar("Base")
@@ -27,7 +27,7 @@ Base = TypeVar("Base")
 
 def classes_in_files(
     files: Iterable[Path], base: type[Base], contract: str, faults: list[Problem]
-) -> list[Found[Base]]:
+) -> list[FoundClass[Base]]:
     """Classes that derive from `base`, each with its place.
 
     Args:
@@ -51,8 +51,55 @@ def classes_in_files(
             others = any(issubclass(other, kind) for other in kinds if other is not kind)
             if not (isabstract(kind) and others):  # what others derive from may leave things to them
                 place = Problem(str(path), lines.get(kind.__name__, 0), 0, "")
-                found.append(Found(kind, place, contract))
+                found.append(FoundClass(kind, place, contract))
     return found
+
+
+def own_instances(
+    files: Iterable[Path],
+    base: type[Base],
+    contract: str,
+    attributes: Iterable[str],
+    fault_of: Callable[[Base], tuple[str, str] | None] = lambda _one: None,
+) -> list[Base]:
+    """Return an instance of every class of Python files that derives from `base`, by names that differ.
+
+    Args:
+        files: Python files.
+        base: what the classes derive from.
+        contract: where to read what is asked of them.
+        attributes: that a class must have, `name` among them.
+        fault_of: what is wrong with an instance, and what to do; it may run its code.
+
+    Raises:
+        InputError: every fault of every file: not there, not Python, no such class in it, something that the contract asks for
+            and that is not there, a name that another one has, code that fails.
+    """
+    faults: list[Problem] = []
+    found: dict[str, Base] = {}
+    for one_of in classes_in_files(files, base, contract, faults):
+        kind, place = one_of.kind, one_of.place
+        lacking = [name for name in attributes if not hasattr(kind, name)]
+        lacking += sorted(getattr(kind, "__abstractmethods__", ()))
+        if lacking:
+            faults.append(Problem(place.file, place.line, 0, f"{kind.__name__} lacks {', '.join(lacking)}", contract))
+            continue
+        try:
+            one = kind()
+            fault = fault_of(one)
+        except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
+            line = line_in(error, place.file) or place.line
+            faults.append(Problem(place.file, line, 0, f"{kind.__name__}: {in_words(error)}", contract))
+            continue
+        name = str(getattr(one, "name", ""))
+        if fault is None and name in found:
+            fault = f"the name `{name}` is taken", "give it another name"
+        if fault is not None:
+            faults.append(Problem(place.file, place.line, 0, *fault))
+        found.setdefault(name, one)
+    if faults:
+        raise InputError(faults)
+    return list(found.values())
 
 
 def module_name(path: Path) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dbbstation.catalogue import Found, in_words, line_in
+from dbbstation.catalogue import FoundClass, in_words, line_in
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.own_classes import classes_in_files
 from dbbstation.nc.dialect import Dialect
@@ -39,7 +39,7 @@ def dialect_given(name_or_file: str) -> Dialect:
     return _tried(found[0])
 
 
-def _tried(found: Found[Dialect]) -> Dialect:
+def _tried(found: FoundClass[Dialect]) -> Dialect:
     """Return a dialect made from a class, after it has written and read all that a program may say.
 
     Raises:

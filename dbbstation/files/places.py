@@ -15,6 +15,22 @@ def real_path(path: Path) -> Path:
     return Path(os.path.realpath(path))
 
 
+def unused_path(folder: Path, name: str, suffix: str = "") -> Path:
+    """Return a path of that name that does not exist, with a number where it has to.
+
+    Args:
+        folder: that it is in.
+        name: of a folder, or of a file without its ending.
+        suffix: ending of a file.
+    """
+    numbered = (folder / f"{name if k == 1 else f'{name}-{k}'}{suffix}" for k in range(1, MOST_NUMBERED))
+    return next(path for path in numbered if not path.exists())
+
+
+MOST_NUMBERED = 10_000
+"""Names with a number that are tried."""
+
+
 def name_of(path: Path) -> str:
     r"""Return what a path leads to is called, as a text: a byte of the name that is no UTF-8 is shown, such as `\xfc`.
 

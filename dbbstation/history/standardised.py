@@ -32,7 +32,7 @@ _SMALLEST = 1e-300
 
 
 @dataclass(frozen=True)
-class Scatter:
+class ScatterRatio:
     """Scatter of values about their level, in stated uncertainties.
 
     Attributes:
@@ -53,9 +53,9 @@ class Scatter:
         """Whether it contradicts the stated uncertainties."""
         return self.freedom > 0 and bool(chdtrc(self.freedom, self.square) < CONTRADICTS)
 
-    def with_residuals(self, residual: NDArray[np.float64]) -> Scatter:
+    def with_residuals(self, residual: NDArray[np.float64]) -> ScatterRatio:
         """Return it with further residuals, each from the level before it, in their standard uncertainties."""
-        return Scatter(self.freedom + len(residual), self.square + float(residual @ residual))
+        return ScatterRatio(self.freedom + len(residual), self.square + float(residual @ residual))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +83,8 @@ def standardised(
     values: NDArray[np.float64],
     u: NDArray[np.float64],
     baseline: int = BASELINE,
-    before: Scatter = Scatter(),
-    hindsight: Scatter | None = None,
+    before: ScatterRatio = ScatterRatio(),
+    hindsight: ScatterRatio | None = None,
 ) -> Standardised:
     """Hold each value against those before it, weighted by their stated uncertainties.
 

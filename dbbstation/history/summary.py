@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.history.record import SessionFigures
-    from dbbstation.history.trend import Asked, MachineHistory, Trend
-    from dbbstation.history.watch import Event, Verdict
+    from dbbstation.history.trend import MachineHistory, Trend, TrendOptions
+    from dbbstation.history.watch import TrendEvent, TrendVerdict
 
 FIGURES = {
     "G": "circular deviation, readings up to 30 undulations per revolution [ISO 230-4]",
@@ -34,7 +34,7 @@ DECIDED_BY = {True: "stated-uncertainty", False: "control-chart"}
 """What a verdict rests on: the stated uncertainties alone, or a chart that knows how the sessions scatter."""
 
 
-def history_summary(machines: Sequence[MachineHistory], asked: Asked) -> dict[str, Any]:
+def history_summary(machines: Sequence[MachineHistory], asked: TrendOptions) -> dict[str, Any]:
     """Return histories as plain numbers; None where something is not known.
 
     Args:
@@ -76,7 +76,7 @@ def _session(session: SessionFigures) -> dict[str, Any]:
 
 def _changes(one: MachineHistory) -> Iterator[dict[str, Any]]:
     """Yield what changed, by the session that showed it and the one from which it is so."""
-    found: dict[tuple[int, int, Verdict], list[tuple[Trend, Event]]] = {}
+    found: dict[tuple[int, int, TrendVerdict], list[tuple[Trend, TrendEvent]]] = {}
     for trend in one.trends:
         for event in () if trend.watched is None else trend.watched.events:
             key = (int(trend.at[event.found]), int(trend.at[event.since]), event.verdict)
@@ -144,7 +144,7 @@ def _trend(trend: Trend, sessions: Sequence[Mapping[str, Any]], coverage_factor:
     }
 
 
-def _event(event: Event, trend: Trend, sessions: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _event(event: TrendEvent, trend: Trend, sessions: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "verdict": str(event.verdict),
         "since": sessions[trend.at[event.since]]["name"],

@@ -12,7 +12,7 @@ import numpy as np
 
 from dbbstation.history.order import by_time
 from dbbstation.history.run_length import chart_for
-from dbbstation.history.watch import Verdict, watch
+from dbbstation.history.watch import TrendVerdict, watch
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.threads import with_one_thread
 
@@ -94,9 +94,9 @@ class Trend:
     why_not: str = ""
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> TrendVerdict:
         """What its history says."""
-        return Verdict.CANNOT_TELL if self.watched is None else self.watched.verdict
+        return TrendVerdict.CANNOT_TELL if self.watched is None else self.watched.verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ class _Series:
 
 
 @dataclass(frozen=True)
-class Asked:
+class TrendOptions:
     """How trends are worked out.
 
     Attributes:
@@ -150,7 +150,7 @@ class Asked:
 
 @with_one_thread
 def histories(
-    sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures], asked: Asked
+    sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures], asked: TrendOptions
 ) -> tuple[MachineHistory, ...]:
     """Return the history of every machine, in the order of their names.
 
@@ -167,7 +167,7 @@ def histories(
 
 
 def _history(
-    machine: str, sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures], asked: Asked
+    machine: str, sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures], asked: TrendOptions
 ) -> MachineHistory:
     series = _circle_series(sessions, asked) | _parameter_series(sessions, models)
     numbers = {subject: (np.array(one.at), np.array(one.values), np.array(one.u)) for subject, one in series.items()}
@@ -195,7 +195,7 @@ def _why_not(subject: Subject, u: NDArray[np.float64]) -> str:
     return ""
 
 
-def _circle_series(sessions: Sequence[SessionFigures], asked: Asked) -> dict[Subject, _Series]:
+def _circle_series(sessions: Sequence[SessionFigures], asked: TrendOptions) -> dict[Subject, _Series]:
     found: dict[Subject, _Series] = {}
     for k, session in enumerate(sessions):
         runs: dict[tuple[str, str, str], list[tuple[Figure, ...]]] = {}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.history.standardised import BASELINE, Scatter, standardised
+from dbbstation.history.standardised import BASELINE, ScatterRatio, standardised
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.history.standardised import Standardised
 
 
-class Verdict(StrEnum):
+class TrendVerdict(StrEnum):
     """What a history says of one quantity."""
 
     STEADY = "steady"
@@ -31,7 +31,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Event:
+class TrendEvent:
     """Something beyond scatter and uncertainty.
 
     Attributes:
@@ -44,7 +44,7 @@ class Event:
         by_stated: whether only the stated uncertainties say so: the scatter of the sessions is not known yet.
     """
 
-    verdict: Verdict
+    verdict: TrendVerdict
     since: int
     found: int
     difference: float
@@ -68,7 +68,7 @@ class Watched:
         by_stated: whether what is said of the last value rests on the stated uncertainties alone.
     """
 
-    events: tuple[Event, ...]
+    events: tuple[TrendEvent, ...]
     z: NDArray[np.float64]
     high: NDArray[np.float64]
     low: NDArray[np.float64]
@@ -84,12 +84,12 @@ class Watched:
         return int(np.isfinite(self.z).sum())
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> TrendVerdict:
         """What all of it says."""
         if not self.watched:
-            return Verdict.CANNOT_TELL
+            return TrendVerdict.CANNOT_TELL
         found = {event.verdict for event in self.events}
-        return next((v for v in (Verdict.CHANGED, Verdict.STANDS_OUT) if v in found), Verdict.STEADY)
+        return next((v for v in (TrendVerdict.CHANGED, TrendVerdict.STANDS_OUT) if v in found), TrendVerdict.STEADY)
 
 
 def watch(
@@ -121,7 +121,7 @@ def watch(
     if not any(event.by_stated for event in looked.events):
         return looked
     # With fewer changes called there is more scatter: it grows until the same changes are called again.
-    taken = Scatter()
+    taken = ScatterRatio()
     while scatter.more_than_stated and scatter.freedom > taken.freedom:
         taken = scatter
         looked, scatter = _look(values, u, chart, coverage_factor, baseline, taken)
@@ -138,14 +138,14 @@ def _look(
     chart: Chart,
     coverage_factor: float,
     baseline: int,
-    hindsight: Scatter | None,
-) -> tuple[Watched, Scatter]:
+    hindsight: ScatterRatio | None,
+) -> tuple[Watched, ScatterRatio]:
     """Look once, with the scatter that early values are held against, or their stated uncertainties; and return that found."""
     count = len(values)
     z, high, low, level, u_level = (np.full(count, np.nan) for _ in range(5))
     by_stated = np.zeros(count, dtype=bool)
-    events: list[Event] = []
-    start, out, pooled = 0, list[int](), Scatter()
+    events: list[TrendEvent] = []
+    start, out, pooled = 0, list[int](), ScatterRatio()
     while True:
         at = np.array([k for k in range(start, count) if k not in out], dtype=np.intp)
         for some in (at[:AT_FIRST], at):  # a change among the first is found without the work for all
@@ -161,7 +161,7 @@ def _look(
         by_stated[at[inside]] = held.by_stated[inside]
         if found is not None:
             alike = _leads_to(found, events, start)
-            if found.verdict is Verdict.STANDS_OUT and not alike:
+            if found.verdict is TrendVerdict.STANDS_OUT and not alike:
                 events.append(found)
                 out.append(found.found)
                 continue
@@ -190,7 +190,7 @@ def _look(
     return Watched(tuple(events), z, high, low, level, u_level, scatter, max(1 - len(at), 0), stated), pooled
 
 
-def _settled(event: Event, level: NDArray[np.float64], u_level: NDArray[np.float64], start: int) -> Event:
+def _settled(event: TrendEvent, level: NDArray[np.float64], u_level: NDArray[np.float64], start: int) -> TrendEvent:
     """Return a change with the difference of the levels about it: that of the values which showed it was chosen for being large.
 
     Args:
@@ -204,7 +204,7 @@ def _settled(event: Event, level: NDArray[np.float64], u_level: NDArray[np.float
     return replace(event, difference=difference, u_difference=u)
 
 
-def _leads_to(found: Event, events: list[Event], start: int) -> list[Event]:
+def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[TrendEvent]:
     """Return the single values that stood out on the same side where a change begins: they belong to it.
 
     Of a value that stands out itself only the one just before it: a change is what goes on.
@@ -213,13 +213,15 @@ def _leads_to(found: Event, events: list[Event], start: int) -> list[Event]:
     return [
         event
         for event in events
-        if event.verdict is Verdict.STANDS_OUT
+        if event.verdict is TrendVerdict.STANDS_OUT
         and event.found >= max(first, start)
         and event.difference * found.difference > 0.0
     ]
 
 
-def _change(since: int, found: int, at: NDArray[np.intp], values: NDArray[np.float64], u: NDArray[np.float64]) -> Event:
+def _change(
+    since: int, found: int, at: NDArray[np.intp], values: NDArray[np.float64], u: NDArray[np.float64]
+) -> TrendEvent:
     """Return a change with all its values, those that stood out among them.
 
     Args:
@@ -233,7 +235,7 @@ def _change(since: int, found: int, at: NDArray[np.intp], values: NDArray[np.flo
     level, u_level = _mean(values[before], u[before])
     after, u_after = _mean(values[these], u[these])
     spread = max(1.0, _scatter(values[before], u[before]))
-    return Event(Verdict.CHANGED, since, found, after - level, spread * float(np.hypot(u_after, u_level)))
+    return TrendEvent(TrendVerdict.CHANGED, since, found, after - level, spread * float(np.hypot(u_after, u_level)))
 
 
 def _scatter(values: NDArray[np.float64], u: NDArray[np.float64]) -> float:
@@ -275,7 +277,7 @@ class _Stretch:
         out[np.isfinite(self.of.z)] = steps - np.minimum(np.minimum.accumulate(steps), 0.0)
         return out
 
-    def first_event(self) -> Event | None:
+    def first_event(self) -> TrendEvent | None:
         """Return the first value beyond a limit whose difference is beyond the stated uncertainty too."""
         sums = self.sums
         high, low = (np.nan_to_num(one) for one in sums)
@@ -283,10 +285,10 @@ class _Stretch:
         beyond = single | (np.maximum(high, low) > self.chart.interval)
         for k in np.flatnonzero(beyond):
             if single[k]:
-                event = self._event(Verdict.STANDS_OUT, int(k), int(k))
+                event = self._event(TrendVerdict.STANDS_OUT, int(k), int(k))
             else:
                 since = self._since(int(k), 1.0 if high[k] >= low[k] else -1.0)
-                event = self._event(Verdict.CHANGED, since, int(k))
+                event = self._event(TrendVerdict.CHANGED, since, int(k))
             if abs(event.difference) > self.coverage_factor * self._stated(event):
                 return event
         return None
@@ -310,13 +312,13 @@ class _Stretch:
         scatter = _scatter(self.values[:count], self.u[:count])
         return level, u_level * max(1.0, float(np.nan_to_num(scatter)))
 
-    def _event(self, verdict: Verdict, since: int, k: int) -> Event:
+    def _event(self, verdict: TrendVerdict, since: int, k: int) -> TrendEvent:
         after, u_after = _mean(self.values[since : k + 1], self.u[since : k + 1])
         u_both = self._spread(since) * float(np.hypot(u_after, self.of.u_level[since]))
         difference = after - float(self.of.level[since])
-        return Event(verdict, int(self.at[since]), int(self.at[k]), difference, u_both, bool(self.of.by_stated[k]))
+        return TrendEvent(verdict, int(self.at[since]), int(self.at[k]), difference, u_both, bool(self.of.by_stated[k]))
 
-    def _stated(self, event: Event) -> float:
+    def _stated(self, event: TrendEvent) -> float:
         """Standard uncertainty of an event's difference by the stated ones alone."""
         since = int(np.searchsorted(self.at, event.since))
         return event.u_difference / self._spread(since)

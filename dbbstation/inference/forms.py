@@ -14,7 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-HATS = 7
+SPLINES = 7
 """Points of a piecewise linear curve."""
 
 POINTS_PER_WAVE = 8
@@ -47,7 +47,7 @@ class Form(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Hats(Form):
+class LinearSplines(Form):
     """Any smooth curve: straight between seven points. Limits are arrays where every strut has its own."""
 
     low: NDArray[np.float64]
@@ -56,17 +56,17 @@ class Hats(Form):
     @property
     def count(self) -> int:
         """One amplitude per point."""
-        return HATS
+        return SPLINES
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """One at its own point, zero at all others."""
-        place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (HATS - 1)
-        return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(HATS)))
+        place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (SPLINES - 1)
+        return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(SPLINES)))
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         """Its own points, in the middle between struts that have their own."""
         del low, high
-        return np.linspace(np.mean(self.low), np.mean(self.high), HATS)
+        return np.linspace(np.mean(self.low), np.mean(self.high), SPLINES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +181,7 @@ class Bump(Form):
 
 
 @dataclass(frozen=True, eq=False)
-class Step(Form):
+class StepForm(Form):
     """Minus a half before one value, plus a half behind it, over a few widths either way."""
 
     at: float
@@ -207,7 +207,7 @@ def _across(at: float, width: float, low: float, high: float) -> NDArray[np.floa
 
 
 @dataclass(frozen=True, eq=False)
-class Sign(Form):
+class SignForm(Form):
     """One way round plus, the other way minus."""
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -286,7 +286,7 @@ class PlaneStep(Form):
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """From minus to plus a half; values of shape (n, 2)."""
-        return Step(self.at, self.width).columns(self.along(values))
+        return StepForm(self.at, self.width).columns(self.along(values))
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         """Across the line."""

@@ -31,7 +31,7 @@ FEWEST = 20
 
 
 @dataclass(frozen=True)
-class Look:
+class ResidualTest:
     """One way of asking whether something is left.
 
     Attributes:
@@ -51,10 +51,10 @@ class Look:
 class LeftOver:
     """What is left, looked at in all these ways."""
 
-    looks: tuple[Look, ...]
+    looks: tuple[ResidualTest, ...]
 
     @property
-    def worst(self) -> Look:
+    def worst(self) -> ResidualTest:
         """The one that is least probable by chance."""
         return min(self.looks, key=lambda look: look.probability)
 
@@ -85,7 +85,7 @@ def left_over(settled: Settled, freedom: float | None = None) -> LeftOver:
     square = float(left @ left) / freedom
     beyond = float(np.sqrt(max(square - 1.0, 0.0))) * settled.noise.sigma
     # The noise was measured on the same rows, beside more columns: it is known about as well as the square.
-    looks = [Look("sum of squares", float(f.sf(square, freedom, freedom)), beyond, "")]
+    looks = [ResidualTest("sum of squares", float(f.sf(square, freedom, freedom)), beyond, "")]
     if channel.time is not None:
         looks += _in_order(left, channel.stretches, settled.noise.sigma)
     blocks = channel.kept_blocks
@@ -98,7 +98,7 @@ def left_over(settled: Settled, freedom: float | None = None) -> LeftOver:
     return LeftOver(tuple(looks))
 
 
-def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: float) -> list[Look]:
+def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: float) -> list[ResidualTest]:
     """Wave in time, and runs of one sign."""
     longest = left[max(stretches, key=lambda rows: rows.stop - rows.start)]
     found = []
@@ -109,7 +109,7 @@ def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: floa
         share = float(power[at] / max(float(power.sum()), 1e-300))
         chance = min(1.0, len(power) * (1.0 - share) ** (len(power) - 1))
         size = sigma * 2.0 * float(np.sqrt(power[at])) / len(longest) / float(np.sqrt(2.0))
-        found.append(Look("wave in time", chance, size, f"about every {len(longest) / (at + 1):.4g} rows"))
+        found.append(ResidualTest("wave in time", chance, size, f"about every {len(longest) / (at + 1):.4g} rows"))
     signs = np.sign(left)
     up, down = float((signs > 0).sum()), float((signs < 0).sum())
     if min(up, down) >= FEWEST / 2:
@@ -118,21 +118,21 @@ def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: floa
         expected = 1.0 + 2.0 * up * down / total
         variance = (expected - 1.0) * (expected - 2.0) / (total - 1.0)  # [Wald and Wolfowitz, 1940]
         z = (runs - expected) / float(np.sqrt(max(variance, 1e-12)))
-        found.append(Look("runs of sign", float(norm.cdf(z)), sigma * float(np.std(left)), ""))
+        found.append(ResidualTest("runs of sign", float(norm.cdf(z)), sigma * float(np.std(left)), ""))
     return found
 
 
-def _by_block(left: NDArray[np.float64], blocks: Sequence[slice], sigma: float) -> Look:
+def _by_block(left: NDArray[np.float64], blocks: Sequence[slice], sigma: float) -> ResidualTest:
     """Means of blocks."""
     counts = np.array([rows.stop - rows.start for rows in blocks], dtype=np.float64)
     means = np.array([left[rows].mean() for rows in blocks])
     terms = counts * means**2
     worst = int(terms.argmax())
     size = sigma * abs(float(means[worst]))
-    return Look("blocks", float(chi2.sf(terms.sum(), len(blocks))), size, f"most in block {worst + 1}")
+    return ResidualTest("blocks", float(chi2.sf(terms.sum(), len(blocks))), size, f"most in block {worst + 1}")
 
 
-def _over(left: NDArray[np.float64], variable: Variable, sigma: float) -> Look:
+def _over(left: NDArray[np.float64], variable: Variable, sigma: float) -> ResidualTest:
     """Means over pieces of a variable with as many rows in each."""
     values = variable.values
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
@@ -143,4 +143,4 @@ def _over(left: NDArray[np.float64], variable: Variable, sigma: float) -> Look:
     worst = int(terms.argmax())
     ends = edges[[worst, min(worst + 1, len(edges) - 1)]]
     where = f"most from {ends[0]:.4g} to {ends[1]:.4g} {variable.unit}".strip()
-    return Look(variable.name, float(chi2.sf(terms.sum(), len(terms))), sigma * abs(float(means[worst])), where)
+    return ResidualTest(variable.name, float(chi2.sf(terms.sum(), len(terms))), sigma * abs(float(means[worst])), where)

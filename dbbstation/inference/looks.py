@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.curves import Spline
-from dbbstation.inference.forms import Bump, Step, Wave
+from dbbstation.inference.forms import Bump, StepForm, Wave
 from dbbstation.inference.patterns import Family, Pattern, log_odds
 from dbbstation.inference.pieces import Sums, peaks
 from dbbstation.inference.variables import Kind
@@ -190,8 +190,8 @@ def _moved(form: Form, finer: float, extent: float) -> list[Form]:
             for away in steps
             for wider in steps
         ]
-    if isinstance(form, Step):
-        return [Step(form.at + away * finer * form.width, form.width) for away in steps]
+    if isinstance(form, StepForm):
+        return [StepForm(form.at + away * finer * form.width, form.width) for away in steps]
     if isinstance(form, Wave):
         return [Wave(max(form.frequency + away * finer * FINER[0] / extent, 0.25 / extent)) for away in steps]
     return [form]
@@ -213,8 +213,8 @@ def _near(form: Form) -> list[Form]:
             for wider in (0.6, 0.7, 0.84, 1.0, 1.19, 1.41, 1.7)
             for away in np.arange(-0.5, 0.55, 0.1)
         ]
-    if isinstance(form, Step):
-        return [Step(form.at + away * form.width, form.width) for away in np.arange(-4.0, 4.1, 0.5)]
+    if isinstance(form, StepForm):
+        return [StepForm(form.at + away * form.width, form.width) for away in np.arange(-4.0, 4.1, 0.5)]
     return [form]
 
 
@@ -242,7 +242,7 @@ def _bumps(variable: Variable, pieces: int) -> list[Form]:
 def _steps(variable: Variable) -> list[Form]:
     wide = variable.extent / STEPS
     places = np.linspace(variable.low, variable.high, STEPS + 1)[2:-2]
-    return [Step(float(at), wide / 4.0) for at in places]
+    return [StepForm(float(at), wide / 4.0) for at in places]
 
 
 def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArray[np.float64]:

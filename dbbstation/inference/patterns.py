@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.curves import Power, Spline
-from dbbstation.inference.forms import Form, Sign, Wave
+from dbbstation.inference.forms import Form, SignForm, Wave
 from dbbstation.inference.variables import TRAVELS, Kind
 
 if TYPE_CHECKING:
@@ -221,7 +221,7 @@ def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: NDArray[np.fl
     weight = -float(np.log(len(labels)))
     choices = tuple(((k,), weight, label) for k, label in enumerate(labels))
     width = len(labels)
-    return Pattern(Family.HYSTERESIS, (variable,), samples, Sign(), ("",) * width, (1.0,) * width, choices=choices)
+    return Pattern(Family.HYSTERESIS, (variable,), samples, SignForm(), ("",) * width, (1.0,) * width, choices=choices)
 
 
 TRANSITS = (0.003, 0.01, 0.03, 0.1)

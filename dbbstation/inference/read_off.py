@@ -54,7 +54,7 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Finding:
+class CauseFinding:
     """What is said of one cause.
 
     Attributes:
@@ -121,7 +121,7 @@ class Trial:
     refits: Sequence[Solution] = ()
 
 
-def read_off(settled: Settled, trial: Trial | None = None) -> tuple[Finding, ...]:
+def read_off(settled: Settled, trial: Trial | None = None) -> tuple[CauseFinding, ...]:
     """One finding per law and per pattern, those that are there first, largest first.
 
     Args:
@@ -162,14 +162,14 @@ class _Judge:
         scan = settled.comparison.scan(self._best.members, absent)
         self._beside = {c.name: (float(g), m) for c, g, m in zip(scan.causes, scan.log_factor, scan.best, strict=True)}
 
-    def refused(self, name: str, why: str) -> Finding:
+    def refused(self, name: str, why: str) -> CauseFinding:
         """Finding of a law that would have to be what it cannot be."""
         blocks = (0.0,) * len(self._settled.channel.blocks)
-        return Finding(
+        return CauseFinding(
             name, Verdict.RULED_OUT, None, "", (), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {}, (), (), blocks, text=why
         )
 
-    def finding(self, cause: Cause) -> Finding:
+    def finding(self, cause: Cause) -> CauseFinding:
         """What is said of one cause."""
         pattern = self._settled.bank.patterns.get(cause.name)
         member = self._members.get(cause.name)
@@ -198,7 +198,7 @@ class _Judge:
         lasts = pattern is None or pattern.family is Family.STEP or self._is_a_step(rows)
         largest = _at_half(effect) if there else np.zeros(0, dtype=bool)
         channel = self._settled.channel
-        return Finding(
+        return CauseFinding(
             name=cause.name,
             verdict=verdict,
             family=pattern.family if pattern else law.family if law else None,

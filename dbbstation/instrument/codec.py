@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.damaged import damaged_in
 from dbbstation.instrument.doubt import Written
-from dbbstation.instrument.fields import Content, Found, Literally, NotRepresentable, NotUnderstood, Reason
+from dbbstation.instrument.fields import Content, FrameParts, Literally, NotRepresentable, NotUnderstood, Reason
 from dbbstation.instrument.reading import Reading, Status
 
 if TYPE_CHECKING:
@@ -244,7 +244,7 @@ def _skipped(raw: bytes, wrong: NotUnderstood | None, *, joining: bool) -> Garba
     return Garbage(raw, joining=joining) if wrong is None else Garbage(raw, str(wrong), joining, wrong.reason)
 
 
-def _reading(protocol: Protocol, found: Found) -> tuple[Reading, Written | None]:
+def _reading(protocol: Protocol, found: FrameParts) -> tuple[Reading, Written | None]:
     length_mm: float | None = None
     if found.value is not None and found.status != "fault":
         length_mm = found.sign * found.value * protocol.length.mm_per_unit(found.unit) + protocol.length.zero_mm + 0.0

@@ -23,7 +23,7 @@ else:
     _MARKS = True
 
 if TYPE_CHECKING:
-    from dbbstation.instrument.protocol import Line
+    from dbbstation.instrument.protocol import LineSettings
 
 _ESCAPED = re.compile(rb"\xff(?:\xff|\x00([\x00-\xff])|(\x00?\Z))")
 
@@ -75,7 +75,7 @@ class Marks:
         return bytes([found[1][0] | _EIGHTH_BIT]) if self._seven else b"\x00"
 
 
-def damaged_in(raw: bytes, line: Line) -> int:
+def damaged_in(raw: bytes, line: LineSettings) -> int:
     """Return how many characters of a text came with a wrong parity, by the bytes that `Marks` gives."""
     if line.parity == "none":
         return 0

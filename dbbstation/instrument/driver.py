@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dbbstation.instrument.adapters import Adapter
     from dbbstation.instrument.bytelog import ByteLog
     from dbbstation.instrument.link import Link, Port
-    from dbbstation.instrument.protocol import Protocol, Step
+    from dbbstation.instrument.protocol import LineCommand, Protocol
     from dbbstation.instrument.reading import Reading
 
 _LOOK_S = 0.25
@@ -290,7 +290,7 @@ class Instrument:
             self._arrived.notify_all()
 
 
-def _command(link: Link, step: Step, patience_s: float) -> bytes:
+def _command(link: Link, step: LineCommand, patience_s: float) -> bytes:
     """Send one command, wait for its answer, return what came behind it.
 
     Raises:

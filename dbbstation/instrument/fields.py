@@ -65,7 +65,7 @@ Bytes: TypeAlias = Annotated[
 
 
 @dataclass(slots=True)
-class Found:
+class FrameParts:
     """What the parts of one frame have said so far.
 
     Attributes:
@@ -149,7 +149,7 @@ class Literally(Schema):
         """Return the regular expression of these bytes."""
         return re.escape(self.value)
 
-    def read(self, raw: bytes, found: Found) -> None:
+    def read(self, raw: bytes, found: FrameParts) -> None:
         """Say nothing: the pattern matched."""
 
     def write(self, content: Content) -> bytes:  # noqa: ARG002 (every part has this signature)
@@ -157,7 +157,7 @@ class Literally(Schema):
         return self.value
 
 
-class Sign(Schema):
+class SignField(Schema):
     """The sign as a part of its own; the first of `plus` and of `minus` is what the device writes."""
 
     kind: Literal["sign"]
@@ -165,7 +165,7 @@ class Sign(Schema):
     minus: tuple[Bytes, ...] = (b"-",)
 
     @model_validator(mode="after")
-    def _one_byte_each(self) -> Sign:
+    def _one_byte_each(self) -> SignField:
         if not self.plus or not self.minus or any(len(code) != 1 for code in self.plus + self.minus):
             raise ValueError("plus and minus list single characters, at least one each")
         return self
@@ -179,7 +179,7 @@ class Sign(Schema):
         """Return the regular expression of any of the signs."""
         return b"[" + re.escape(b"".join(self.plus + self.minus)) + b"]"
 
-    def read(self, raw: bytes, found: Found) -> None:
+    def read(self, raw: bytes, found: FrameParts) -> None:
         """Take the sign."""
         found.sign = -1 if raw in self.minus else 1
 
@@ -188,14 +188,14 @@ class Sign(Schema):
         return self.minus[0] if content.value < 0 else self.plus[0]
 
 
-class Choice(Schema):
+class ChoiceField(Schema):
     """One of several codes; without a status to report the device writes the first."""
 
     kind: Literal["choice"]
     codes: tuple[Code, ...] = Field(min_length=1)
 
     @model_validator(mode="after")
-    def _codes_differ(self) -> Choice:
+    def _codes_differ(self) -> ChoiceField:
         if len({code.code for code in self.codes}) < len(self.codes):
             raise ValueError("two codes are the same bytes")
         if self.codes[0].status != "ok":
@@ -216,7 +216,7 @@ class Choice(Schema):
             + b")"
         )
 
-    def read(self, raw: bytes, found: Found) -> None:
+    def read(self, raw: bytes, found: FrameParts) -> None:
         """Take unit and status of the code."""
         code = next(code for code in self.codes if code.code == raw)
         found.unit = code.unit or found.unit
@@ -245,7 +245,7 @@ class Flags(Schema):
         allowed = sorted({value for value in range(256) if value & ~free == self.base & ~free})
         return b"[" + b"".join(re.escape(bytes([value])) for value in allowed) + b"]"
 
-    def read(self, raw: bytes, found: Found) -> None:
+    def read(self, raw: bytes, found: FrameParts) -> None:
         """Report every bit that differs from the base."""
         for bit in self.bits:
             if (raw[0] ^ self.base) >> bit.bit & 1:
@@ -256,7 +256,7 @@ class Flags(Schema):
         return bytes([self.base ^ sum(1 << bit.bit for bit in self.bits if bit is content.voice)])
 
 
-class Skip(Schema):
+class SkipField(Schema):
     """Bytes of fixed number that say nothing of the length; the virtual instrument writes `written`."""
 
     kind: Literal["skip"]
@@ -271,7 +271,7 @@ class Skip(Schema):
         """Return the regular expression of any bytes."""
         return b"[\\x00-\\xff]{%d}" % self.width
 
-    def read(self, raw: bytes, found: Found) -> None:
+    def read(self, raw: bytes, found: FrameParts) -> None:
         """Pass over it."""
 
     def write(self, content: Content) -> bytes:  # noqa: ARG002 (every part has this signature)

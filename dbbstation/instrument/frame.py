@@ -10,7 +10,7 @@ from pydantic import Field
 
 from dbbstation.files.yaml.schema import Schema
 from dbbstation.instrument.checksum_part import Checksum
-from dbbstation.instrument.fields import Choice, Flags, Found, Literally, Sign, Skip
+from dbbstation.instrument.fields import ChoiceField, Flags, FrameParts, Literally, SignField, SkipField
 from dbbstation.instrument.numbers import DecimalText, Ieee, Integer
 from dbbstation.instrument.reading import SaidStatus  # noqa: TC001 (pydantic needs it at run time)
 from dbbstation.instrument.telling import ErrorTable, Text
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Number: TypeAlias = DecimalText | Integer | Ieee
 
 PlainPart: TypeAlias = Annotated[
-    Literally | Sign | DecimalText | Integer | Ieee | Choice | Flags | Skip | Text | ErrorTable,
+    Literally | SignField | DecimalText | Integer | Ieee | ChoiceField | Flags | SkipField | Text | ErrorTable,
     Field(discriminator="kind"),
 ]
 
@@ -47,7 +47,7 @@ class Optionally(Schema):
         """Return the regular expression of all the parts, or of nothing."""
         return b"(?:" + b"".join(part.pattern() for part in self.parts) + b")?"
 
-    def read(self, raw: bytes, found: Found) -> None:
+    def read(self, raw: bytes, found: FrameParts) -> None:
         """Take what the parts say, where they are there.
 
         Raises:
@@ -75,7 +75,18 @@ class Optionally(Schema):
 
 
 Part: TypeAlias = Annotated[
-    Literally | Sign | DecimalText | Integer | Ieee | Choice | Flags | Checksum | Skip | Text | ErrorTable | Optionally,
+    Literally
+    | SignField
+    | DecimalText
+    | Integer
+    | Ieee
+    | ChoiceField
+    | Flags
+    | Checksum
+    | SkipField
+    | Text
+    | ErrorTable
+    | Optionally,
     Field(discriminator="kind"),
 ]
 
@@ -157,7 +168,7 @@ class Frame(Schema):
         """Every code and bit with which this frame can speak of a status."""
         found: list[Code | Bit] = []
         for part in self.parts:
-            if isinstance(part, Choice | ErrorTable):
+            if isinstance(part, ChoiceField | ErrorTable):
                 found += part.codes
             elif isinstance(part, Flags):
                 found += part.bits
@@ -165,13 +176,13 @@ class Frame(Schema):
                 found += part.specials
         return tuple(voice for voice in found if voice.status != "ok")
 
-    def read(self, match: re.Match[bytes]) -> Found:
+    def read(self, match: re.Match[bytes]) -> FrameParts:
         """Return what a match of `pattern` says.
 
         Raises:
             NotUnderstood: the characters are right but a number or the checksum is not.
         """
-        found = Found()
+        found = FrameParts()
         found.report(self.status, self.means, self.remedy)
         for group, part in enumerate(self.parts, start=1):
             if isinstance(part, Checksum):
@@ -192,11 +203,11 @@ class Frame(Schema):
         value = (number.as_read(content.value) if number else 0.0) + 0.0
         signed = content.of(value)
         unsigned = content.of(abs(value))
-        has_sign = any(isinstance(part, Sign) for part in self.parts)
+        has_sign = any(isinstance(part, SignField) for part in self.parts)
         raw = b""
         for part in self.parts:
             if isinstance(part, Checksum):
                 raw += part.over(raw)
             else:
-                raw += part.write(signed if isinstance(part, Sign) or not has_sign else unsigned)
+                raw += part.write(signed if isinstance(part, SignField) or not has_sign else unsigned)
         return raw

@@ -18,7 +18,7 @@ from dbbstation.instrument.holders import holders
 
 if TYPE_CHECKING:
     from dbbstation.instrument.bytelog import ByteLog
-    from dbbstation.instrument.protocol import Line
+    from dbbstation.instrument.protocol import LineSettings
 
 _ERRORS: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
 """What a port can raise; pyserial lets some errors of the system through, and TypeError from a port just closed."""
@@ -168,7 +168,7 @@ def _close_quietly(port: object) -> None:
 
 
 def open_link(
-    port: str | Port, line: Line, *, baud: int | None = None, log: ByteLog | None = None, text: bool = False
+    port: str | Port, line: LineSettings, *, baud: int | None = None, log: ByteLog | None = None, text: bool = False
 ) -> Link:
     """Open a line to an instrument.
 

@@ -10,7 +10,7 @@ from dbbstation.instrument.arrivals import Arrivals
 from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage, Piece
 from dbbstation.instrument.doubt import Doubts
 from dbbstation.instrument.reception import INCOMPLETE
-from dbbstation.instrument.sequence import Sequence
+from dbbstation.instrument.sequence import SampleOrder
 from dbbstation.instrument.stamps import StreamStamps
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class Listener:
         protocol = reception.protocol
         self._link = link
         self._to = reception
-        self._sequence = Sequence[tuple[Piece, float, float]](protocol.counter_modulus, reception.where)
+        self._sequence = SampleOrder[tuple[Piece, float, float]](protocol.counter_modulus, reception.where)
         # Behind the answer to a start command the stream begins with a whole frame.
         self._decoder = Decoder(protocol, joining=not (protocol.ask.start and protocol.ask.start[-1].reply))
         self._stamps = StreamStamps(1.0 / protocol.fastest_hz(reception.baud), reception.memory_s)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import Field, model_validator
 
 from dbbstation.files.yaml.schema import Schema
-from dbbstation.instrument.fields import Code, Content, Found, NotRepresentable, NotUnderstood
+from dbbstation.instrument.fields import Code, Content, FrameParts, NotRepresentable, NotUnderstood
 
 if TYPE_CHECKING:
     from typing import Self
@@ -48,7 +48,7 @@ class Number(Schema):
         specials = b"".join(re.escape(special.code) + b"|" for special in self.specials)
         return b"(?:" + specials + self._digits() + b")"
 
-    def read(self, raw: bytes, found: Found) -> None:
+    def read(self, raw: bytes, found: FrameParts) -> None:
         """Take the number.
 
         Raises:

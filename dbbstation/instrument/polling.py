@@ -12,7 +12,7 @@ from dbbstation.instrument.doubt import Doubts
 from dbbstation.instrument.latch import latch_of
 from dbbstation.instrument.reading import Reading
 from dbbstation.instrument.reception import INCOMPLETE
-from dbbstation.instrument.sequence import Sequence
+from dbbstation.instrument.sequence import SampleOrder
 
 if TYPE_CHECKING:
     from dbbstation.instrument.codec import Heard
@@ -34,7 +34,7 @@ places. Where one exchange in twenty is disturbed, so many come once in 30 000 t
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class PolledReply:
     """What came after a request.
 
     Attributes:
@@ -65,11 +65,11 @@ class Poller:
         self._link = link
         self._to = reception
         self._protocol = reception.protocol
-        self._sequence = Sequence[tuple[Piece, Reading]](self._protocol.counter_modulus, reception.where)
+        self._sequence = SampleOrder[tuple[Piece, Reading]](self._protocol.counter_modulus, reception.where)
         self._doubts = Doubts(self._protocol)
         self._last_s = float("-inf")
         self._failed: list[Garbage] = []
-        self._recent: deque[Answer] = deque(maxlen=EXCHANGES)
+        self._recent: deque[PolledReply] = deque(maxlen=EXCHANGES)
         self._explained = ""
 
     def run(self) -> None:
@@ -162,7 +162,7 @@ class Poller:
             heard_s = now_s if raw else heard_s
             self._to.tally.reject(raw, "bytes")
 
-    def _answer(self, protocol: Protocol) -> Answer:
+    def _answer(self, protocol: Protocol) -> PolledReply:
         """Wait for a reply in a protocol's frames."""
         decoder = Decoder(protocol, joining=False)
         deadline_s = time.monotonic() + self._to.timeout_s
@@ -177,8 +177,8 @@ class Poller:
             if pieces:
                 noise = b"".join(one.raw for one in heard if isinstance(one, Garbage)) + decoder.take_pending()
                 self._to.tally.reject(noise, "bytes")
-                return Answer(pieces[-1], first_s, came)
+                return PolledReply(pieces[-1], first_s, came)
             if heard and not decoder.pending:
                 # A whole line that is no reading: asking again is quicker than waiting.
-                return Answer(heard[-1], first_s, came)
-        return Answer(Garbage(decoder.take_pending(), INCOMPLETE), first_s, came)
+                return PolledReply(heard[-1], first_s, came)
+        return PolledReply(Garbage(decoder.take_pending(), INCOMPLETE), first_s, came)

@@ -10,7 +10,7 @@ from pydantic import Field
 from dbbstation.files.yaml.schema import Schema, validate
 from dbbstation.instrument.fields import Bytes  # noqa: TC001 (pydantic needs it at run time)
 from dbbstation.instrument.frame import Frame  # noqa: TC001 (pydantic needs it at run time)
-from dbbstation.instrument.protocol import FollowUp, Name, Protocol, Reference, Step
+from dbbstation.instrument.protocol import FollowUp, LineCommand, Name, Protocol, Reference
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -36,8 +36,8 @@ class AskInstead(Schema):
     mode: str | None = None
     request: Bytes | None = None
     request_end: Bytes | None = None
-    start: tuple[Step, ...] | None = None
-    stop: tuple[Step, ...] | None = None
+    start: tuple[LineCommand, ...] | None = None
+    stop: tuple[LineCommand, ...] | None = None
     follow_up: FollowUp | None = None
 
 

@@ -34,7 +34,7 @@ _NEWER_WORDS = {"poll", "latch", "text", "errors", "optional"}
 _MM_PER_UNIT: dict[Unit, float] = {"mm": 1.0, "um": 1e-3, "nm": 1e-6, "m": 1e3, "inch": 25.4}
 
 
-class Line(Schema):
+class LineSettings(Schema):
     """Settings of the serial line; `baud_choices` are the rates that the device can be set to."""
 
     baud: int = Field(gt=0)
@@ -67,7 +67,7 @@ class Line(Schema):
         return f"{self.baud} baud, {self.bits_text}{flow}"
 
 
-class Step(Schema):
+class LineCommand(Schema):
     """One command of a start or stop sequence: bytes sent, the answer waited for, a rest afterwards.
 
     Attributes:
@@ -115,8 +115,8 @@ class Ask(Schema):
     mode: Literal["request", "poll", "latch", "stream"]
     request: Bytes = b""
     request_end: Bytes = b""
-    start: tuple[Step, ...] = ()
-    stop: tuple[Step, ...] = ()
+    start: tuple[LineCommand, ...] = ()
+    stop: tuple[LineCommand, ...] = ()
     follow_up: FollowUp | None = None
 
     @model_validator(mode="after")
@@ -243,7 +243,7 @@ class Protocol(Schema):
     setup: tuple[str, ...] = ()
     references: tuple[Reference, ...] = ()
     features: tuple[str, ...] = ()
-    line: Line
+    line: LineSettings
     ask: Ask
     reply: Reply = Reply()
     length: Length

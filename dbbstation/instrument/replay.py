@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.codec import Decoder, Piece
 from dbbstation.instrument.doubt import Doubts
-from dbbstation.instrument.sequence import Sequence
+from dbbstation.instrument.sequence import SampleOrder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -109,5 +109,5 @@ class _Decoding:
         if raw and raw not in self._answers:
             yield Replayed(self._last_s, raw, None, why)
 
-    def _anew(self) -> Sequence[tuple[Piece, float]]:
-        return Sequence(self._protocol.counter_modulus, self._where)
+    def _anew(self) -> SampleOrder[tuple[Piece, float]]:
+        return SampleOrder(self._protocol.counter_modulus, self._where)

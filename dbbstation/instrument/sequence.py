@@ -40,7 +40,7 @@ class Placed(Generic[Held]):
     why: str = ""
 
 
-class Sequence(Generic[Held]):
+class SampleOrder(Generic[Held]):
     """Puts samples in order by their counter; hands them out in wire order, the doubtful ones some lines later.
 
     Args:

@@ -11,7 +11,7 @@ from dbbstation.files.yaml.schema import Schema
 from dbbstation.instrument.fields import Code  # noqa: TC001 (pydantic needs it at run time)
 
 if TYPE_CHECKING:
-    from dbbstation.instrument.fields import Content, Found
+    from dbbstation.instrument.fields import Content, FrameParts
 
 _PRINTABLE = b"[\\x20-\\x7e]"
 
@@ -39,7 +39,7 @@ class Text(Schema):
         """Return the regular expression of printable characters."""
         return _PRINTABLE + (b"{%d}" % self.width if self.width else b"{1,%d}" % self.max_width)
 
-    def read(self, raw: bytes, found: Found) -> None:
+    def read(self, raw: bytes, found: FrameParts) -> None:
         """Keep the words."""
         found.text = raw.decode("ascii").strip()
 
@@ -79,7 +79,7 @@ class ErrorTable(Schema):
         known = b"|".join(re.escape(code.code) for code in self.codes)
         return b"(?:" + known + b"|" + _PRINTABLE + b"{%d})" % self.width
 
-    def read(self, raw: bytes, found: Found) -> None:
+    def read(self, raw: bytes, found: FrameParts) -> None:
         """Take what the code means; it is more exact than what the frame means."""
         code = next((one for one in self.codes if one.code == raw), None)
         if code is None:

@@ -133,7 +133,7 @@ def _acting(
             size = usual if stated is None else np.asarray(stated, dtype=np.float64)
             at_a_pose = source.needs <= {Need.POSE}
             # Amplitudes are zero as long as nothing is known; what says when, such as a time constant, has its usual value.
-            about = np.where([bool(parameter.shape) and not at_a_pose for parameter in parameters], usual, 0.0)
+            about = np.where([bool(parameter.grid) and not at_a_pose for parameter in parameters], usual, 0.0)
             columns = reading.by_source(source, model.machine, about) * size
         except ModelError:
             continue  # the machine file does not have what it acts on

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.nc.toolpath import Step, Toolpath, ToolpathBuilder
+from dbbstation.nc.toolpath import RowKind, Toolpath, ToolpathBuilder
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def circle_toolpath(
         path.rapid(_raised(first, approach.clear_mm))
     path.feed(first[None], circle.feed_mm_min)
     if approach is not None:
-        path.say(Step.PAUSE, BAR_ON)
+        path.say(RowKind.PAUSE, BAR_ON)
     path.dwell(OUTER_DWELL_S)
     arc = circle.poses(circle.theta_deg(arc_phi_deg(circle, step_deg)))
     path.feed(arc[:1], circle.feed_mm_min)
@@ -91,7 +91,7 @@ def circle_toolpath(
     path.feed(last[None], circle.feed_mm_min)
     path.dwell(OUTER_DWELL_S)
     if approach is not None:
-        path.say(Step.PAUSE, BAR_OFF)
+        path.say(RowKind.PAUSE, BAR_OFF)
         path.rapid(_raised(last, approach.clear_mm))
     return path.built()
 

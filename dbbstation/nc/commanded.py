@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.nc.registry import dialect_of_file
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def poses_at_progress(toolpath: Toolpath, circle: Circle, phi_deg: NDArray[np.fl
 def _arc_s(toolpath: Toolpath) -> tuple[float, float]:
     """Begin and end of the longest stretch of feed moves [s]."""
     # Comments and functions take no time and end no stretch.
-    stops = np.isin(toolpath.kind, [Step.RAPID, Step.DWELL, Step.PAUSE, Step.OPTIONAL_STOP])
+    stops = np.isin(toolpath.kind, [RowKind.RAPID, RowKind.DWELL, RowKind.PAUSE, RowKind.OPTIONAL_STOP])
     stretch = np.cumsum(stops)
     lasts = np.where(stops, 0.0, toolpath.duration_s)
     longest = int(np.argmax(np.bincount(stretch, weights=lasts)))

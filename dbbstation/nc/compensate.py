@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.nc.curve import Curve, felt_mm, row_and_share
+from dbbstation.nc.curve import CommandCurve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, PLANNED_WITHIN, cuts, move_mm
 from dbbstation.nc.splitting import SHORTEST_MM, Pieces, looked_at, moves_of, parts_of, rows_as_pieces, runs_of, split
-from dbbstation.nc.toolpath import Step, rounded
+from dbbstation.nc.toolpath import RowKind, rounded
 from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def compensate_toolpath(
         begins_s = (
             None if started_s is None else started_s + float(toolpath.end_s[rows.start - 1] if rows.start else 0.0)
         )
-        curve = Curve(path, model, begins_s, hold_tilt=prefer is Prefer.POSITION_ONLY, before=before)
+        curve = CommandCurve(path, model, begins_s, hold_tilt=prefer is Prefer.POSITION_ONLY, before=before)
         if chord_mm is None:
             pieces = rows_as_pieces(path)
         else:
@@ -224,7 +224,7 @@ def _off_mm(toolpath: Toolpath, pieces: Pieces, at: NDArray[np.float64]) -> NDAr
     """How far the curve leaves each piece at feed, at `DENSELY` places, shape (k,) [mm]."""
     begin, end = at[:, 0], at[:, -1]
     off = np.array([felt_mm(at[:, 1 + k] - (begin + share * (end - begin))) for k, share in enumerate(DENSELY)])
-    return np.where(toolpath.kind[pieces.row] == Step.FEED, off.max(axis=0, initial=0.0), 0.0)
+    return np.where(toolpath.kind[pieces.row] == RowKind.FEED, off.max(axis=0, initial=0.0), 0.0)
 
 
 def _needed_mm(toolpath: Toolpath, planner: Planner, prefer: Prefer | None) -> NDArray[np.float64]:
@@ -234,7 +234,7 @@ def _needed_mm(toolpath: Toolpath, planner: Planner, prefer: Prefer | None) -> N
     is as slow as its length lets it be, compensated or not.
     """
     limited = planner.limited(toolpath)
-    mm_s = np.where(toolpath.kind == Step.FEED, np.nan_to_num(toolpath.feed) / 60.0, 0.0)
+    mm_s = np.where(toolpath.kind == RowKind.FEED, np.nan_to_num(toolpath.feed) / 60.0, 0.0)
     mm_s = np.where(limited, np.minimum(mm_s, planner.reached_mm_s(move_mm(toolpath))), mm_s)
     turns = limited if prefer is Prefer.POSITION_ONLY else cuts(toolpath)
     return np.where(turns, planner.needed_mm(mm_s), 0.0)
@@ -314,14 +314,14 @@ def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner
         middle = (low + high) / 2.0
         low, high = (middle, high) if share(middle) <= NAMED else (low, middle)
     takes, took = of.lost(_seconds(toolpath, planner), _seconds(done, planner))
-    row = int(np.argmax((of.before == int(np.argmax(takes - took))) & (toolpath.kind == Step.FEED)))
+    row = int(np.argmax((of.before == int(np.argmax(takes - took))) & (toolpath.kind == RowKind.FEED)))
     feed = float(toolpath.feed[row])
     return Slow(int(toolpath.line[row]), feed, low * feed, np.nan)
 
 
 def _seconds(path: Toolpath, planner: Planner) -> NDArray[np.float64]:
     """Time of each row at feed, zero in others, shape (n,) [s]."""
-    return np.where(path.kind == Step.FEED, planner.seconds(path), 0.0)
+    return np.where(path.kind == RowKind.FEED, planner.seconds(path), 0.0)
 
 
 def _slowed(done: Toolpath, planner: Planner) -> Toolpath:
@@ -365,7 +365,7 @@ def _written(toolpath: Toolpath, pieces: Pieces) -> NDArray[np.bool_]:
     """Which pieces become a row: all at feed, the last one of a rapid."""
     row = pieces.row
     last = np.append(row[1:] != row[:-1], True)[: len(row)]
-    return np.asarray(last | (toolpath.kind[row] == Step.FEED))
+    return np.asarray(last | (toolpath.kind[row] == RowKind.FEED))
 
 
 def _until(toolpath: Toolpath, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -395,4 +395,4 @@ def _feeds(
     wanted = np.where(wanted_mm > 0.0, wanted_mm, way)
     kept = like & (np.abs(way - wanted) <= FEED_KEPT * wanted)
     in_time = np.divide(60.0 * way, wanted_s, out=wanted_feed.copy(), where=(wanted_s > 0.0) & (way > 0.0))
-    return np.where((path.kind == Step.FEED) & ~kept, in_time, wanted_feed)
+    return np.where((path.kind == RowKind.FEED) & ~kept, in_time, wanted_feed)

@@ -40,7 +40,7 @@ class Behind:
     passed: Passed
 
 
-class Curve:
+class CommandCurve:
     """What to command along a toolpath.
 
     A place is a number: the row that it lies in and the share of it that is behind it, so that a row ends at the number

@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.nc.dialect import plain
 from dbbstation.nc.mark import is_marked
-from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, Step
+from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, RowKind
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,7 +33,7 @@ def checksum(toolpath: Toolpath) -> int:
 
     Comments, feeds, line numbers, units, and how numbers are written have no part in it.
     """
-    told = np.isin(toolpath.kind, [Step.RAPID, Step.FEED, Step.DWELL, Step.PAUSE])
+    told = np.isin(toolpath.kind, [RowKind.RAPID, RowKind.FEED, RowKind.DWELL, RowKind.PAUSE])
     decimals = np.repeat([10.0**DECIMALS_MM, 10.0**DECIMALS_DEG], 3)
     poses = np.where(toolpath.is_move[:, None], np.rint(toolpath.poses * decimals), 0.0)
     digest = hashlib.sha256()
@@ -87,4 +87,4 @@ def _header(toolpath: Toolpath) -> Iterator[str]:
     """Comments before the first move."""
     moves = np.flatnonzero(toolpath.is_move)
     first = int(moves[0]) if len(moves) else len(toolpath)
-    return (text for row, text in toolpath.text.items() if row < first and toolpath.kind[row] == Step.COMMENT)
+    return (text for row, text in toolpath.text.items() if row < first and toolpath.kind[row] == RowKind.COMMENT)

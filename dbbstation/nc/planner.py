@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.nc.splitting import moves_of
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,7 +31,7 @@ KEPT = 1.01
 PLANNED_WITHIN = 0.0015
 """Share of the time by which LinuxCNC may be slower than it is reckoned to be here: 0.0012 at most in the programs of docs/nc.md."""
 
-STOPS = (Step.RAPID, Step.DWELL, Step.PAUSE, Step.OPTIONAL_STOP)
+STOPS = (RowKind.RAPID, RowKind.DWELL, RowKind.PAUSE, RowKind.OPTIONAL_STOP)
 """What a stretch at feed ends at. Rapids are no part of it, and their corners with it are left out."""
 
 LEAST_MM_PER_DEG = 0.1
@@ -110,7 +110,7 @@ class Planner:
         an arc are one piece.
         """
         rows = np.flatnonzero(cuts(toolpath))
-        seconds = np.where(toolpath.kind == Step.RAPID, 0.0, toolpath.duration_s)
+        seconds = np.where(toolpath.kind == RowKind.RAPID, 0.0, toolpath.duration_s)
         if len(rows) == 0:
             return seconds
         limited, length_mm = self.limited(toolpath)[rows], toolpath.tip_mm[rows]
@@ -166,7 +166,7 @@ def cuts(toolpath: Toolpath) -> NDArray[np.bool_]:
 
     How fast those are is a matter of the angles' own acceleration, which is not known here.
     """
-    return (toolpath.kind == Step.FEED) & (toolpath.tip_mm > LEAST_MM_PER_DEG * toolpath.turn_deg)
+    return (toolpath.kind == RowKind.FEED) & (toolpath.tip_mm > LEAST_MM_PER_DEG * toolpath.turn_deg)
 
 
 def move_mm(toolpath: Toolpath) -> NDArray[np.float64]:

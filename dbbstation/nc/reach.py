@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.errors import MachineError, TravelError
 from dbbstation.machine.travel import check_travel
-from dbbstation.nc.toolpath import Step, in_pieces
+from dbbstation.nc.toolpath import RowKind, in_pieces
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -56,7 +56,7 @@ def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
     """
     turning = toolpath.only_turns
     limit = np.where(turning, machine.turn_limit_deg_min, machine.feed_limit_mm_min)
-    over = (toolpath.kind == Step.FEED) & (toolpath.feed > limit)
+    over = (toolpath.kind == RowKind.FEED) & (toolpath.feed > limit)
     if not over.any():
         return
     row = int(np.argmax(over))

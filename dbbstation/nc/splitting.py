@@ -12,7 +12,7 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.nc.curve import felt_mm, in_mm, row_and_share
 from dbbstation.nc.pieces import longest, truest
-from dbbstation.nc.toolpath import Step, in_pieces
+from dbbstation.nc.toolpath import RowKind, in_pieces
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.nc.curve import Curve
+    from dbbstation.nc.curve import CommandCurve
     from dbbstation.nc.toolpath import Toolpath
 
 FIRST_CELL_MM, FIRST_CELL_DEG = 50.0, 5.0
@@ -68,7 +68,7 @@ MOST_CELLS = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Places where pieces begin and end, as `Curve` counts them, shapes (k,)."""
+    """Places where pieces begin and end, as `CommandCurve` counts them, shapes (k,)."""
 
     begin: NDArray[np.float64]
     end: NDArray[np.float64]
@@ -91,7 +91,7 @@ class Pieces:
 def rows_as_pieces(toolpath: Toolpath) -> Pieces:
     """Return one piece for each row, rapids in steps for the sake of sources with a history."""
     history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
-    return _in(toolpath, np.where(toolpath.kind == Step.RAPID, history, 1.0))
+    return _in(toolpath, np.where(toolpath.kind == RowKind.RAPID, history, 1.0))
 
 
 def moves_of(toolpath: Toolpath) -> NDArray[np.int64]:
@@ -113,7 +113,7 @@ def parts_of(toolpath: Toolpath, runs: NDArray[np.int64]) -> list[slice]:
     leads_on = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
     # The first move shows where the machine comes from.
     may = np.flatnonzero(leads_on)[1:]
-    may = may[(toolpath.kind[may] == Step.FEED) & (toolpath.tip_mm[may] > 0.0)]
+    may = may[(toolpath.kind[may] == RowKind.FEED) & (toolpath.tip_mm[may] > 0.0)]
     new_run = may[runs[may] != runs[may - 1]]
     cuts = [0]
     while len(toolpath) - cuts[-1] > ROWS_AT_ONCE:
@@ -140,7 +140,7 @@ def runs_of(toolpath: Toolpath, needed_mm: NDArray[np.float64]) -> NDArray[np.in
     moves = moves_of(toolpath)
     if len(toolpath) < 2:  # noqa: PLR2004 - a pair
         return moves
-    cuts = (toolpath.kind == Step.FEED) & (toolpath.tip_mm > 0.0)
+    cuts = (toolpath.kind == RowKind.FEED) & (toolpath.tip_mm > 0.0)
     short = cuts & (np.bincount(moves, weights=toolpath.tip_mm)[moves] < ALMOST * needed_mm)
     way = toolpath.poses[:, :3] - toolpath.before[:, :3]
     along = np.einsum("ni,ni->n", way[1:], way[:-1]) >= COSINE * toolpath.tip_mm[1:] * toolpath.tip_mm[:-1]
@@ -152,7 +152,7 @@ def runs_of(toolpath: Toolpath, needed_mm: NDArray[np.float64]) -> NDArray[np.in
 
 
 def split(
-    curve: Curve,
+    curve: CommandCurve,
     model: MachineModel,
     tolerance_mm: float,
     needed_mm: NDArray[np.float64],
@@ -186,7 +186,7 @@ def split(
     toolpath, row = curve.toolpath, cells.row
     # What needs no choice: what is no move at feed, and moves that are one cell near the curve.
     number = runs[row]
-    chosen = (toolpath.kind[row] == Step.FEED) & curve.leads_on[row] & ~whole[row]
+    chosen = (toolpath.kind[row] == RowKind.FEED) & curve.leads_on[row] & ~whole[row]
     alone = np.bincount(number)[number] == 1
     chosen &= ~alone | (off_mm > OF_THE_TOLERANCE * tolerance_mm)
     begins, ends = [cells.begin[~chosen]], [cells.end[~chosen]]
@@ -214,7 +214,7 @@ class _Nodes:
 
     def __init__(
         self,
-        curve: Curve,
+        curve: CommandCurve,
         begin: float,
         places: NDArray[np.float64],
         at: NDArray[np.float64],
@@ -271,7 +271,7 @@ def with_begins(at_places: NDArray[np.float64], start: NDArray[np.float64]) -> N
     return np.concatenate([begins[:, None], at_places], axis=1)
 
 
-def looked_at(curve: Curve, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def looked_at(curve: CommandCurve, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
     """Poses of the curve at the begin and at shares of each piece, the last of them 1, shape (k, 1 + len(shares), 6)."""
     first = curve.toolpath.before[:1]
     places = np.concatenate([[0.0], pieces.places(shares).reshape(-1)])
@@ -281,7 +281,7 @@ def looked_at(curve: Curve, pieces: Pieces, shares: NDArray[np.float64]) -> NDAr
 
 
 def _cells(
-    curve: Curve,
+    curve: CommandCurve,
     model: MachineModel,
     tolerance_mm: float,
     shortest_mm: NDArray[np.float64] | None,
@@ -291,7 +291,7 @@ def _cells(
     history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
     cutting = np.maximum(toolpath.tip_mm / FIRST_CELL_MM, toolpath.turn_deg / FIRST_CELL_DEG)
     cutting = np.maximum(cutting, _way_mm(toolpath, model.machine) / (OF_A_PERIOD * model.shortest_period_mm))
-    cells = _in(toolpath, np.where(whole, 1.0, np.where(toolpath.kind == Step.RAPID, history, cutting)))
+    cells = _in(toolpath, np.where(whole, 1.0, np.where(toolpath.kind == RowKind.RAPID, history, cutting)))
     while True:
         at = looked_at(curve, cells, LOOKED_AT)
         row, share = cells.row, cells.end - cells.begin
@@ -299,7 +299,7 @@ def _cells(
         can = (way_mm > SHORTEST_MM) | (turn_deg > SHORTEST_DEG)
         if shortest_mm is not None:
             can &= (way_mm > shortest_mm[row]) | (toolpath.tip_mm[row] == 0.0)
-        at_feed = (toolpath.kind[row] == Step.FEED) & curve.leads_on[row] & ~whole[row]
+        at_feed = (toolpath.kind[row] == RowKind.FEED) & curve.leads_on[row] & ~whole[row]
         bent = at_feed & can & (cell_off_mm(at) > tolerance_mm / FINER)
         if not bent.any():
             return cells, at

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.nc.toolpath import ACTIVE_SYSTEM, BY_INCREMENTS, MACHINE_SYSTEM, SYSTEMS, Step
+from dbbstation.nc.toolpath import ACTIVE_SYSTEM, BY_INCREMENTS, MACHINE_SYSTEM, SYSTEMS, RowKind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,7 +49,7 @@ def _mixed_feeds(toolpath: Toolpath) -> NDArray[np.bool_]:
     """Moves at feed that begin or end with an axis in another system, shape (n,)."""
     before = np.vstack([toolpath.frame[:1], toolpath.frame])[:-1]
     begins = (before != toolpath.system[:, None]).any(axis=1)
-    return (toolpath.kind == Step.FEED) & (begins | elsewhere(toolpath).any(axis=1))
+    return (toolpath.kind == RowKind.FEED) & (begins | elsewhere(toolpath).any(axis=1))
 
 
 def _held(toolpath: Toolpath) -> Toolpath:

@@ -32,7 +32,7 @@ RAPID_DEG_MIN = 2000.0
 """The same for rapids that tilt the platform."""
 
 
-class Step(IntEnum):
+class RowKind(IntEnum):
     """What one row of a toolpath is."""
 
     RAPID = 0
@@ -80,7 +80,7 @@ class Toolpath:
 
     Attributes:
         name: what to call the program in messages; the file where it was read from one.
-        kind: `Step` of each row, shape (n,).
+        kind: `RowKind` of each row, shape (n,).
         poses: [X, Y, Z, A, B, C] after each row, shape (n, 6) [mm, deg]; NaN before the first move where nobody
             knows where the machine stands.
         feed_mm_min: feed of `FEED` rows along the path of the tool tip, shape (n,) [mm/min]; NaN in other rows.
@@ -181,7 +181,7 @@ class Toolpath:
     @property
     def is_move(self) -> NDArray[np.bool_]:
         """Rows that are moves, whether or not they lead elsewhere, shape (n,)."""
-        return (self.kind == Step.RAPID) | (self.kind == Step.FEED)
+        return (self.kind == RowKind.RAPID) | (self.kind == RowKind.FEED)
 
     @cached_property
     def before(self) -> NDArray[np.float64]:
@@ -218,9 +218,9 @@ class Toolpath:
         and Z it is a turning speed. [RS274/NGC 2.1.2.5; LinuxCNC does the same]
         """
         way = np.where(self.tip_mm > 0.0, self.tip_mm, self.turn_deg)
-        feeding = np.divide(60.0 * way, self.feed, out=np.zeros(len(self)), where=self.kind == Step.FEED)
+        feeding = np.divide(60.0 * way, self.feed, out=np.zeros(len(self)), where=self.kind == RowKind.FEED)
         rapid = 60.0 * np.maximum(self.tip_mm / RAPID_MM_MIN, self.turn_deg / RAPID_DEG_MIN)
-        return self.dwell_s + np.where(self.kind == Step.RAPID, rapid, feeding)
+        return self.dwell_s + np.where(self.kind == RowKind.RAPID, rapid, feeding)
 
     @cached_property
     def end_s(self) -> NDArray[np.float64]:
@@ -270,7 +270,7 @@ _STRAIGHT = (0.0, 0.0, 0.0)
 class _Rows(NamedTuple):
     """Rows of a toolpath that were added together; what is one value holds for all of them."""
 
-    kind: Step
+    kind: RowKind
     poses: NDArray[np.float64]
     feed: tuple[float, float]
     dwell_s: float
@@ -328,7 +328,7 @@ class ToolpathBuilder:
             system: in which this move's numbers count; None: as those before it.
         """
         self._named(named, system)
-        self._add(Step.RAPID, pose[None], line=line, system=system)
+        self._add(RowKind.RAPID, pose[None], line=line, system=system)
 
     def feed(
         self,
@@ -354,13 +354,13 @@ class ToolpathBuilder:
         """
         self._named(named, system)
         feed = (mm_min, mm_min if deg_min is None else deg_min)
-        self._add(Step.FEED, poses, feed, line=line, system=system, arc=arc)
+        self._add(RowKind.FEED, poses, feed, line=line, system=system, arc=arc)
 
     def dwell(self, seconds: float, *, line: int = 0) -> None:
         """Add a stop of known duration."""
-        self._add(Step.DWELL, self._pose[None], dwell_s=seconds, line=line)
+        self._add(RowKind.DWELL, self._pose[None], dwell_s=seconds, line=line)
 
-    def say(self, kind: Step, text: str, *, line: int = 0) -> None:
+    def say(self, kind: RowKind, text: str, *, line: int = 0) -> None:
         """Add a row that is no move and no dwell, with its words."""
         if text:
             self._text[self._count] = text
@@ -373,7 +373,7 @@ class ToolpathBuilder:
         return self._text.pop(self._count, "")
 
     @property
-    def last_kind(self) -> Step | None:
+    def last_kind(self) -> RowKind | None:
         """Kind of the last row; None where there is none."""
         return self._rows[-1].kind if self._rows else None
 
@@ -426,7 +426,7 @@ class ToolpathBuilder:
 
     def _add(
         self,
-        kind: Step,
+        kind: RowKind,
         poses: NDArray[np.float64],
         feed: tuple[float, float] = _NO_FEED,
         *,

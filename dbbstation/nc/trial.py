@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, Step, ToolpathBuilder
+from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, RowKind, ToolpathBuilder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -84,7 +84,7 @@ def _dwell(path: ToolpathBuilder) -> None:
     path.dwell(12.25)
 
 
-def _said(kind: Step, *texts: str) -> Callable[[ToolpathBuilder], None]:
+def _said(kind: RowKind, *texts: str) -> Callable[[ToolpathBuilder], None]:
     def add(path: ToolpathBuilder) -> None:
         for number, text in enumerate(texts):
             path.say(kind, text)
@@ -94,7 +94,7 @@ def _said(kind: Step, *texts: str) -> Callable[[ToolpathBuilder], None]:
 
 
 def _systems(path: ToolpathBuilder) -> None:
-    path.say(Step.SYSTEM, "G55")
+    path.say(RowKind.SYSTEM, "G55")
     path.system = SYSTEMS.index("G55") + 1
     path.rapid(FIRST)
 
@@ -124,13 +124,13 @@ def _ends(ending: Ending) -> Callable[[ToolpathBuilder], None]:
 THINGS: dict[str, Callable[[ToolpathBuilder], None]] = {
     "feeds": _feeds,
     "dwells": _dwell,
-    "stops": _said(Step.PAUSE, "", "turn the part"),
-    "an optional stop": _said(Step.OPTIONAL_STOP, ""),
-    "the spindle": _said(Step.FUNCTION, "S1200 M3", "M5", "S800.5 M4"),
-    "a slow spindle": _said(Step.FUNCTION, "S0.00001 M3"),
-    "coolant": _said(Step.FUNCTION, "M8", "M7", "M9"),
-    "a tool": _said(Step.FUNCTION, "T2 M6"),
-    "a message": _said(Step.MESSAGE, "MSG, hello"),
+    "stops": _said(RowKind.PAUSE, "", "turn the part"),
+    "an optional stop": _said(RowKind.OPTIONAL_STOP, ""),
+    "the spindle": _said(RowKind.FUNCTION, "S1200 M3", "M5", "S800.5 M4"),
+    "a slow spindle": _said(RowKind.FUNCTION, "S0.00001 M3"),
+    "coolant": _said(RowKind.FUNCTION, "M8", "M7", "M9"),
+    "a tool": _said(RowKind.FUNCTION, "T2 M6"),
+    "a message": _said(RowKind.MESSAGE, "MSG, hello"),
     "a work system": _systems,
     "machine coordinates": _machine,
     "path control": _corners,
@@ -192,20 +192,20 @@ def _rows(path: Toolpath) -> Iterator[_Row]:
     feeds, corner = path.feed, np.nan
     for row, kind in enumerate(path.kind.tolist()):
         text = path.text.get(row, "")
-        if kind in {Step.RAPID, Step.FEED}:
+        if kind in {RowKind.RAPID, RowKind.FEED}:
             if not np.array_equal(path.corners_mm[row], corner, equal_nan=True):
                 corner = float(path.corners_mm[row])
                 yield _Row("corners within", (corner,), (SHARE_WITHIN * abs(np.nan_to_num(corner)),))
             system = " in machine coordinates" if path.system[row] == MACHINE_SYSTEM else ""
             pose = tuple(path.poses[row].tolist())
-            yield _Row(f"{'rapid' if kind == Step.RAPID else 'feed'}{system} to", pose, (POSE_WITHIN,) * 6)
-            if kind == Step.FEED:
+            yield _Row(f"{'rapid' if kind == RowKind.RAPID else 'feed'}{system} to", pose, (POSE_WITHIN,) * 6)
+            if kind == RowKind.FEED:
                 unit = "deg/min" if path.only_turns[row] else "mm/min"
                 yield _Row(f"feed in {unit}", (feeds[row],), (SHARE_WITHIN * feeds[row],))
-        elif kind == Step.DWELL:
+        elif kind == RowKind.DWELL:
             yield _Row("dwell in s", (path.dwell_s[row],), (SHARE_WITHIN * path.dwell_s[row],))
-        elif kind == Step.FUNCTION:
+        elif kind == RowKind.FUNCTION:
             yield from (_Row(word) for word in text.split())
-        elif kind != Step.COMMENT:
-            yield _Row(f"{Step(kind).name.lower().replace('_', ' ')} {text}".strip())
+        elif kind != RowKind.COMMENT:
+            yield _Row(f"{RowKind(kind).name.lower().replace('_', ' ')} {text}".strip())
     yield _Row(f"end by {path.ending.value}")

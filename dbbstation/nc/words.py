@@ -14,7 +14,7 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.nc.dialect import Dialect
-from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, MACHINE_SYSTEM, Ending, Step, rounded
+from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, MACHINE_SYSTEM, Ending, RowKind, rounded
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -180,7 +180,7 @@ class WordDialect(Dialect):
             for place, kind in enumerate(kinds):
                 try:
                     if kind not in _MOVES:
-                        yield self._row(Step(kind), toolpath, begin + place)
+                        yield self._row(RowKind(kind), toolpath, begin + place)
                         continue
                     if corners[place] != state.corner_mm and not math.isnan(corners[place]):
                         state.corner_mm = corners[place]
@@ -193,24 +193,24 @@ class WordDialect(Dialect):
                     raise CannotSayError(error.dialect, error.asked, where=where) from None
 
     def _move(self, kind: int, words: str, feed: float, state: _Modal) -> str:
-        if kind == Step.RAPID:
+        if kind == RowKind.RAPID:
             return self.rapid(words)
         changed = None if feed == state.feed else feed
         state.feed = feed
         return self.feed(words, changed)
 
-    def _row(self, kind: Step, toolpath: Toolpath, row: int) -> str:
+    def _row(self, kind: RowKind, toolpath: Toolpath, row: int) -> str:
         text = toolpath.text.get(row, "")
-        if kind == Step.DWELL:
+        if kind == RowKind.DWELL:
             return self.dwell(float(toolpath.dwell_s[row]))
-        if kind == Step.OPTIONAL_STOP:
+        if kind == RowKind.OPTIONAL_STOP:
             return self.optional_stop()
         said = {
-            Step.PAUSE: self.pause,
-            Step.COMMENT: self.comment,
-            Step.FUNCTION: self.function,
-            Step.MESSAGE: self.message,
-            Step.SYSTEM: self.system,
+            RowKind.PAUSE: self.pause,
+            RowKind.COMMENT: self.comment,
+            RowKind.FUNCTION: self.function,
+            RowKind.MESSAGE: self.message,
+            RowKind.SYSTEM: self.system,
         }
         return said[kind](text)
 
@@ -240,7 +240,7 @@ class _Modal:
         self.feed, self.corner_mm = feed, corner_mm
 
 
-_MOVES = frozenset((int(Step.RAPID), int(Step.FEED)))
+_MOVES = frozenset((int(RowKind.RAPID), int(RowKind.FEED)))
 
 
 def changed_axes(toolpath: Toolpath) -> NDArray[np.bool_]:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from dbbstation.quality.finding import Finding, Name, Verdict
+from dbbstation.quality.finding import Finding, FindingVerdict, Name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-class Word(StrEnum):
+class Advice(StrEnum):
     """The word; the text is what people read."""
 
     GOOD = "GOOD"
@@ -21,7 +21,7 @@ class Word(StrEnum):
 
 
 @dataclass(frozen=True)
-class Answer:
+class RunAssessment:
     """What to do with a run.
 
     Attributes:
@@ -30,12 +30,12 @@ class Answer:
         unseen: of CANNOT TELL, what could be wrong and shows in nothing that was measured so far.
     """
 
-    word: Word
+    word: Advice
     causes: tuple[str, ...] = ()
     unseen: tuple[str, ...] = ()
 
 
-def answer(findings: Sequence[Finding], problem: str = "") -> Answer:
+def answer(findings: Sequence[Finding], problem: str = "") -> RunAssessment:
     """Return the word on a run.
 
     REPEAT where anything is wrong. CANNOT TELL where nothing is, and there is a fault that no decided finding would have shown.
@@ -47,12 +47,12 @@ def answer(findings: Sequence[Finding], problem: str = "") -> Answer:
     """
     wrong = [one for one in findings if one.wrong]
     if problem and not any(one.name is Name.CIRCLE for one in wrong):
-        wrong.append(Finding(Name.CIRCLE, None, None, "", Verdict.WRONG, problem))
+        wrong.append(Finding(Name.CIRCLE, None, None, "", FindingVerdict.WRONG, problem))
     if wrong:
-        return Answer(Word.REPEAT, tuple(cause_of(one) for one in sorted(wrong, key=rank)))
-    decided = {one.name for one in findings if one.verdict is not Verdict.CANNOT_TELL}
+        return RunAssessment(Advice.REPEAT, tuple(cause_of(one) for one in sorted(wrong, key=rank)))
+    decided = {one.name for one in findings if one.verdict is not FindingVerdict.CANNOT_TELL}
     unseen = tuple(fault for fault, names in SHOWN_BY.items() if not decided & names)
-    return Answer(Word.CANNOT_TELL, unseen=unseen) if unseen else Answer(Word.GOOD)
+    return RunAssessment(Advice.CANNOT_TELL, unseen=unseen) if unseen else RunAssessment(Advice.GOOD)
 
 
 def cause_of(finding: Finding) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.quality.finding import Finding, Name, Verdict, found, undecided
+from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.knowledge import ACROSS, COEFFICIENTS, Others, Seen, across
 from dbbstation.quality.limits import FEWEST_OTHERS, length_limit, length_quantile, median_length, quantile
 from dbbstation.quality.stated import covariance_apart, drifted_um, limit_along, limit_of_length, unseen_um2
@@ -48,11 +48,11 @@ def direction(one: Seen, others: Others) -> Finding:
     limit, of_mirror = limits
     if apart > limit and mirror <= of_mirror:
         why = f"{stated}: one of both was run the wrong way round; run both again"
-        return Finding(Name.DIRECTION, apart, limit, "µm", Verdict.WRONG, why)
+        return Finding(Name.DIRECTION, apart, limit, "µm", FindingVerdict.WRONG, why)
     if apart <= limit and mirror > of_mirror:
-        return Finding(Name.DIRECTION, apart, limit, "µm", Verdict.GOOD, stated)
+        return Finding(Name.DIRECTION, apart, limit, "µm", FindingVerdict.GOOD, stated)
     why = "too alike to tell" if apart <= limit else "neither of them; something else differs"
-    return Finding(Name.DIRECTION, apart, limit, "µm", Verdict.CANNOT_TELL, f"{stated}: {why}")
+    return Finding(Name.DIRECTION, apart, limit, "µm", FindingVerdict.CANNOT_TELL, f"{stated}: {why}")
 
 
 def _across_limits(
@@ -88,10 +88,10 @@ def _by_place(one: Seen) -> Finding | None:
     stated = f"off the axis through the start the centre is at {is_um:+.1f} µm, expected at {should:+.1f} µm"
     if abs(is_um - should) > limit >= abs(is_um + should):
         why = f"{stated}: the circle was run the wrong way round; run it again"
-        return Finding(Name.DIRECTION, abs(is_um - should), limit, "µm", Verdict.WRONG, why)
+        return Finding(Name.DIRECTION, abs(is_um - should), limit, "µm", FindingVerdict.WRONG, why)
     if abs(is_um - should) > limit:
         return None  # neither way round: another finding's business
-    return Finding(Name.DIRECTION, abs(is_um - should), limit, "µm", Verdict.GOOD, stated)
+    return Finding(Name.DIRECTION, abs(is_um - should), limit, "µm", FindingVerdict.GOOD, stated)
 
 
 def other_direction(one: Seen, others: Others) -> Finding:

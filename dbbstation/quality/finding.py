@@ -27,7 +27,7 @@ class Name(StrEnum):
     REPEAT = "repeat"
 
 
-class Verdict(StrEnum):
+class FindingVerdict(StrEnum):
     """What a finding says."""
 
     GOOD = "good"
@@ -53,14 +53,14 @@ class Finding:
     value: float | None
     limit: float | None
     unit: str
-    verdict: Verdict
+    verdict: FindingVerdict
     text: str
     short: str = ""
 
     @property
     def wrong(self) -> bool:
         """Whether the run should not be used as it is."""
-        return self.verdict is Verdict.WRONG
+        return self.verdict is FindingVerdict.WRONG
 
 
 def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: str, short: str = "") -> Finding:
@@ -75,13 +75,13 @@ def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: 
         wrong: text where it is not.
         short: what was found, in the fewest words.
     """
-    verdict = Verdict.WRONG if value > limit else Verdict.GOOD
-    return Finding(name, value, limit, unit, verdict, wrong if verdict is Verdict.WRONG else sound, short)
+    verdict = FindingVerdict.WRONG if value > limit else FindingVerdict.GOOD
+    return Finding(name, value, limit, unit, verdict, wrong if verdict is FindingVerdict.WRONG else sound, short)
 
 
 def undecided(name: Name, why: str, unit: str = "", value: float | None = None) -> Finding:
     """Return a finding that cannot be decided, and why."""
-    return Finding(name, value, None, unit, Verdict.CANNOT_TELL, why)
+    return Finding(name, value, None, unit, FindingVerdict.CANNOT_TELL, why)
 
 
 def against_limit(finding: Finding) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.circles.noise import LEAST_UM
 from dbbstation.quality.bump import bump
-from dbbstation.quality.finding import Finding, Name, Verdict, found, undecided
+from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.held import held
 from dbbstation.quality.limits import FEWEST_OTHERS, joined, quantile, scale_of
 from dbbstation.quality.spike import spike
@@ -172,7 +172,7 @@ def feed(circle: Circle, shown_mm_min: tuple[float, float] | None) -> Finding:
 
 def no_circle(one: Seen) -> tuple[Finding, ...]:
     """Findings of a recording that shows no circle."""
-    whole = Finding(Name.CIRCLE, None, None, "", Verdict.WRONG, one.problem)
+    whole = Finding(Name.CIRCLE, None, None, "", FindingVerdict.WRONG, one.problem)
     shown = feed(one.run.circle, one.feed_mm_min)
     return (whole, lost_samples(one), *((shown,) if shown.wrong else ()))
 

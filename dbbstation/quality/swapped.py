@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import logsumexp
 
-from dbbstation.quality.finding import Finding, Name, Verdict, found, undecided
+from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN, length_quantile
 from dbbstation.quality.stated import drifted_um, unseen_um2
@@ -59,7 +59,7 @@ def of_its_test(one: Seen, others: Others) -> Finding:
     own = f"{one.run.test} {one.run.circle.direction}"
     better = f"the readings are {times} times as likely those of {nearest.label} as those of {own}"
     if 0.0 < value <= limit:
-        return Finding(Name.TEST, value, limit, "", Verdict.CANNOT_TELL, f"{better}: too alike to tell")
+        return Finding(Name.TEST, value, limit, "", FindingVerdict.CANNOT_TELL, f"{better}: too alike to tell")
     sound = f"none of {len(every)} other circles of the plan explains the readings better"
     return found(
         Name.TEST,

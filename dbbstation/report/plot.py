@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.circles.budget import budget_of
-from dbbstation.circles.quantity import Quantity
+from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.errors import StationError
 from dbbstation.report.conditions import conditions
 from dbbstation.report.drawing import AFTER, BEFORE, in_style
@@ -310,7 +310,7 @@ def _numbers_of(one: MeasuredCircle) -> dict[str, Any]:
     if one.analysis is None:
         return {}
     x, y = one.analysis.centre_mm
-    g = budget_of(one.analysis, Quantity.G, one.known)
+    g = budget_of(one.analysis, BudgetQuantity.G, one.known)
     return {
         "session": one.session,
         "test": one.entry.test,

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.patches import Circle as Ring
 
 from dbbstation.circles.budget import budget_of
-from dbbstation.circles.quantity import Quantity
+from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.spectrum import FIRST, spectrum_of
 from dbbstation.plan.circle import FULL_TURN_DEG, Direction
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, SET
@@ -176,7 +176,7 @@ def _figures(drawn: Sequence[Drawn]) -> str:
     """G of the last run of each direction, in words."""
     last = [one for one, thin in drawn if not thin and one.analysis is not None]
     return ", ".join(
-        f"{budget_of(one.analysis, Quantity.G, one.known).value_um:.1f} {str(one.entry.direction).upper()}"
+        f"{budget_of(one.analysis, BudgetQuantity.G, one.known).value_um:.1f} {str(one.entry.direction).upper()}"
         for one in last
         if one.analysis
     )

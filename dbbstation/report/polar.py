@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.circles.budget import budget_of
-from dbbstation.circles.quantity import Quantity
+from dbbstation.circles.quantity import BudgetQuantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -117,7 +117,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
             former=former,
             thin=thin,
             name=f"{'before ' if former else ''}{str(one.entry.direction).upper()} {one.entry.repeat}",
-            title=f"{'before: ' if former else ''}{one.entry.label}: G {budget_of(analysis, Quantity.G_LS, one.known).value_um:.1f} µm",
+            title=f"{'before: ' if former else ''}{one.entry.label}: G {budget_of(analysis, BudgetQuantity.G_LS, one.known).value_um:.1f} µm",
         )
         for one, analysis, former, thin in analysed
     )

@@ -13,13 +13,13 @@ from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from dbbstation.diagnosis.simulator.answer import Answer
+    from dbbstation.diagnosis.simulator.answer import SimulatorComparison
 
 MOST_POINTS = 2000
 """Points of a cloud that are drawn: more make a large file and the same picture."""
 
 
-def simulator_figure(answer: Answer, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+def simulator_figure(answer: SimulatorComparison, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
     """Draw measured less simulated values, refitted and corrected, and the held-out error of every part."""
     with in_style():
         figure = Figure(figsize=(7.2, 6.4), layout="constrained")
@@ -30,7 +30,7 @@ def simulator_figure(answer: Answer, wanted: FigureFormat | Stamped = FigureForm
         return in_format(figure, wanted)
 
 
-def _over_time(axes: Axes, answer: Answer) -> None:
+def _over_time(axes: Axes, answer: SimulatorComparison) -> None:
     rows, step = np.arange(answer.work.size), max(answer.work.size // MOST_POINTS, 1)
     for left, colour, label in (
         (answer.base.fitted.residual, BEFORE, "refitted"),
@@ -42,7 +42,7 @@ def _over_time(axes: Axes, answer: Answer) -> None:
     axes.legend()
 
 
-def _over_signal(axes: Axes, answer: Answer) -> None:
+def _over_signal(axes: Axes, answer: SimulatorComparison) -> None:
     """Over the signal that leads the first term; over the simulated value where the port is not called at the rows."""
     name, values = "simulated value", answer.work.measured - answer.as_simulated * answer.work.scale
     if answer.terms and answer.terms[0].signals:
@@ -62,7 +62,7 @@ def _over_signal(axes: Axes, answer: Answer) -> None:
     axes.legend()
 
 
-def _held_out(axes: Axes, answer: Answer) -> None:
+def _held_out(axes: Axes, answer: SimulatorComparison) -> None:
     if answer.held_out is None:
         axes.set_axis_off()
         axes.text(0.5, 0.5, "held-out parts were not asked for", ha="center", va="center")
@@ -79,6 +79,6 @@ def _held_out(axes: Axes, answer: Answer) -> None:
     axes.legend()
 
 
-def _label(answer: Answer) -> str:
+def _label(answer: SimulatorComparison) -> str:
     unit = answer.model.outputs[0].unit
     return f"measured less simulated{f', {unit}' if unit else ''}"

@@ -11,6 +11,7 @@ from pydantic import Field
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.calibration import OutlierResult
 from dbbstation.results.frame import Framed
+from dbbstation.results.inference import HeldOutGains
 from dbbstation.results.serialise import Absent, AsItIs, Kept, Quantified
 
 
@@ -87,23 +88,6 @@ class MisfitLocation:
     share: float
     peak_um: float
     text: str
-
-
-@dataclass(frozen=True)
-class HeldOutGains:
-    """What a cause gains in tests that did not choose it.
-
-    Attributes:
-        parts: gain of each part.
-        with_gain: parts that gain.
-        total: of all.
-        predicts: whether that counts as a prediction.
-    """
-
-    parts: tuple[float, ...]
-    with_gain: int
-    total: float
-    predicts: bool
 
 
 @dataclass(frozen=True, kw_only=True)

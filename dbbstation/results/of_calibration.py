@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from dbbstation.calibration.checks.scatter import ScatterCheck
     from dbbstation.calibration.checks.visibility import Visibility
     from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.calibration.layout import Term
+    from dbbstation.calibration.layout import ParameterSet
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.calibration.reporting.evaluation import Evaluation
     from dbbstation.inference.harmonics import Misfit
@@ -156,7 +156,7 @@ def _uncertainties(calibration: Calibration) -> NDArray[np.float64]:
     return known_u(variance, np.sum(calibration.null_space**2, axis=0))
 
 
-def _values(calibration: Calibration, term: Term, u: NDArray[np.float64]) -> SourceValues:
+def _values(calibration: Calibration, term: ParameterSet, u: NDArray[np.float64]) -> SourceValues:
     numbers = zip(term.parameters, calibration.x[term.columns], u[term.columns], strict=True)
     return SourceValues(
         name=term.source.name,

@@ -15,7 +15,6 @@ from dbbstation.results.diagnosis import (
     CurveFollows,
     DiagnosisFigures,
     DiagnosisResult,
-    HeldOutGains,
     MisfitLocation,
     ParameterShift,
     ProposedTest,
@@ -24,6 +23,7 @@ from dbbstation.results.diagnosis import (
     UnexplainedResult,
     WorkspaceGain,
 )
+from dbbstation.results.inference import gains_result
 from dbbstation.results.of_calibration import outlier_result
 from dbbstation.results.serialise import Quantified
 from dbbstation.trace.analysis import figures
@@ -201,9 +201,7 @@ def _cause(source: SourceFinding) -> CauseResult:
         acts=source.acts.name.lower(),
         persists=source.persists,
         sigmas=source.sigmas,
-        gains=None
-        if source.gains is None
-        else HeldOutGains(tuple(source.gains.parts), source.gains.with_gain, source.gains.total, source.gains.predicts),
+        gains=gains_result(source.gains),
         parameters={name: Quantified(v.value, v.uncertainty, v.unit) for name, v in source.parameters.items()},
         text=source.text,
     )

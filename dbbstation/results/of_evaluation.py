@@ -10,12 +10,12 @@ from dbbstation.results.evaluation import CircleDeviations, EvaluatedRun, Evalua
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from dbbstation.calibration.reporting.evaluation import RunFigures
+    from dbbstation.calibration.reporting.evaluation import RunEvaluation
     from dbbstation.plan.tolerance import Tolerance
     from dbbstation.trace.analysis import CircleFigures
 
 
-def evaluated_runs(runs: Iterable[RunFigures]) -> tuple[EvaluatedRun, ...]:
+def evaluated_runs(runs: Iterable[RunEvaluation]) -> tuple[EvaluatedRun, ...]:
     """Return figures of runs, before under the nominal machine and after under the model [CAL Table III]."""
     return tuple(
         EvaluatedRun(

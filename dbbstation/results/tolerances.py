@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.circles.analysis import refiltered
 from dbbstation.circles.budget import budgets
 from dbbstation.circles.path import Filter
-from dbbstation.circles.quantity import Quantity
+from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.rice import without_noise
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.quality.conformity import Conformity, Size, conformity
@@ -90,11 +90,11 @@ TOLERATED = Filter.UPR_30
 
 def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, Size]:
     """Sizes with their uncertainties."""
-    found = budgets(one, known, (Quantity.G_LS, Quantity.MEAN_RADIAL, Quantity.X, Quantity.Y))
-    g, radial = found[Quantity.G_LS], found[Quantity.MEAN_RADIAL]
+    found = budgets(one, known, (BudgetQuantity.G_LS, BudgetQuantity.MEAN_RADIAL, BudgetQuantity.X, BudgetQuantity.Y))
+    g, radial = found[BudgetQuantity.G_LS], found[BudgetQuantity.MEAN_RADIAL]
     return {
         CircleFigure.CIRCULAR_DEVIATION: Size(g.value_um, g.u_um, g.why_not, g.known_um),
-        CircleFigure.CENTRE_DEVIATION: _off_centre(found[Quantity.X], found[Quantity.Y]),
+        CircleFigure.CENTRE_DEVIATION: _off_centre(found[BudgetQuantity.X], found[BudgetQuantity.Y]),
         CircleFigure.MEAN_RADIAL_ERROR: Size(abs(radial.value_um), radial.u_um, radial.why_not, radial.known_um),
     }
 

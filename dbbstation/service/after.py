@@ -1,35 +1,27 @@
-"""What is done with a session once it is measured: calibrate, diagnose, write programs and report. Each is a command of the program."""
+"""What is done with a session once it is measured: calibrate, diagnose, write programs and report. Each is a task of the program."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import InputError
+from dbbstation.files.places import unused_path
+from dbbstation.files.recordings.session import read_session
 from dbbstation.service.former_sessions import keep_models
-from dbbstation.service.work import Progress, Work
+from dbbstation.service.job import SessionJob, SessionTask
+from dbbstation.service.work import BackgroundWork, WorkProgress
 from dbbstation.service.worked_out import DoneStep, counted, keep_steps, steps_before
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
     from pathlib import Path
 
     from dbbstation.service.former_sessions import Former
 
 
-class Step(StrEnum):
-    """What can be done, in the order in which it is usual."""
-
-    CALIBRATE = "calibrate"
-    DIAGNOSE = "diagnose"
-    PROGRAMS = "programs"
-    REPORT = "report"
-    ACCEPTANCE = "acceptance"
-
-
-USUAL = (Step.CALIBRATE, Step.DIAGNOSE, Step.PROGRAMS, Step.REPORT)
+USUAL = (SessionTask.CALIBRATE, SessionTask.DIAGNOSE, SessionTask.PROGRAMS, SessionTask.REPORT)
 """Steps on the session alone: an acceptance also needs one that was measured before."""
 
 KINEMATIC, JOINT, PROGRAMS, REPORT = "model.yaml", "joint-model.yaml", "programs", "report.html"
@@ -45,12 +37,12 @@ class Result:
         progress: None: not begun.
         stage: what it does now.
         passed_s: time since it began, until it ended [s].
-        answer: what its command printed; empty until it is done.
+        answer: its result as JSON has it; empty until it is done.
         failure: what it said where it failed.
         path: what it wrote; None until it is done.
     """
 
-    progress: Progress | None = None
+    progress: WorkProgress | None = None
     stage: str = ""
     passed_s: float = 0.0
     answer: dict[str, Any] = field(default_factory=dict)
@@ -65,7 +57,7 @@ class After:
         session: its folder.
         model: of an earlier calibration, that the circles are held against until this one has a model; None: none.
         settings: file of the shop's settings where one was named; None: those that are found.
-        start: starts a command; a process of its own.
+        start: begins a job, in a process of its own.
 
     Attributes:
         session: its folder.
@@ -79,34 +71,31 @@ class After:
         session: Path,
         model: Path | None = None,
         settings: Path | None = None,
-        start: Callable[[Sequence[str], Path], Work] = Work,
+        start: Callable[[SessionJob, Path], BackgroundWork] = BackgroundWork,
     ) -> None:
         self.session = session.absolute()
-        self.results = {step: Result() for step in Step}
+        self.results = {step: Result() for step in SessionTask}
         self._model = model
         self._settings = settings
         self._start = start
         self._folder: Path | None = None
-        self._running: tuple[Step, Work] | None = None
-        self._waiting: list[Step] = []
+        self._running: tuple[SessionTask, BackgroundWork] | None = None
+        self._waiting: list[SessionTask] = []
         self.former: Former | None = None
         self.kept: tuple[Path, ...] = ()
         self._counted = ""
         before = steps_before(self.session)
         if before is not None:
-            self._folder, done = before
-            self._counted = counted(self.session)
-            for name, one in done.items():
+            self._folder, self._counted = before.folder, before.counted
+            for name, one in before.steps.items():
                 path = self._folder / one.path
-                self.results[Step(name)] = Result(Progress.DONE, "", one.passed_s, one.answer, "", path)
+                self.results[SessionTask(name)] = Result(WorkProgress.DONE, "", one.passed_s, one.answer, "", path)
 
     @property
     def folder(self) -> Path:
         """Folder of the results: made with the first step, never one that was there before."""
         if self._folder is None:
-            parent, name = self.session.parent, f"{self.session.name}-results"
-            numbered = (parent / (name if k == 1 else f"{name}-{k}") for k in range(1, 1000))
-            self._folder = next(path for path in numbered if not path.exists())
+            self._folder = unused_path(self.session.parent, f"{self.session.name}-results")
         return self._folder
 
     @property
@@ -118,21 +107,21 @@ class After:
             return False
 
     @property
-    def busy(self) -> Step | None:
+    def busy(self) -> SessionTask | None:
         """The step that is being done."""
         return None if self._running is None else self._running[0]
 
     @property
     def model(self) -> Path | None:
         """The best model there is: of the diagnosis, of the calibration, an earlier one."""
-        for step in (Step.DIAGNOSE, Step.CALIBRATE):
-            if self.results[step].progress is Progress.DONE:
+        for step in (SessionTask.DIAGNOSE, SessionTask.CALIBRATE):
+            if self.results[step].progress is WorkProgress.DONE:
                 return self.results[step].path
         return self._model
 
-    def can(self, step: Step) -> bool:
+    def can(self, step: SessionTask) -> bool:
         """Whether a step can be begun now."""
-        lacking = {Step.PROGRAMS: self.model is None, Step.ACCEPTANCE: self.former is None}
+        lacking = {SessionTask.PROGRAMS: self.model is None, SessionTask.ACCEPTANCE: self.former is None}
         return self.busy is None and not lacking.get(step, False)
 
     def accept(self, former: Former) -> None:
@@ -146,9 +135,9 @@ class After:
             return
         self.folder.mkdir(parents=True, exist_ok=True)
         self.former, self.kept = former, keep_models(former, self.folder)
-        self.do(Step.ACCEPTANCE)
+        self.do(SessionTask.ACCEPTANCE)
 
-    def do(self, *steps: Step) -> None:
+    def do(self, *steps: SessionTask) -> None:
         """Do these steps, one behind the other; a step that fails or is cancelled ends the row."""
         if self.busy is None:
             self._waiting = list(steps)
@@ -167,18 +156,19 @@ class After:
         step, work = self._running
         result, progress = self.results[step], work.progress
         result.progress, result.stage, result.passed_s = progress, work.stage, work.passed_s
-        if progress is Progress.RUNNING:
+        if progress is WorkProgress.RUNNING:
             return
-        if progress is Progress.DONE:
+        if progress is WorkProgress.DONE:
             result.answer, result.path = work.answer(), self.folder / self._out(step)
-            keep_steps(self.folder, self.session, self._done())
             with suppress(InputError):
-                self._counted = self._counted or counted(self.session)
-        elif progress is Progress.FAILED:
+                now = counted(self.session)
+                keep_steps(self.folder, now, self._done())
+                self._counted = self._counted or now
+        elif progress is WorkProgress.FAILED:
             result.failure = work.failure()
         work.close()
         self._running = None
-        if progress is Progress.DONE:
+        if progress is WorkProgress.DONE:
             self._next()
         else:
             self._waiting = []
@@ -195,46 +185,48 @@ class After:
             return
         step = self._waiting.pop(0)
         self.folder.mkdir(parents=True, exist_ok=True)
-        self.results[step] = Result(Progress.RUNNING)
-        self._running = step, self._start(self._arguments(step), self.folder)
+        self.results[step] = Result(WorkProgress.RUNNING)
+        self._running = step, self._start(self._job(step), self.folder)
 
-    def _arguments(self, step: Step) -> list[str]:
-        settings = [] if self._settings is None else ["--settings", str(self._settings.absolute())]
-        session, out = str(self.session), ["--out", self._out(step), "--force"]
-        model = [] if self.model is None else ["--model", str(self.model)]
+    def _job(self, step: SessionTask) -> SessionJob:
+        job = SessionJob(
+            task=step,
+            beside=self.session.parent,
+            out=self._out(step),
+            session=self.session,
+            settings=None if self._settings is None else self._settings.absolute(),
+        )
         match step:
-            case Step.CALIBRATE | Step.DIAGNOSE:
-                return [*settings, step.value, session, *out]
-            case Step.PROGRAMS:
+            case SessionTask.CALIBRATE | SessionTask.DIAGNOSE:
+                return job
+            case SessionTask.PROGRAMS:
                 plan, machine = self._files()
-                return [*settings, "program", "--plan", plan, "--machine", machine, *model, *out]
-            case Step.REPORT:
-                return [*settings, "report", session, *model, *out]
-            case Step.ACCEPTANCE:
+                return job.model_copy(update={"plan": plan, "machine": machine, "model": self.model})
+            case SessionTask.REPORT:
+                return job.model_copy(update={"model": self.model})
+            case SessionTask.ACCEPTANCE:
                 if self.former is None:
                     raise ValueError("no session was chosen to hold this one against")
-                return [*settings, "report", session, "--before", str(self.former.folder), *out]
+                return job.model_copy(update={"before": self.former.folder})
 
-    def _files(self) -> tuple[str, str]:
-        from dbbstation.files.recordings.session import read_session  # noqa: PLC0415 - read when it is needed, anew
-
+    def _files(self) -> tuple[Path, Path]:
         session = read_session(self.session)
-        return str(session.plan_path), str(session.machine_path)
+        return session.plan_path.absolute(), session.machine_path.absolute()
 
     def _done(self) -> dict[str, DoneStep]:
         """What was done; a comparison is not kept: the session that it is with is chosen anew."""
         return {
             step.value: DoneStep(path=one.path.name, passed_s=one.passed_s, answer=one.answer)
             for step, one in self.results.items()
-            if one.progress is Progress.DONE and one.path is not None and step is not Step.ACCEPTANCE
+            if one.progress is WorkProgress.DONE and one.path is not None and step is not SessionTask.ACCEPTANCE
         }
 
     @staticmethod
-    def _out(step: Step) -> str:
+    def _out(step: SessionTask) -> str:
         return {
-            Step.CALIBRATE: KINEMATIC,
-            Step.DIAGNOSE: JOINT,
-            Step.PROGRAMS: PROGRAMS,
-            Step.REPORT: REPORT,
-            Step.ACCEPTANCE: ACCEPTANCE,
+            SessionTask.CALIBRATE: KINEMATIC,
+            SessionTask.DIAGNOSE: JOINT,
+            SessionTask.PROGRAMS: PROGRAMS,
+            SessionTask.REPORT: REPORT,
+            SessionTask.ACCEPTANCE: ACCEPTANCE,
         }[step]

@@ -40,7 +40,7 @@ class Mark(StrEnum):
     PASSED = "left out"
 
 
-class Verdict(StrEnum):
+class RunDecision(StrEnum):
     """What was decided about a recorded run; the text is what people read."""
 
     NONE = ""
@@ -129,7 +129,7 @@ class Board:
     running: Direction | None = None
     results: deque[events.RunCompleted] = field(default_factory=lambda: deque(maxlen=2))
     runs: dict[str, events.RunCompleted] = field(default_factory=dict)
-    verdicts: dict[str, Verdict] = field(default_factory=dict)
+    verdicts: dict[str, RunDecision] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
     completed: events.RunCompleted | None = None
     fault: events.Fault | None = None
@@ -196,7 +196,7 @@ class Board:
         standing = [
             one.figures
             for one in self.runs_of(test, direction)
-            if one.figures is not None and self.verdicts.get(one.run.label) is not Verdict.REJECTED
+            if one.figures is not None and self.verdicts.get(one.run.label) is not RunDecision.REJECTED
         ]
         return standing[-1] if standing else None
 
@@ -208,7 +208,7 @@ class Board:
         match event:
             case events.SamplesRecorded() | events.ReadingsSeen():
                 self._samples(event)
-            case events.Progress():
+            case events.RunProgress():
                 self.swept_deg = event.swept_deg
             case events.StateChanged():
                 self._enter(event)
@@ -225,9 +225,9 @@ class Board:
                 self._begin(event.run)
                 self._trace(event.run, event.samples)
             case events.RunAccepted():
-                self._judge(event.run, Verdict.ACCEPTED, event.reason)
+                self._judge(event.run, RunDecision.ACCEPTED, event.reason)
             case events.RunRejected():
-                self._judge(event.run, Verdict.REJECTED, event.reason)
+                self._judge(event.run, RunDecision.REJECTED, event.reason)
             case events.SessionFinished():
                 self.finished = event
             case events.Fault():
@@ -243,7 +243,7 @@ class Board:
         for known in opened.known:
             label = known.completed.run.label
             self.runs[label], self.reasons[label] = known.completed, known.reason
-            self.verdicts[label] = Verdict.ACCEPTED if known.accepted else Verdict.REJECTED
+            self.verdicts[label] = RunDecision.ACCEPTED if known.accepted else RunDecision.REJECTED
         if self.fault is not None:
             # What is over does not stay red.
             past = [replace(message, weight=Weight.NOTE) for message in self.messages]
@@ -302,29 +302,29 @@ class Board:
             ccw, cw = (None if one is None else one.centred for one in both)
             self.difference = None if ccw is None or cw is None else difference(ccw, cw)
 
-    def _judge(self, run: events.RunId, verdict: Verdict, reason: str = "") -> None:
+    def _judge(self, run: events.RunId, verdict: RunDecision, reason: str = "") -> None:
         """Note a verdict; on the announced run as its mark, on an earlier one wherever its task stands."""
         self.verdicts[run.label], self.reasons[run.label] = verdict, reason
         announced = self.announced.run if self.announced else None
         if announced is not None and announced.label == run.label:
-            if verdict is Verdict.ACCEPTED:
+            if verdict is RunDecision.ACCEPTED:
                 self._mark(Mark.ACCEPTED)
         else:
             self._mark_earlier(run, verdict)
-        if verdict is Verdict.REJECTED:
+        if verdict is RunDecision.REJECTED:
             trace = self.traces.get(run.direction)
             if trace is not None and trace.run.label == run.label:
                 del self.traces[run.direction]
                 self.difference = None
 
-    def _mark_earlier(self, run: events.RunId, verdict: Verdict) -> None:
+    def _mark_earlier(self, run: events.RunId, verdict: RunDecision) -> None:
         mine = [k for k, task in enumerate(self.tasks) if (task.test, task.direction) == (run.test, run.direction)]
-        if verdict is Verdict.ACCEPTED:
+        if verdict is RunDecision.ACCEPTED:
             changed = next((k for k in mine if self.marks[k] is not Mark.ACCEPTED), None)
         else:
             changed = next((k for k in reversed(mine) if self.marks[k] is Mark.ACCEPTED), None)
         if changed is not None:
-            self.marks[changed] = Mark.ACCEPTED if verdict is Verdict.ACCEPTED else Mark.OPEN
+            self.marks[changed] = Mark.ACCEPTED if verdict is RunDecision.ACCEPTED else Mark.OPEN
 
     def _trace(self, run: events.RunId, samples: Sequence[events.Sample]) -> None:
         trace = self.traces.get(run.direction)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-class Kind(StrEnum):
+class CandidateFormat(StrEnum):
     """Formats that are chosen from; the text is how the `format` key begins."""
 
     MACHINE = "dbb-machine/"
@@ -29,11 +29,14 @@ DEPTH = 2
 _HEAD = 4096
 """Bytes of a file within which its format is stated: behind the comments at its top."""
 
-_SHIPPED = {Kind.MACHINE: ("fixtures", "machines/reference.yaml"), Kind.PLAN: ("protocols", "plans/*.yaml")}
+_SHIPPED = {
+    CandidateFormat.MACHINE: ("fixtures", "machines/reference.yaml"),
+    CandidateFormat.PLAN: ("protocols", "plans/*.yaml"),
+}
 """Examples that come with the package."""
 
 
-def candidates(kind: Kind, under: Path, *, shipped: bool = True) -> tuple[Path, ...]:
+def candidates(kind: CandidateFormat, under: Path, *, shipped: bool = True) -> tuple[Path, ...]:
     """Return the files of a format, those under a folder first; copies inside sessions are left out.
 
     Args:
@@ -63,7 +66,7 @@ def _files(folder: Path, depth: int) -> Iterator[Path]:
                 yield from _files(path, depth - 1)
 
 
-def _is(kind: Kind, path: Path) -> bool:
+def _is(kind: CandidateFormat, path: Path) -> bool:
     try:
         head = head_of(path, _HEAD)
     except OSError:

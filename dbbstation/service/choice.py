@@ -39,7 +39,7 @@ PROGRAMS = "programs"
 """Folder of a session in which its NC programs are."""
 
 
-class Part(StrEnum):
+class SetUpPart(StrEnum):
     """What has to be chosen for a new session."""
 
     MACHINE = "machine"
@@ -111,15 +111,15 @@ class Choice:
         """Whether the session exists."""
         return self.folder is not None and (self.folder / SESSION_FILE).is_file()
 
-    def missing(self) -> tuple[Part, ...]:
+    def missing(self) -> tuple[SetUpPart, ...]:
         """Return what has still to be chosen, in the order in which it is asked for."""
         given = {
-            Part.MACHINE: self.goes_on or self.machine is not None,
-            Part.PLAN: self.goes_on or self.plan is not None,
-            Part.INSTRUMENT: bool(self.line.instrument),
-            Part.PORT: bool(self.line.port),
-            Part.BAR: self.goes_on or self.line.virtual or self.bar is not None or bool(self.bar_waiver),
-            Part.FOLDER: self.folder is not None,
+            SetUpPart.MACHINE: self.goes_on or self.machine is not None,
+            SetUpPart.PLAN: self.goes_on or self.plan is not None,
+            SetUpPart.INSTRUMENT: bool(self.line.instrument),
+            SetUpPart.PORT: bool(self.line.port),
+            SetUpPart.BAR: self.goes_on or self.line.virtual or self.bar is not None or bool(self.bar_waiver),
+            SetUpPart.FOLDER: self.folder is not None,
         }
         return tuple(part for part, there in given.items() if not there)
 

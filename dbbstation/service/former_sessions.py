@@ -12,7 +12,7 @@ from dbbstation.files.gateway import content_of, digest_of
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.machine.difference import differences
-from dbbstation.service.candidates import Kind, candidates
+from dbbstation.service.candidates import CandidateFormat, candidates
 from dbbstation.service.session_list import dated_folders
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def before_and_now(folder: Path) -> BeforeAndNow:
     """
     now = read_session(folder)
     under = folder.absolute().parent
-    by_sha256 = {_sha256(path): path for path in candidates(Kind.MODEL, under)}
+    by_sha256 = {_sha256(path): path for path in candidates(CandidateFormat.MODEL, under)}
     formers = (Former(one.folder, at, in_force(one, by_sha256)) for at, one in former_sessions(now, under))
     return BeforeAndNow(in_force(now, by_sha256), tuple(formers))
 

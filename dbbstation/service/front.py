@@ -9,23 +9,25 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
+from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
 from dbbstation.service.after import JOINT, KINEMATIC, After
 from dbbstation.service.bar_calibration import BarCalibration, Stated
 from dbbstation.service.bar_stated import fault_of
-from dbbstation.service.candidates import Kind, candidates
-from dbbstation.service.choice import Choice, Limits, Part, Prepared, prepare
+from dbbstation.service.candidates import CandidateFormat, candidates
+from dbbstation.service.choice import Choice, Limits, Prepared, SetUpPart, prepare
 from dbbstation.service.held_line import HeldLine, HeldOpen
+from dbbstation.service.job import SessionJob, SessionTask
 from dbbstation.service.memory import VIRTUAL, Line, Memory
 from dbbstation.service.opening import opener
-from dbbstation.service.port_probe import Answer, ports, probe
+from dbbstation.service.port_probe import ProbeOutcome, ports, probe
 from dbbstation.service.runner import Runner
 from dbbstation.service.session_line import line_to_go_on
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.shop_temperature import note_temperature
 from dbbstation.service.virtual_place import virtual_place
-from dbbstation.service.work import Progress, Work
+from dbbstation.service.work import BackgroundWork, WorkProgress
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -103,8 +105,10 @@ class Front:
 
     def virtual_choice(self) -> Choice:
         """Return a choice with which anybody can try everything: nothing is missing, and no hardware is needed."""
-        machine = candidates(Kind.MACHINE, self.under)[-1]
-        plan = next(path for path in candidates(Kind.PLAN, self.under) if path.name == "ten-minute-check.yaml")
+        machine = candidates(CandidateFormat.MACHINE, self.under)[-1]
+        plan = next(
+            path for path in candidates(CandidateFormat.PLAN, self.under) if path.name == "ten-minute-check.yaml"
+        )
         line = Line(instrument=USUAL_VIRTUAL, port=list(VIRTUAL)[-1])
         said = {name: getattr(self.given, name) for name in ("operator", "serial_number", "job", "order", "gate")}
         return Choice(self.new_folder("virtual"), machine, plan, line, **said)
@@ -116,11 +120,15 @@ class Front:
 
     def new_folder(self, name: str = "session") -> Path:
         """Return a folder for a new session that is not there yet."""
-        return _not_there(self.under, name)
+        return unused_path(self.under, name)
 
-    def files(self, part: Part) -> tuple[Path, ...]:
+    def files(self, part: SetUpPart) -> tuple[Path, ...]:
         """Return the files that can be chosen for a part."""
-        kinds = {Part.MACHINE: Kind.MACHINE, Part.PLAN: Kind.PLAN, Part.BAR: Kind.BAR}
+        kinds = {
+            SetUpPart.MACHINE: CandidateFormat.MACHINE,
+            SetUpPart.PLAN: CandidateFormat.PLAN,
+            SetUpPart.BAR: CandidateFormat.BAR,
+        }
         return candidates(kinds[part], self.under)
 
     def instruments(self) -> list[tuple[str, str]]:
@@ -131,20 +139,20 @@ class Front:
         """Return name and description of what can be chosen as port: those of the computer, and virtual machines."""
         return [*ports(), *((name, "no hardware, to try it") for name in VIRTUAL)]
 
-    def probe(self, line: Line) -> Answer:
+    def probe(self, line: Line) -> ProbeOutcome:
         """Return what answers at a port; takes some seconds.
 
         Args:
             line: instrument and port.
         """
         if line.virtual:
-            return Answer(line.port, answers=True, text="is switched on when it is needed")
+            return ProbeOutcome(line.port, answers=True, text="is switched on when it is needed")
         try:
             protocol = load_instrument(line.instrument, line.profile or None)
             # What a relative instrument calls zero does not matter for whether it answers.
             protocol = with_zero(protocol, (line.zero_mm or 0.0) if protocol.length.relative else None)
         except StationError as error:
-            return Answer(line.port, answers=False, text=str(error))
+            return ProbeOutcome(line.port, answers=False, text=str(error))
         self.release()  # only one can open a port
         return probe(protocol, line.port, line.baud)
 
@@ -167,7 +175,7 @@ class Front:
 
     def models(self) -> tuple[Path, ...]:
         """Return the models that programs can be compensated with, the last written first."""
-        return tuple(sorted(candidates(Kind.MODEL, self.under), key=lambda path: -path.stat().st_mtime))
+        return tuple(sorted(candidates(CandidateFormat.MODEL, self.under), key=lambda path: -path.stat().st_mtime))
 
     def write_programs(self, choice: Choice, model: Path | None = None) -> tuple[int, Path]:
         """Write NC programs of all circles into a new folder beside the session; return how many, and where.
@@ -177,7 +185,7 @@ class Front:
             model: that they are compensated with; None: nominal programs.
 
         Raises:
-            StationError: what the command says.
+            StationError: what the task says.
             ValueError: plan or machine is missing.
         """
         plan, machine = choice.plan, choice.machine
@@ -186,13 +194,20 @@ class Front:
             plan, machine = session.plan_path, session.machine_path
         if plan is None or machine is None or choice.folder is None:
             raise ValueError("plan, machine or folder is missing")
-        folder = _not_there(choice.folder.parent, f"{choice.folder.name}-programs")
-        names = ["--plan", str(plan.absolute()), "--machine", str(machine.absolute()), "--out", str(folder.absolute())]
-        by_model = [] if model is None else ["--model", str(model.absolute())]
-        settings = [] if self.settings is None else ["--settings", str(self.settings)]
-        work = Work([*settings, "program", *names, *by_model], self.under)
+        folder = unused_path(choice.folder.parent, f"{choice.folder.name}-programs")
+        job = SessionJob(
+            task=SessionTask.PROGRAMS,
+            beside=self.under.absolute(),
+            out=str(folder.absolute()),
+            model=None if model is None else model.absolute(),
+            plan=plan.absolute(),
+            machine=machine.absolute(),
+            settings=None if self.settings is None else self.settings.absolute(),
+            force=False,
+        )
+        work = BackgroundWork(job, self.under)
         try:
-            if work.wait() is not Progress.DONE:
+            if work.wait() is not WorkProgress.DONE:
                 raise StationError(work.failure())
             return len(work.answer()["programs"]), folder
         finally:
@@ -249,7 +264,7 @@ class Front:
 
     def new_bar_file(self) -> Path:
         """Return a file for a calibration of the bar that is not there yet."""
-        return _not_there(self.under, f"bar-{datetime.now().astimezone():%Y-%m-%d}", ".yaml")
+        return unused_path(self.under, f"bar-{datetime.now().astimezone():%Y-%m-%d}", ".yaml")
 
     def open(self, choice: Choice, prepared: Prepared) -> Opened:
         """Switch on what is virtual, remember the choice, and return what runs the sequence.
@@ -334,12 +349,6 @@ class NoNumberError(ValueError):
     def __init__(self, name: str, text: str) -> None:
         self.name, self.text = name, text
         super().__init__(f"{name}: `{text}` is no number")
-
-
-def _not_there(folder: Path, name: str, suffix: str = "") -> Path:
-    """Return a path of that name that does not exist, with a number where it has to."""
-    numbered = (folder / f"{name if k == 1 else f'{name}-{k}'}{suffix}" for k in range(1, 10_000))
-    return next(path for path in numbered if not path.exists())
 
 
 def _number(values: Mapping[str, str], name: str) -> float:

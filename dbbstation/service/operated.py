@@ -10,21 +10,24 @@ from dbbstation.errors import InputError
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.formats.settings_schema import SettingsFile
+from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import format_for
 from dbbstation.quality.conformity import Conformity
-from dbbstation.service.after import After, Step
+from dbbstation.service.after import After
 from dbbstation.service.choice import Choice
+from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Line
 from dbbstation.service.session_list import list_sessions
-from dbbstation.service.work import Progress, Work
+from dbbstation.service.work import BackgroundWork, WorkProgress
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from dbbstation.files.formats.job import JobFile
+    from dbbstation.service.job import SessionJob
 
 
 @dataclass(frozen=True)
@@ -87,8 +90,7 @@ class Operated:
 
     def _new_folder(self) -> Path:
         name = f"{self.path.stem}-{datetime.now().astimezone():%Y-%m-%d}"
-        numbered = (self.sessions / (name if k == 1 else f"{name}-{k}") for k in range(1, 10_000))
-        return next(path for path in numbered if not path.exists())
+        return unused_path(self.sessions, name)
 
 
 @dataclass(frozen=True)
@@ -109,13 +111,13 @@ class Answered:
 
 
 class JobAnswer:
-    """Holds the circles of a session against the job's tolerances, by the command `report`.
+    """Holds the circles of a session against the job's tolerances, by a report.
 
     Args:
         operated: the job.
         session: its folder.
         missing: runs of the plan that have no accepted recording, as people read them.
-        start: starts a command; a process of its own.
+        start: begins a job, in a process of its own.
     """
 
     def __init__(
@@ -123,19 +125,19 @@ class JobAnswer:
         operated: Operated,
         session: Path,
         missing: Sequence[str],
-        start: Callable[[Sequence[str], Path], Work] = Work,
+        start: Callable[[SessionJob, Path], BackgroundWork] = BackgroundWork,
     ) -> None:
         self._missing = tuple(missing)
         self._after = After(session, None, operated.tolerances_file(session), start)
-        self._after.do(Step.REPORT)
+        self._after.do(SessionTask.REPORT)
 
     def look(self) -> Answered | None:
         """Return the answer; None while it is worked out."""
         self._after.look()
-        result = self._after.results[Step.REPORT]
-        if result.progress in {None, Progress.RUNNING}:
+        result = self._after.results[SessionTask.REPORT]
+        if result.progress in {None, WorkProgress.RUNNING}:
             return None
-        if result.progress is not Progress.DONE:
+        if result.progress is not WorkProgress.DONE:
             return Answered(Conformity.UNDECIDED, (result.failure or "the report was ended before it was done",))
         return answer_of(result.answer["verdict"], self._missing, result.path)
 

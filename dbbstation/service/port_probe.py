@@ -20,7 +20,7 @@ _LOOK_S = 0.02
 
 
 @dataclass(frozen=True)
-class Answer:
+class ProbeOutcome:
     """What came from a port.
 
     Attributes:
@@ -39,7 +39,7 @@ def ports() -> list[tuple[str, str]]:
     return [(name, description) for name, description, _ in connected_ports()]
 
 
-def probe(protocol: Protocol, port: str, baud: int | None = None, patience_s: float = PATIENCE_S) -> Answer:
+def probe(protocol: Protocol, port: str, baud: int | None = None, patience_s: float = PATIENCE_S) -> ProbeOutcome:
     """Ask a port for a reading of an instrument.
 
     Args:
@@ -56,9 +56,9 @@ def probe(protocol: Protocol, port: str, baud: int | None = None, patience_s: fl
                 if readings:
                     last = readings[-1]
                     if last.length_mm is not None:
-                        return Answer(port, answers=True, text=f"{last.length_mm:.4f} mm")
-                    return Answer(port, answers=True, text=f"no bar: {last.said or last.status}")
+                        return ProbeOutcome(port, answers=True, text=f"{last.length_mm:.4f} mm")
+                    return ProbeOutcome(port, answers=True, text=f"no bar: {last.said or last.status}")
                 time.sleep(_LOOK_S)
     except StationError as error:
-        return Answer(port, answers=False, text=f"{error.what}; {error.remedy}" if error.remedy else error.what)
-    return Answer(port, answers=False, text="nothing came")
+        return ProbeOutcome(port, answers=False, text=f"{error.what}; {error.remedy}" if error.remedy else error.what)
+    return ProbeOutcome(port, answers=False, text="nothing came")

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Seat:
+class BarAtFeedIn:
     """How the bar stands at the feed-in point.
 
     Attributes:
@@ -25,7 +25,7 @@ class Seat:
     seated: bool
 
 
-def seat(length_mm: float, circle: Circle) -> Seat:
+def seat(length_mm: float, circle: Circle) -> BarAtFeedIn:
     """Return how the bar stands at the feed-in point of a circle.
 
     Args:
@@ -33,4 +33,4 @@ def seat(length_mm: float, circle: Circle) -> Seat:
         circle: that is run next.
     """
     long_mm = length_mm - (circle.bar_mm + circle.feed_in_mm)
-    return Seat(long_mm, abs(long_mm) < (0.5 - HYSTERESIS) * circle.feed_in_mm)
+    return BarAtFeedIn(long_mm, abs(long_mm) < (0.5 - HYSTERESIS) * circle.feed_in_mm)

@@ -27,7 +27,7 @@ def shop_degc(text: str) -> float | None:
 
 
 def note_temperature(folder: Path, degc: float) -> None:
-    """Note the present temperature; while a sequence runs, it takes a `Note` instead.
+    """Note the present temperature; while a sequence runs, it takes an `AddNote` instead.
 
     Args:
         folder: of the session.

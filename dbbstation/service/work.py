@@ -1,11 +1,10 @@
-"""Long work in a process of its own: the program's own commands, so that what they write says how to get it again.
-
-A process can be ended at any time; what its command writes is written whole or not at all.
-"""
+"""Long work in a process of its own, which can be ended at any time; what it writes is written whole or not at all."""
 
 from __future__ import annotations
 
 import json
+import logging
+import os
 import signal
 import subprocess
 import sys
@@ -17,19 +16,26 @@ from enum import StrEnum
 from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
-STAGE_MARK = "... "
-"""How the log names a stage of long work."""
+    from dbbstation.service.job import SessionJob
 
-_LOG_MARK = "log: "
+WORKER = "dbbstation.service.worker"
+"""Module that the process runs. The station never loads it: it knows what is computed."""
+
+STAGE_MARK = "stage: "
+"""How the process begins a line that names a stage of its work."""
+
+LOG_MARK = "log: "
+"""How it begins a line for the log."""
+
+_LOG = logging.getLogger(__name__)
 
 _POLITE_S = 3.0
-"""A command that was asked to end has so long before it is ended [s]."""
+"""Work that was asked to end has so long before it is ended [s]."""
 
 
-class Progress(StrEnum):
+class WorkProgress(StrEnum):
     """How work stands."""
 
     RUNNING = "running"
@@ -38,69 +44,72 @@ class Progress(StrEnum):
     CANCELLED = "cancelled"
 
 
-class Work:
-    """One command of the program, started at once.
+class BackgroundWork:
+    """One job, begun at once.
 
     Args:
-        arguments: of the command, without the program's name; `--json` is added.
-        folder: where it runs.
+        job: what is to be done.
+        folder: where it is done.
 
     Attributes:
-        arguments: as given.
+        job: as given.
         stage: what it does now, as it says itself; empty before it says anything.
     """
 
-    def __init__(self, arguments: Sequence[str], folder: Path) -> None:
-        self.arguments = tuple(arguments)
+    def __init__(self, job: SessionJob, folder: Path) -> None:
+        self.job = job
         self.stage = ""
         self._begun_s = time.monotonic()
         self._ended_s: float | None = None
         self._cancelled = False
         self._said: list[str] = []
-        # A file takes any amount; a pipe that nobody reads would hold the command up.
+        # A file takes any amount; a pipe that nobody reads would hold the work up.
         self._answer: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `close`
-        self._process = subprocess.Popen(  # noqa: S603 - the program's own commands
-            [sys.executable, "-m", "dbbstation", "--verbose", *arguments, "--json"],
+        self._process = subprocess.Popen(  # noqa: S603 - a module of the program
+            [sys.executable, "-m", WORKER],
             cwd=folder,
-            stdin=subprocess.DEVNULL,
+            # Read when NumPy is imported: the threads that `dbbstation.threads` takes away are not even started.
+            env={"OPENBLAS_NUM_THREADS": "1", **os.environ},
+            stdin=subprocess.PIPE,
             stdout=self._answer,
             stderr=subprocess.PIPE,
             text=True,
             encoding="utf-8",
             errors="replace",
         )
+        self._tell()
         self._listener = threading.Thread(target=self._listen, name="work", daemon=True)
         self._listener.start()
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> WorkProgress:
         """How it stands."""
         code = self._process.poll()
         if code is None:
-            return Progress.RUNNING
+            return WorkProgress.RUNNING
         self._ended_s = self._ended_s or time.monotonic()
         if self._cancelled:
-            return Progress.CANCELLED
-        return Progress.DONE if code == 0 else Progress.FAILED
+            return WorkProgress.CANCELLED
+        return WorkProgress.DONE if code == 0 else WorkProgress.FAILED
 
     @property
     def passed_s(self) -> float:
         """Time since it began, until it ended [s]."""
         return (self._ended_s or time.monotonic()) - self._begun_s
 
-    def wait(self) -> Progress:
+    def wait(self) -> WorkProgress:
         """Wait for its end; return how it ended."""
         self._process.wait()
         return self.progress
 
     def answer(self) -> dict[str, Any]:
-        """Return what the command printed, once it is done."""
+        """Return the result as JSON has it, once it is done."""
         self._answer.seek(0)
         found: dict[str, Any] = json.loads(self._answer.read())
         return found
 
     def failure(self) -> str:
-        """Return what the command said last, once it has failed."""
+        """Return why it failed, once it has."""
         self._listener.join(_POLITE_S)
         return "\n".join(self._said[-4:])
 
@@ -125,12 +134,22 @@ class Work:
             self._process.stderr.close()
         self._answer.close()
 
+    def _tell(self) -> None:
+        """Tell the process its job; one that has ended already says why by itself."""
+        if self._process.stdin is None:
+            return
+        with suppress(OSError):
+            self._process.stdin.write(self.job.model_dump_json() + "\n")
+            self._process.stdin.close()
+
     def _listen(self) -> None:
         if self._process.stderr is None:
             return
         for line in self._process.stderr:
             text = line.rstrip()
-            if text.startswith(_LOG_MARK + STAGE_MARK):
-                self.stage = text.removeprefix(_LOG_MARK + STAGE_MARK)
-            elif text and not text.startswith(_LOG_MARK):
+            if text.startswith(STAGE_MARK):
+                self.stage = text.removeprefix(STAGE_MARK)
+            elif text.startswith(LOG_MARK):
+                _LOG.info("%s", text.removeprefix(LOG_MARK))
+            elif text:
                 self._said.append(text)

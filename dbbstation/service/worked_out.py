@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -45,20 +46,35 @@ class _File(BaseModel):
     steps: dict[str, DoneStep]
 
 
-def keep_steps(folder: Path, session: Path, steps: dict[str, DoneStep]) -> None:
+@dataclass(frozen=True)
+class StepsBefore:
+    """What was done with the runs that count now.
+
+    Attributes:
+        folder: of the results.
+        counted: SHA-256 of the runs that count.
+        steps: what was done, by the name of the step.
+    """
+
+    folder: Path
+    counted: str
+    steps: dict[str, DoneStep]
+
+
+def keep_steps(folder: Path, runs_sha256: str, steps: dict[str, DoneStep]) -> None:
     """Keep what was done beside its results; where that cannot be written, only the next start lacks it.
 
     Args:
         folder: of the results.
-        session: its folder.
+        runs_sha256: of the runs that count, as `counted` has it.
         steps: what was done, by the name of the step.
     """
-    with suppress(OSError, OutputError, InputError):
-        file = _File(runs_sha256=counted(session), steps=steps)
+    with suppress(OSError, OutputError):
+        file = _File(runs_sha256=runs_sha256, steps=steps)
         write_text(folder / FILE, file.model_dump_json(indent=1) + "\n", force=True, rewrites=True)
 
 
-def steps_before(session: Path) -> tuple[Path, dict[str, DoneStep]] | None:
+def steps_before(session: Path) -> StepsBefore | None:
     """Return the last folder of results of a session whose counting runs are still the same, and what was done; None where none is.
 
     A step whose file is gone is left out.
@@ -79,7 +95,8 @@ def steps_before(session: Path) -> tuple[Path, dict[str, DoneStep]] | None:
             continue
         if found.runs_sha256 == now:
             folder = file.parent
-            return folder, {name: step for name, step in found.steps.items() if (folder / step.path).exists()}
+            steps = {name: step for name, step in found.steps.items() if (folder / step.path).exists()}
+            return StepsBefore(folder, now, steps)
     return None
 
 

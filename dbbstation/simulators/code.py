@@ -7,25 +7,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.candidates import basis
-from dbbstation.diagnosis.simulator.terms import Form
+from dbbstation.diagnosis.simulator.terms import TermForm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.diagnosis.simulator.answer import Answer
+    from dbbstation.diagnosis.simulator.answer import SimulatorComparison
     from dbbstation.diagnosis.simulator.terms import Term
 
 _PLAIN = {
-    Form.CONSTANT: "{a}",
-    Form.LINEAR: "{a} * x",
-    Form.SQUARE: "{a} * x**2",
-    Form.DRAG: "{a} * x * abs(x)",
-    Form.CUBIC: "{a} * x**3",
-    Form.SIGN: "{a} * x / math.sqrt(x**2 + {s} ** 2)",
-    Form.HINGE: "{a} * max(x - {s}, 0.0)",
-    Form.LIMIT: "{a} * min(max(x, -{s}), {s})",
-    Form.PRODUCT: "{a} * x * z",
-    Form.PERIODIC: "{a} * math.cos({turns} * x) + {b} * math.sin({turns} * x)",
+    TermForm.CONSTANT: "{a}",
+    TermForm.LINEAR: "{a} * x",
+    TermForm.SQUARE: "{a} * x**2",
+    TermForm.DRAG: "{a} * x * abs(x)",
+    TermForm.CUBIC: "{a} * x**3",
+    TermForm.SIGN: "{a} * x / math.sqrt(x**2 + {s} ** 2)",
+    TermForm.HINGE: "{a} * max(x - {s}, 0.0)",
+    TermForm.LIMIT: "{a} * min(max(x, -{s}), {s})",
+    TermForm.PRODUCT: "{a} * x * z",
+    TermForm.PERIODIC: "{a} * math.cos({turns} * x) + {b} * math.sin({turns} * x)",
 }
 
 _BEHIND = """    if before is not None and {tau} > 0.0:
@@ -43,7 +43,7 @@ _LATE = """    times, values = before or ([], [])
     return float(np.interp(t - {a}, times, values)) - x, (times, values)"""
 
 
-def missing_code(answer: Answer) -> str:
+def missing_code(answer: SimulatorComparison) -> str:
     """Text of a Python module with a function for each term: `value(t, signals)`, or with a state for those with a memory."""
     lines = [
         f'"""What {answer.model.name} lacks, as found from its recordings. Add each term at its port."""',
@@ -81,13 +81,13 @@ def _function(term: Term, verdict: str, values: Sequence[str]) -> list[str]:
     head = [f"def {function_name(term)}({arguments}):", *said, '    """', *signals]
     if remembers:
         return [*head, remembers]
-    if term.form is Form.OWN:
+    if term.form is TermForm.OWN:
         numbers = ", ".join(repr(float(number)) for number in term.numbers)
         return [*head, f"    return own_value(t, signals, ({numbers},))  # physics of your own"]
-    if term.form is Form.CURVE:
+    if term.form is TermForm.CURVE:
         return [*head, *_curve(term)]
     b = repr(float(term.amplitudes[1])) if len(term.amplitudes) > 1 else ""
-    turns = f"2.0 * math.pi * {term.fixed[1]} / {term.fixed[0]!r}" if term.form is Form.PERIODIC else ""
+    turns = f"2.0 * math.pi * {term.fixed[1]} / {term.fixed[0]!r}" if term.form is TermForm.PERIODIC else ""
     return [*head, "    return " + _PLAIN[term.form].format(a=a, s=shape, b=b, turns=turns)]
 
 
@@ -107,12 +107,12 @@ POINTS = 41
 
 def _body(term: Term, a: str, shape: str) -> str:
     """Body of a term with a memory; empty for the others."""
-    if term.form is Form.MEMORY:
+    if term.form is TermForm.MEMORY:
         return _BEHIND.format(tau=shape, out=f"{a} * (x + behind)")
-    if term.form is Form.LAG:
+    if term.form is TermForm.LAG:
         return _BEHIND.format(tau=a, out="behind")
-    if term.form is Form.PLAY:
+    if term.form is TermForm.PLAY:
         return _APART.format(half=a, out="apart")
-    if term.form is Form.SLIP:
+    if term.form is TermForm.SLIP:
         return _APART.format(half=shape, out=f"-{a} * apart / {shape}")
-    return _LATE.format(a=a) if term.form is Form.DELAY else ""
+    return _LATE.format(a=a) if term.form is TermForm.DELAY else ""

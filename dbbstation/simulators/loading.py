@@ -13,12 +13,12 @@ import numpy as np
 
 from dbbstation.catalogue import in_words, line_in
 from dbbstation.diagnosis.simulator.contract import Simulator
-from dbbstation.diagnosis.simulator.model import Model, Output, Parameter, Port, Recorded
+from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
 from dbbstation.diagnosis.simulator.own import PortSource
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
 from dbbstation.files.gateway import content_of
-from dbbstation.files.own_classes import classes_in_files, module_name
+from dbbstation.files.own_classes import classes_in_files, module_name, own_instances
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ FEWEST_ROWS = 30
 
 
 @dataclass(frozen=True, eq=False)
-class Loaded:
+class LoadedSimulator:
     """A simulator with its recordings.
 
     Attributes:
@@ -67,7 +67,7 @@ class Loaded:
 
 def load_simulator(
     path: Path, recordings: Sequence[Path], own_files: Sequence[Path] = (), numbers: NumberLanguage | None = None
-) -> Loaded:
+) -> LoadedSimulator:
     """Read a simulator, its recordings, and physics of the user's own. Python files are executed.
 
     Raises:
@@ -88,11 +88,11 @@ def load_simulator(
     model = Model(
         file.name,
         tuple(parameters),
-        tuple(Port(name, one.unit, dict(one.signals), one.about) for name, one in file.ports.items()),
+        tuple(SimulatorPort(name, one.unit, dict(one.signals), one.about) for name, one in file.ports.items()),
         tuple(Output(name, one.unit, one.filter_s or 0.0) for name, one in file.outputs.items()),
         tuple(_recorded(file, table) for table in tables),
     )
-    return Loaded(path, python, file, model, tables, tuple(_own(own_files, file)), tuple(own_files))
+    return LoadedSimulator(path, python, file, model, tables, tuple(_own(own_files, file)), tuple(own_files))
 
 
 def simulator_of(python: Path) -> Simulator:
@@ -128,32 +128,15 @@ def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
     Raises:
         InputError: faults of the files; a port that is not there.
     """
-    faults: list[Problem] = []
-    found: dict[str, PortSource] = {}
-    for one_of in classes_in_files(files, PortSource, CONTRACT, faults) if files else ():  # type: ignore[type-abstract]
-        kind, place = one_of.kind, one_of.place
-        lacking = [name for name in ("name", "port") if not hasattr(kind, name)]
-        lacking += sorted(getattr(kind, "__abstractmethods__", ()))
-        if lacking:
-            faults.append(Problem(place.file, place.line, 0, f"{kind.__name__} lacks {', '.join(lacking)}", CONTRACT))
-            continue
-        try:
-            one = kind()
-            if one.port in file.ports:
-                _try_once(one, file.ports[one.port].signals)
-        except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
-            line = line_in(error, place.file) or place.line
-            faults.append(Problem(place.file, line, 0, f"{kind.__name__}: {in_words(error)}", CONTRACT))
-            continue
+
+    def fault_of(one: PortSource) -> tuple[str, str] | None:
         if one.port not in file.ports:
-            what = f"`{one.port}` of {kind.__name__} is no port; there are {', '.join(file.ports)}"
-            faults.append(Problem(place.file, place.line, 0, what, "name one of them"))
-        elif one.name in found:
-            faults.append(Problem(place.file, place.line, 0, f"the name `{one.name}` is taken", "give it another name"))
-        found[one.name] = one
-    if faults:
-        raise InputError(faults)
-    return list(found.values())
+            there = ", ".join(file.ports)
+            return f"`{one.port}` of {type(one).__name__} is no port; there are {there}", "name one of them"
+        _try_once(one, file.ports[one.port].signals)
+        return None
+
+    return own_instances(files, PortSource, CONTRACT, ("name", "port"), fault_of)  # type: ignore[type-abstract]
 
 
 def know(files: Sequence[Path]) -> None:
@@ -165,14 +148,14 @@ def know(files: Sequence[Path]) -> None:
 
 def _try_once(one: PortSource, signals: Iterable[str]) -> None:
     """Ask physics of the user's own for its numbers, and once for what it does, so that a fault is found before anything is simulated."""
-    values = {p.name: p.shape[len(p.shape) // 2] if p.shape else p.plausible for p in one.parameters()}
+    values = {p.name: p.grid[len(p.grid) // 2] if p.grid else p.plausible for p in one.parameters()}
     float(one.value(0.0, dict.fromkeys(signals, 1.0), values))
 
 
-def _parameter(name: str, key: str, one: ParameterSchema, run: int | None = None) -> Parameter:
+def _parameter(name: str, key: str, one: ParameterSchema, run: int | None = None) -> SimulatorParameter:
     low = -np.inf if one.low is None else one.low
     high = np.inf if one.high is None else one.high
-    return Parameter(name, key, one.value, one.unit, one.uncertainty, low, high, run)
+    return SimulatorParameter(name, key, one.value, one.unit, one.uncertainty, low, high, run)
 
 
 def _tables(
@@ -208,7 +191,9 @@ def _tables(
     return tuple(found)
 
 
-def _recorded(file: SimulatorFile, table: TableFile) -> Recorded:
+def _recorded(file: SimulatorFile, table: TableFile) -> SimulatorRecording:
     inputs: dict[str, NDArray[np.float64]] = {"t": table.values[file.time]}
     inputs |= {name: table.values[column] for name, column in file.inputs.items()}
-    return Recorded(table.file, inputs, {name: table.values[one.column] for name, one in file.outputs.items()})
+    return SimulatorRecording(
+        table.file, inputs, {name: table.values[one.column] for name, one in file.outputs.items()}
+    )

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from types import TracebackType
     from typing import Self
 
-    from dbbstation.diagnosis.simulator.model import Answer, Ask, Model
-    from dbbstation.simulators.loading import Loaded
+    from dbbstation.diagnosis.simulator.model import Model, SimulationOutcome, SimulationRequest
+    from dbbstation.simulators.loading import LoadedSimulator
 
 MOST_SECONDS = 600.0
 """Time that simulations may take in all, where no number of them is given: a coffee."""
@@ -46,10 +46,10 @@ class Runs:
         most: simulations that may be run; None: what ten minutes hold.
     """
 
-    def __init__(self, loaded: Loaded, count: int | None = None, most: int | None = None) -> None:
+    def __init__(self, loaded: LoadedSimulator, count: int | None = None, most: int | None = None) -> None:
         self._loaded, self._model = loaded, loaded.model
         self._count = (os.cpu_count() or 1) if count is None else count
-        self._known: dict[Ask, Answer] = {}
+        self._known: dict[SimulationRequest, SimulationOutcome] = {}
         self._pool: ProcessPoolExecutor | None = None
         self._stack = ExitStack()
         self.ran, self.most, self.seconds = 0, most, 0.0
@@ -66,7 +66,7 @@ class Runs:
         """End them; those that still simulate are ended at once."""
         self._stack.__exit__(kind, error, trace)
 
-    def __call__(self, asks: Sequence[Ask]) -> list[Answer]:
+    def __call__(self, asks: Sequence[SimulationRequest]) -> list[SimulationOutcome]:
         """Answers to all, from those that are known where they are.
 
         Raises:
@@ -91,7 +91,7 @@ class Runs:
             return None
         return (self.most - self.ran) * self.seconds / self.ran
 
-    def allow(self, first: Sequence[Ask]) -> float:
+    def allow(self, first: Sequence[SimulationRequest]) -> float:
         """Run a first simulation, set the number that may be run where none was given, and return its time [s]."""
         self(first)  # whatever a process does once only is no part of a simulation's time
         again = list(dict.fromkeys(first))
@@ -104,7 +104,7 @@ class Runs:
         self.seconds = one * self.ran
         return one
 
-    def _simulated(self, asks: Sequence[Ask]) -> list[Answer]:
+    def _simulated(self, asks: Sequence[SimulationRequest]) -> list[SimulationOutcome]:
         if self._pool is None:
             return [_one(self._loaded.python, self._model, ask) for ask in asks]
         together = max(min(TOGETHER, len(asks) // (2 * self._count)), 1)
@@ -125,7 +125,9 @@ class Runs:
                 what, where=told(self._model, asks[0]), remedy="it may lack memory, or crash there"
             ) from error
 
-    def _result(self, part: Sequence[Ask], future: Future[list[Answer]]) -> list[Answer]:
+    def _result(
+        self, part: Sequence[SimulationRequest], future: Future[list[SimulationOutcome]]
+    ) -> list[SimulationOutcome]:
         limit = self._loaded.file.time_limit_s
         # Those before it in the queue take their time, too, and a process is started first.
         allowed = STARTING_S + limit * len(part) * 2.0
@@ -143,13 +145,13 @@ STARTING_S = 20.0
 """Time that a process may take until it simulates."""
 
 
-def _several(python: Path, own_files: tuple[Path, ...], model: Model, asks: bytes) -> list[Answer]:
+def _several(python: Path, own_files: tuple[Path, ...], model: Model, asks: bytes) -> list[SimulationOutcome]:
     """Simulations in a process of their own, which must know classes of the user's before it can read what is asked of them."""
     know(own_files)
     return [_one(python, model, ask) for ask in pickle.loads(asks)]  # noqa: S301 - what the process above made
 
 
-def _one(python: Path, model: Model, ask: Ask) -> Answer:
+def _one(python: Path, model: Model, ask: SimulationRequest) -> SimulationOutcome:
     """One simulation.
 
     Raises:

@@ -241,14 +241,14 @@ class Parameter:
         unit: as printed.
         plausible: usual size, one standard deviation, in that unit.
         meaning: one line with the sign.
-        shape: values to search over, where the effect is not proportional to the parameter (a time constant, a
+        grid: values to search over, where the effect is not proportional to the parameter (a time constant, a
             phase); empty for an amplitude, which the effect is proportional to.
         tolerance: standard deviation that the machine file states, in that unit: a fit takes it for known; None where
             nothing is stated.
         newer: True for one that the source had not always: models written before lack it, and it is zero there.
         positive: True for what cannot be negative, such as a compliance or a friction: where a fit says so beyond its
             uncertainty, something else is at work.
-        listed: True where only the values of `shape` are possible and nothing between them, as of a part that is bought.
+        listed: True where only the values of `grid` are possible and nothing between them, as of a part that is bought.
         part: amplitudes with one label may be wrong alone, such as those of one order of a ball's form; empty for those of a
             strut, and for a source that has no parts.
         strut: strut that it is of, 1 to 6; the amplitudes of one strut may be wrong alone. None where it is of none.
@@ -258,7 +258,7 @@ class Parameter:
     unit: str
     plausible: float
     meaning: str
-    shape: tuple[float, ...] = ()
+    grid: tuple[float, ...] = ()
     tolerance: float | None = None
     newer: bool = False
     positive: bool = False
@@ -274,7 +274,7 @@ class Parameter:
     @property
     def largest(self) -> float:
         """Greatest size of a value that a model may have, in the parameter's unit."""
-        return max(BEYOND_PLAUSIBLE * self.plausible, *(10.0 * abs(value) for value in self.shape), 0.0)
+        return max(BEYOND_PLAUSIBLE * self.plausible, *(10.0 * abs(value) for value in self.grid), 0.0)
 
 
 def of_each_strut(

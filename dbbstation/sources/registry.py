@@ -6,7 +6,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import Found, added, in_folders, in_words, installed, line_in, looked_up
+from dbbstation.catalogue import FoundClass, added, in_folders, in_words, installed, line_in, looked_up
 from dbbstation.errors import InputError, ModelError, Problem
 from dbbstation.sources import causes, unmodelled
 from dbbstation.sources.contract import ErrorSource
@@ -45,7 +45,7 @@ def _known() -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
 _BASE: type[ErrorSource] = ErrorSource  # type: ignore[type-abstract]  # what derives from it is made
 
 
-def known_with(others: Sequence[Found[ErrorSource]], faults: list[Problem]) -> Mapping[str, ErrorSource]:
+def known_with(others: Sequence[FoundClass[ErrorSource]], faults: list[Problem]) -> Mapping[str, ErrorSource]:
     """All that are known, and sources made from further classes; what these lack of the contract is added to `faults`.
 
     Raises:
@@ -58,7 +58,7 @@ def known_with(others: Sequence[Found[ErrorSource]], faults: list[Problem]) -> M
 def _with(
     known: Mapping[str, ErrorSource],
     whose: Mapping[str, str],
-    others: Sequence[Found[ErrorSource]],
+    others: Sequence[FoundClass[ErrorSource]],
     faults: list[Problem],
 ) -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
     found, places = dict(known), dict(whose)
@@ -69,7 +69,7 @@ def _with(
     return MappingProxyType(dict(sorted(found.items()))), places
 
 
-def _checked(found: Found[ErrorSource], faults: list[Problem]) -> ErrorSource | None:
+def _checked(found: FoundClass[ErrorSource], faults: list[Problem]) -> ErrorSource | None:
     """Return a source made from a class; None with what it lacks added."""
     kind, place = found.kind, found.place
     said, line = undeclared(kind), place.line

@@ -136,7 +136,7 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
     if faults:
         return faults
     motion = _circle(machine)
-    values = np.array([p.shape[len(p.shape) // 2] if p.shape else p.plausible for p in parameters])
+    values = np.array([p.grid[len(p.grid) // 2] if p.grid else p.plausible for p in parameters])
     # A derivative comes first: where only that is written, the effect is made of it.
     for what, ask, last in (("derivative", source.derivative, (len(parameters),)), ("effect", source.effect, ())):
         answer: object = ask(motion, machine, values)
@@ -145,7 +145,7 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
         faults = _of_shapes(what, answer, len(motion), last)
         if faults:
             return faults
-    signs = np.array([1.0 if p.shape else -OTHER_SIZE for p in parameters])
+    signs = np.array([1.0 if p.grid else -OTHER_SIZE for p in parameters])
     return (
         _of_derivative(source, motion, machine, parameters, values)
         or _of_derivative(source, motion, machine, parameters, signs * values)
@@ -212,8 +212,8 @@ def _of_parameters(parameters: Sequence[Parameter]) -> list[str]:
         strut = re.match(r"(?:strut|joint)_([1-6])_", p.name)
         if p.strut != (int(strut[1]) if strut else None):
             faults.append(f"its parameter {p.name} must say with `strut` which strut it is of, as its name does")
-        if p.shape and not min(p.shape) <= p.plausible <= max(p.shape):
-            faults.append(f"the plausible size of its parameter {p.name} lies outside of its shape's values")
+        if p.grid and not min(p.grid) <= p.plausible <= max(p.grid):
+            faults.append(f"the plausible size of its parameter {p.name} lies outside of its grid")
     return faults
 
 
@@ -234,7 +234,7 @@ def _of_proportion(
     nothing = source.effect(motion, machine, zero)
     slopes = source.derivative(motion, machine, zero)
     faults = []
-    doubled = values * np.where([bool(p.shape) for p in parameters], 1.0, 2.0)
+    doubled = values * np.where([bool(p.grid) for p in parameters], 1.0, 2.0)
     once, twice = (source.effect(motion, machine, each) for each in (values, doubled))
     for name in EFFECT_SHAPES:
         at_zero, whole, double = (getattr(effect, name) for effect in (nothing, once, twice))
@@ -245,9 +245,7 @@ def _of_proportion(
         if whole is None or double is None or source.has_history:
             continue
         if np.abs(double - 2.0 * whole).max(initial=0.0) > SAME * np.abs(whole).max(initial=0.0):
-            faults.append(
-                f"{name} of its effect is not proportional to its amplitudes: what is not must have a `shape`"
-            )
+            faults.append(f"{name} of its effect is not proportional to its amplitudes: what is not must have a `grid`")
     return faults
 
 

@@ -96,7 +96,7 @@ class Judge:
 
 
 @dataclass(frozen=True)
-class Note:
+class AddNote:
     """Keep a remark or the temperature of the shop with the session; at any time.
 
     Attributes:
@@ -118,4 +118,4 @@ class Resume:
     """Go on after a pause."""
 
 
-Command: TypeAlias = Start | Accept | Repeat | Reject | Skip | Quit | GoTo | Judge | Note | Pause | Resume
+Command: TypeAlias = Start | Accept | Repeat | Reject | Skip | Quit | GoTo | Judge | AddNote | Pause | Resume

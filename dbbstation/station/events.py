@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.plan.plan import Ball
     from dbbstation.plan.sampling import Sampling
-    from dbbstation.quality.answer import Answer
+    from dbbstation.quality.answer import RunAssessment
     from dbbstation.quality.finding import Finding
     from dbbstation.station.commands import Command
     from dbbstation.station.states import State
@@ -159,7 +159,7 @@ class FeedInSeen:
 
 
 @dataclass(frozen=True)
-class Progress:
+class RunProgress:
     """How far the run is; sent once per degree at most.
 
     Attributes:
@@ -196,7 +196,7 @@ class RunCompleted:
     doubtful: int = 0
 
     @property
-    def answer(self) -> Answer:
+    def answer(self) -> RunAssessment:
         """The run in one word, and what caused it."""
         return answer(self.findings, "" if self.figures is not None else self.problem or "no circle")
 
@@ -347,7 +347,7 @@ Event: TypeAlias = (
     | RunStarted
     | SamplesRecorded
     | FeedInSeen
-    | Progress
+    | RunProgress
     | RunCompleted
     | RunRestored
     | FeedInMissed

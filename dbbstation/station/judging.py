@@ -17,7 +17,7 @@ from dbbstation.trace.analysis import figures
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.files.recordings.entries import Program
+    from dbbstation.files.recordings.entries import CommandedProgram
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Direction
@@ -54,7 +54,7 @@ class RunJudge:
     def __init__(
         self,
         writer: SessionWriter,
-        programs: Mapping[tuple[str, Direction], Program] | None = None,
+        programs: Mapping[tuple[str, Direction], CommandedProgram] | None = None,
         model: IdentifiedModel | None = None,
     ) -> None:
         self._writer = writer

@@ -33,7 +33,7 @@ _STEP_S = 2e-6
 """Run files have microseconds; two samples must not round to the same one."""
 
 
-class Recorded(Protocol):
+class RunRecall(Protocol):
     """Gives back what was recorded of the run that goes on."""
 
     def __call__(self, run: RunId, behind: Sequence[Sample], /) -> Recording:

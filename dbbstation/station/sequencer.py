@@ -12,7 +12,19 @@ from dbbstation.plan.sampling import sampling
 from dbbstation.quality.finding import against_limit
 from dbbstation.quality.held import HeldLength
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, Command, GoTo, Judge, Note, Pause, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.commands import (
+    Accept,
+    AddNote,
+    Command,
+    GoTo,
+    Judge,
+    Pause,
+    Reject,
+    Repeat,
+    Resume,
+    Skip,
+    Start,
+)
 from dbbstation.station.detector import CircleWatch, EdgeDetector, Patience
 from dbbstation.station.instructions import instructions
 from dbbstation.station.run_record import RunRecord, unrecorded
@@ -22,8 +34,8 @@ from dbbstation.station.states import (
     RECORDING,
     TRANSITIONS,
     VERDICT,
-    Cause,
     State,
+    Trigger,
     commands_allowed,
 )
 from dbbstation.trace.reachable import Reachable
@@ -37,7 +49,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import Plan
     from dbbstation.quality.finding import Finding
     from dbbstation.station.events import Event, RunId, Sample
-    from dbbstation.station.run_record import Recorded
+    from dbbstation.station.run_record import RunRecall
     from dbbstation.station.schedule import Schedule
     from dbbstation.trace.analysis import CircleFigures
     from dbbstation.trace.recording import Recording
@@ -84,7 +96,7 @@ class Sequencer:
         self,
         plan: Plan,
         schedule: Schedule,
-        recorded: Recorded,
+        recorded: RunRecall,
         *,
         programs: Mapping[tuple[str, Direction], str] | None = None,
         patience: Patience | None = None,
@@ -138,7 +150,7 @@ class Sequencer:
                 self._to_next(cause)
             case GoTo() | Judge():
                 self._reorder(command)
-            case Note():
+            case AddNote():
                 self._flush()
                 self._out.append(events.Noted(command.text, command.ambient_temp_c))
             case Pause():
@@ -164,7 +176,7 @@ class Sequencer:
             return []
         self._flush()
         self._out.append(events.Fault(error, self._interrupted()))
-        self._move(Cause.FAILED)
+        self._move(Trigger.FAILED)
         return self._told()
 
     # Between runs.
@@ -178,11 +190,11 @@ class Sequencer:
         if following is None:
             missing = tuple(task.text for task in self.schedule.open)
             self._out.append(events.SessionFinished(self.schedule.accepted, missing))
-            self._move(Cause.NONE_LEFT)
+            self._move(Trigger.NONE_LEFT)
             return
         self._announce(following.run, following.number, put_up=following.put_up)
         self._watch = CircleWatch(self._circle(), waits_for_feed_in=True)
-        self._move(Cause.RUN_LEFT)
+        self._move(Trigger.RUN_LEFT)
 
     def _announce(self, run: RunId, number: int, *, put_up: bool) -> None:
         self._run = run
@@ -210,9 +222,9 @@ class Sequencer:
         self._announce(run, self.schedule.number_of(run), put_up=False)
         self._out += [events.RunRestored(run, waiting.samples), waiting.completed]
         self._wrong = _found_wrong(waiting.completed)
-        self._move(Cause.CIRCLE_MISSING if waiting.completed.figures is None else Cause.CIRCLE_FOUND)
+        self._move(Trigger.CIRCLE_MISSING if waiting.completed.figures is None else Trigger.CIRCLE_FOUND)
 
-    def _to_next(self, cause: Cause) -> None:
+    def _to_next(self, cause: Trigger) -> None:
         self._record = None
         self._move(cause)
         self._announce_next()
@@ -224,14 +236,14 @@ class Sequencer:
         self._edges = EdgeDetector(self._circle())
         self._watch = CircleWatch(self._circle(), waits_for_feed_in=False)
         self._waiting_since_s = None
-        self._move(Cause.START)
+        self._move(Trigger.START)
 
     def _accept(self, command: Accept) -> None:
         run = self._announced()
         self.schedule.accept(run)
         reason = command.reason or (f"accepted although {self._wrong}" if self._wrong else "")
         self._out.append(events.RunAccepted(run, reason))
-        self._to_next(Cause.ACCEPT)
+        self._to_next(Trigger.ACCEPT)
 
     def _throw_out(self, command: Repeat | Reject) -> None:
         run = self._announced()
@@ -271,9 +283,9 @@ class Sequencer:
         self._flush()
         left = len(self.schedule.open)
         self._out.append(events.SessionStopped(self.schedule.accepted, left, self._interrupted()))
-        self._move(Cause.QUIT)
+        self._move(Trigger.QUIT)
 
-    def _why_not(self, cause: Cause) -> str:
+    def _why_not(self, cause: Trigger) -> str:
         possible = ", ".join(sorted(COMMAND_CAUSES[kind] for kind in commands_allowed(self.state)))
         return f"`{cause}` means nothing while {self.state}; possible: {possible or 'nothing any more'}"
 
@@ -300,15 +312,15 @@ class Sequencer:
         elif self.state is State.TURNING and outside is True:
             self._flush()
             self._record.fed_out_s = sample.t_s
-            self._move(Cause.FED_OUT)
+            self._move(Trigger.FED_OUT)
         elif self.state is State.LEAVING and self._record.left(sample.t_s):
-            self._move(Cause.CIRCLE_FOUND if self._complete() else Cause.CIRCLE_MISSING)
+            self._move(Trigger.CIRCLE_FOUND if self._complete() else Trigger.CIRCLE_MISSING)
         elif self.state is State.TURNING and self._record.stands(sample):
             self._complete(problem=self._record.standing)
-            self._move(Cause.LENGTH_GONE)
+            self._move(Trigger.LENGTH_GONE)
         elif reading.gone and sample.phi_deg is not None and 0.0 <= sample.phi_deg <= FULL_TURN_DEG:
             self._complete(problem=_length_gone(reading, sample.phi_deg))
-            self._move(Cause.LENGTH_GONE)
+            self._move(Trigger.LENGTH_GONE)
         else:
             self._check_patience(reading)
         self._tell_progress()
@@ -335,14 +347,14 @@ class Sequencer:
         self._record = RunRecord(run, self._circle(), reading.t_s, held=self._held)
         self._waiting_since_s = reading.t_s
         self._out.append(events.RunStarted(run, self._programs.get((run.test, run.direction), "")))
-        self._move(Cause.BAR_OUTSIDE)
+        self._move(Trigger.BAR_OUTSIDE)
 
     def _fed_in(self, record: RunRecord, t_s: float, now_s: float) -> None:
         self._flush()
         record.fed_in_s = t_s
         self._waiting_since_s, self._told_deg = now_s, 0.0
         self._out.append(events.FeedInSeen(record.run, t_s))
-        self._move(Cause.FED_IN)
+        self._move(Trigger.FED_IN)
 
     def _tell_progress(self) -> None:
         if self.state is not State.TURNING or self._record is None:
@@ -351,7 +363,7 @@ class Sequencer:
         if swept >= self._told_deg + 1.0:
             self._told_deg = swept
             self._flush()
-            self._out.append(events.Progress(self._record.run, swept, self._record.circle.swept_deg))
+            self._out.append(events.RunProgress(self._record.run, swept, self._record.circle.swept_deg))
 
     def _look_for_missed(self, reading: Reading) -> None:
         """Say so where the machine is on its circle and nobody records it."""
@@ -379,10 +391,10 @@ class Sequencer:
         if self.state is State.ARMED:
             self._flush()
             self._out.append(events.RunLate(self._announced(), problem))
-            self._to_next(Cause.LATE)
+            self._to_next(Trigger.LATE)
         else:
             self._complete(problem=problem)
-            self._move(Cause.LATE)
+            self._move(Trigger.LATE)
 
     def _complete(self, problem: str = "") -> bool:
         """End the recording, for a reason other than its circle where one is given; return whether it holds one."""
@@ -419,7 +431,7 @@ class Sequencer:
     def _interrupted(self) -> RunId | None:
         return self._run if self.state in RECORDING else None
 
-    def _move(self, cause: Cause) -> None:
+    def _move(self, cause: Trigger) -> None:
         self.state = TRANSITIONS[self.state][cause]
         self._out.append(events.StateChanged(self.state, commands_allowed(self.state)))
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from dbbstation.station.commands import (
     Accept,
+    AddNote,
     Command,
     GoTo,
     Judge,
-    Note,
     Pause,
     Quit,
     Reject,
@@ -42,7 +42,7 @@ class State(StrEnum):
     FAULTED = "stopped by a fault"
 
 
-class Cause(StrEnum):
+class Trigger(StrEnum):
     """Why a state changes: commands first, then what the readings, the schedule or the equipment bring."""
 
     START = "start"
@@ -69,37 +69,39 @@ class Cause(StrEnum):
     FAILED = "instrument or storage failed"
 
 
-_ALWAYS = {Cause.QUIT: State.STOPPED, Cause.FAILED: State.FAULTED}
-_GIVEN_UP = {Cause.REPEAT: State.BETWEEN, Cause.REJECT: State.BETWEEN}
-_OTHER_RUN = {Cause.GO_TO: State.BETWEEN, Cause.JUDGE: State.BETWEEN, Cause.PAUSE: State.PAUSED}
+_ALWAYS = {Trigger.QUIT: State.STOPPED, Trigger.FAILED: State.FAULTED}
+_GIVEN_UP = {Trigger.REPEAT: State.BETWEEN, Trigger.REJECT: State.BETWEEN}
+_OTHER_RUN = {Trigger.GO_TO: State.BETWEEN, Trigger.JUDGE: State.BETWEEN, Trigger.PAUSE: State.PAUSED}
 
-_WAYS: Mapping[State, Mapping[Cause, State]] = MappingProxyType(
+_WAYS: Mapping[State, Mapping[Trigger, State]] = MappingProxyType(
     {
         State.BETWEEN: {
-            Cause.RUN_LEFT: State.ANNOUNCED,
-            Cause.NONE_LEFT: State.FINISHED,
+            Trigger.RUN_LEFT: State.ANNOUNCED,
+            Trigger.NONE_LEFT: State.FINISHED,
             # A run that was recorded before, and was not judged.
-            Cause.CIRCLE_FOUND: State.COMPLETE,
-            Cause.CIRCLE_MISSING: State.FLAWED,
+            Trigger.CIRCLE_FOUND: State.COMPLETE,
+            Trigger.CIRCLE_MISSING: State.FLAWED,
         }
         | _ALWAYS,
-        State.ANNOUNCED: {Cause.START: State.ARMED, Cause.SKIP: State.BETWEEN} | _OTHER_RUN | _ALWAYS,
+        State.ANNOUNCED: {Trigger.START: State.ARMED, Trigger.SKIP: State.BETWEEN} | _OTHER_RUN | _ALWAYS,
         State.ARMED: {
-            Cause.BAR_OUTSIDE: State.DWELLING,
-            Cause.REPEAT: State.BETWEEN,
-            Cause.SKIP: State.BETWEEN,
-            Cause.LATE: State.BETWEEN,
+            Trigger.BAR_OUTSIDE: State.DWELLING,
+            Trigger.REPEAT: State.BETWEEN,
+            Trigger.SKIP: State.BETWEEN,
+            Trigger.LATE: State.BETWEEN,
         }
         | _OTHER_RUN
         | _ALWAYS,
-        State.DWELLING: {Cause.FED_IN: State.TURNING, Cause.LATE: State.FLAWED} | _GIVEN_UP | _ALWAYS,
-        State.TURNING: {Cause.FED_OUT: State.LEAVING, Cause.LENGTH_GONE: State.FLAWED, Cause.LATE: State.FLAWED}
+        State.DWELLING: {Trigger.FED_IN: State.TURNING, Trigger.LATE: State.FLAWED} | _GIVEN_UP | _ALWAYS,
+        State.TURNING: {Trigger.FED_OUT: State.LEAVING, Trigger.LENGTH_GONE: State.FLAWED, Trigger.LATE: State.FLAWED}
         | _GIVEN_UP
         | _ALWAYS,
-        State.LEAVING: {Cause.CIRCLE_FOUND: State.COMPLETE, Cause.CIRCLE_MISSING: State.FLAWED} | _GIVEN_UP | _ALWAYS,
-        State.COMPLETE: {Cause.ACCEPT: State.BETWEEN} | _GIVEN_UP | _ALWAYS,
+        State.LEAVING: {Trigger.CIRCLE_FOUND: State.COMPLETE, Trigger.CIRCLE_MISSING: State.FLAWED}
+        | _GIVEN_UP
+        | _ALWAYS,
+        State.COMPLETE: {Trigger.ACCEPT: State.BETWEEN} | _GIVEN_UP | _ALWAYS,
         State.FLAWED: _GIVEN_UP | _ALWAYS,
-        State.PAUSED: {Cause.RESUME: State.BETWEEN} | _ALWAYS,
+        State.PAUSED: {Trigger.RESUME: State.BETWEEN} | _ALWAYS,
         State.FINISHED: {},
         State.STOPPED: {},
         State.FAULTED: {},
@@ -107,8 +109,8 @@ _WAYS: Mapping[State, Mapping[Cause, State]] = MappingProxyType(
 )
 """Where causes lead that change the state."""
 
-TRANSITIONS: Mapping[State, Mapping[Cause, State]] = MappingProxyType(
-    {state: {**ways, Cause.NOTE: state} if ways else ways for state, ways in _WAYS.items()}
+TRANSITIONS: Mapping[State, Mapping[Trigger, State]] = MappingProxyType(
+    {state: {**ways, Trigger.NOTE: state} if ways else ways for state, ways in _WAYS.items()}
 )
 """To which state a cause leads from each state; what does not stand here does not happen. A note changes nothing."""
 
@@ -121,19 +123,19 @@ VERDICT = frozenset({State.COMPLETE, State.FLAWED})
 FINAL = frozenset(state for state, ways in TRANSITIONS.items() if not ways)
 """States that nothing leads out of."""
 
-COMMAND_CAUSES: Mapping[type[Command], Cause] = MappingProxyType(
+COMMAND_CAUSES: Mapping[type[Command], Trigger] = MappingProxyType(
     {
-        Start: Cause.START,
-        Accept: Cause.ACCEPT,
-        Repeat: Cause.REPEAT,
-        Reject: Cause.REJECT,
-        Skip: Cause.SKIP,
-        Quit: Cause.QUIT,
-        GoTo: Cause.GO_TO,
-        Judge: Cause.JUDGE,
-        Note: Cause.NOTE,
-        Pause: Cause.PAUSE,
-        Resume: Cause.RESUME,
+        Start: Trigger.START,
+        Accept: Trigger.ACCEPT,
+        Repeat: Trigger.REPEAT,
+        Reject: Trigger.REJECT,
+        Skip: Trigger.SKIP,
+        Quit: Trigger.QUIT,
+        GoTo: Trigger.GO_TO,
+        Judge: Trigger.JUDGE,
+        AddNote: Trigger.NOTE,
+        Pause: Trigger.PAUSE,
+        Resume: Trigger.RESUME,
     }
 )
 """What each command is in the table."""

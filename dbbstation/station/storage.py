@@ -18,7 +18,7 @@ from dbbstation.trace.recording import Recording
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from dbbstation.files.recordings.entries import Program, ReadBy, RunEntry
+    from dbbstation.files.recordings.entries import CommandedProgram, ReadBy, RunEntry
     from dbbstation.files.recordings.journal import RunWriter
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.plan.circle import Direction
@@ -47,7 +47,7 @@ class Storage:
         self,
         writer: SessionWriter,
         now: Callable[[], datetime] | None = None,
-        programs: Mapping[tuple[str, Direction], Program] | None = None,
+        programs: Mapping[tuple[str, Direction], CommandedProgram] | None = None,
         unreadable: Callable[[], Mapping[str, int]] = dict,
         *,
         asked: bool = False,

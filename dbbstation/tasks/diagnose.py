@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.diagnosis.findings import Diagnosis
-    from dbbstation.diagnosis.unexplained_model import Kept as KeptCurve
+    from dbbstation.diagnosis.unexplained_model import JointFitWithCurve
     from dbbstation.results.diagnosis import DiagnosisResult
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.load import Recorded, Sessions
@@ -179,7 +179,7 @@ def _diagnosed(
     return Diagnosed(recorded, found, lacking)
 
 
-def _kept(found: Diagnosis, telling: Telling) -> KeptCurve | None:
+def _kept(found: Diagnosis, telling: Telling) -> JointFitWithCurve | None:
     """Unmodelled effect to be kept in the model; None where it cannot be kept, with a note of the reason."""
     try:
         return keeping(found.unexplained.curve, found.after)

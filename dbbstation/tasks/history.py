@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_known
-from dbbstation.files.kept import Kept, Noted, Stamp, stamp_of
+from dbbstation.files.kept import Kept, NotedAnchor, Stamp, stamp_of
 from dbbstation.files.recordings.anchors import SHORTEST, links_of
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session_name import SESSION_FILE
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.history.trend import Asked, MachineHistory
+    from dbbstation.history.trend import MachineHistory, TrendOptions
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Historied:
 
 def load_history(
     folder: Path,
-    asked: Asked,
+    asked: TrendOptions,
     source_files: Sequence[Path] = (),
     *,
     rebuild: bool = False,
@@ -108,7 +108,7 @@ def _seal_note(kept: Kept, folder: Path, one: SessionFigures, moment: datetime) 
     noted = kept.noted(one.name)
     if noted is None or noted.anchor == one.anchor or noted.anchor in links_of(folder):
         if one.anchor and (noted is None or noted.anchor != one.anchor):
-            kept.note(one.name, Noted(one.anchor, moment.isoformat(timespec="seconds")))
+            kept.note(one.name, NotedAnchor(one.anchor, moment.isoformat(timespec="seconds")))
         return ""
     before = f"one ended with {noted.anchor[:SHORTEST]} on {noted.at[:10]}"
     if not one.anchor:
@@ -323,7 +323,7 @@ def _once(sessions: Iterable[SessionFigures]) -> tuple[list[SessionFigures], lis
     return list(first.values()), notes
 
 
-def _check_tests(folder: Path, sessions: Sequence[SessionFigures], asked: Asked) -> None:
+def _check_tests(folder: Path, sessions: Sequence[SessionFigures], asked: TrendOptions) -> None:
     known = {run.test for one in sessions for run in one.runs}
     unknown = [name for name in (*asked.tests, *asked.exclude) if name not in known]
     if unknown:

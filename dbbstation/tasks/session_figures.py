@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from dbbstation.circles.budget import budgets
-from dbbstation.circles.quantity import Quantity
+from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book
@@ -69,7 +69,7 @@ def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
     analysis = one.analysis
     if analysis is None:
         raise ValueError("a run without a circle has no figures")
-    known = budgets(analysis, one.known, (Quantity.X, Quantity.Y))
+    known = budgets(analysis, one.known, (BudgetQuantity.X, BudgetQuantity.Y))
     x_mm, y_mm = analysis.centre_mm
     g, centre, radial = (
         tolerated.sizes[figure]
@@ -81,8 +81,8 @@ def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
         circle=_in_words(analysis.raw.circle),
         figures=(
             Figure("G", g.um, g.known_um),
-            Figure("X", 1e3 * x_mm, known[Quantity.X].known_um),
-            Figure("Y", 1e3 * y_mm, known[Quantity.Y].known_um),
+            Figure("X", 1e3 * x_mm, known[BudgetQuantity.X].known_um),
+            Figure("Y", 1e3 * y_mm, known[BudgetQuantity.Y].known_um),
             Figure("R", analysis.mean_radial_error_um, radial.known_um),
             Figure("C", centre.um, centre.known_um),
         ),

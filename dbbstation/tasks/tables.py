@@ -42,7 +42,7 @@ MOST_RESETS = 30
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class TableOptions:
     """What is asked of the files.
 
     Attributes:
@@ -128,7 +128,7 @@ def stated_uncertainties(text: str) -> dict[str, float]:
     return found
 
 
-def load_tables(paths: Sequence[Path], asked: Asked) -> Tabulated:
+def load_tables(paths: Sequence[Path], asked: TableOptions) -> Tabulated:
     """Read tables and put them together.
 
     Raises:
@@ -182,7 +182,7 @@ def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
     return faults
 
 
-def _faults_of_scale(files: Sequence[TableFile], asked: Asked) -> list[Problem]:
+def _faults_of_scale(files: Sequence[TableFile], asked: TableOptions) -> list[Problem]:
     """What is wrong where measured and simulated values cannot be of one quantity."""
     greatest = {name: _greatest(files, name) for name in (asked.measured, asked.simulated)}
     less, more = min(greatest, key=lambda name: greatest[name]), max(greatest, key=lambda name: greatest[name])
@@ -219,7 +219,7 @@ def load_sources(files: Sequence[Path], table: Table) -> tuple[list[TableSource]
 class _Reader:
     """Puts files together, column by column."""
 
-    def __init__(self, files: Sequence[TableFile], asked: Asked, unit: str) -> None:
+    def __init__(self, files: Sequence[TableFile], asked: TableOptions, unit: str) -> None:
         self._files, self._asked, self._unit = files, asked, unit
         self._notes: list[str] = []
         self._names = [name for name in files[0].names if all(name in file.names for file in files)]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Logged = Mapping[str, NDArray[np.float64]]
 
 
-class Kind(StrEnum):
+class ColumnKind(StrEnum):
     """What a column is, and with that who reads it."""
 
     TIME = "time"
@@ -52,7 +52,7 @@ class Column:
     """
 
     name: str
-    kind: Kind
+    kind: ColumnKind
     unit: str
     meaning: str
     decimals: int
@@ -65,23 +65,25 @@ _SENSORS = ("bar", "jig", "machine", *(f"strut{i}" for i in range(1, 7)))
 _PULL = "positive when it pulls the platform towards the base"
 
 _DECLARED = (
-    Column("t_s", Kind.TIME, "s", "host time since the first sample, rising", 6, 1e6),
-    Column("t_uncertainty_s", Kind.OTHER, "s", "standard uncertainty of t_s, of an instrument that is asked", 6, 1e3),
-    Column("length_mm", Kind.LENGTH, "mm", "distance between the two ball centres, raw", 6, 1e4),
+    Column("t_s", ColumnKind.TIME, "s", "host time since the first sample, rising", 6, 1e6),
+    Column(
+        "t_uncertainty_s", ColumnKind.OTHER, "s", "standard uncertainty of t_s, of an instrument that is asked", 6, 1e3
+    ),
+    Column("length_mm", ColumnKind.LENGTH, "mm", "distance between the two ball centres, raw", 6, 1e4),
     Column(
         "theta_deg",
-        Kind.ANGLE,
+        ColumnKind.ANGLE,
         "deg",
         "commanded angle from +X towards +Y, for both directions",
         6,
         _DEGREES_OF_TURNS,
     ),
     *(
-        Column(f"{one}_temp_c", Kind.TEMPERATURE, "degC", f"temperature of the {one}", 3, 150.0, one)
+        Column(f"{one}_temp_c", ColumnKind.TEMPERATURE, "degC", f"temperature of the {one}", 3, 150.0, one)
         for one in _SENSORS
     ),
     *(
-        Column(f"motor{i}_current_a", Kind.CURRENT, "A", f"current of motor {i}, {_PULL}", 5, 1e3, f"motor{i}")
+        Column(f"motor{i}_current_a", ColumnKind.CURRENT, "A", f"current of motor {i}, {_PULL}", 5, 1e3, f"motor{i}")
         for i in range(1, 7)
     ),
 )
@@ -113,15 +115,17 @@ class WithLogged:
     @property
     def temperature_degc(self) -> dict[str, NDArray[np.float64]]:
         """Logged temperatures by sensor (`bar`, `jig`, `machine`, `strut1` ... `strut6`), shape (n,) each [degC]."""
-        return {COLUMNS[name].of: values for name, values in self.logged.items() if _is(name, Kind.TEMPERATURE)}
+        return {COLUMNS[name].of: values for name, values in self.logged.items() if _is(name, ColumnKind.TEMPERATURE)}
 
     @property
     def motor_current_a(self) -> NDArray[np.float64] | None:
         """Logged currents of the six motors, NaN for one that was not logged, shape (n, 6) [A]; None where none was."""
-        there = next((values for name, values in self.logged.items() if _is(name, Kind.CURRENT)), None)
+        there = next((values for name, values in self.logged.items() if _is(name, ColumnKind.CURRENT)), None)
         if there is None:
             return None
-        return np.column_stack([self.logged.get(name, np.full(len(there), np.nan)) for name in _named(Kind.CURRENT)])
+        return np.column_stack(
+            [self.logged.get(name, np.full(len(there), np.nan)) for name in _named(ColumnKind.CURRENT)]
+        )
 
 
 def each(logged: Logged, change: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Logged:
@@ -131,19 +135,19 @@ def each(logged: Logged, change: Callable[[NDArray[np.float64]], NDArray[np.floa
 
 def temperatures(by_sensor: Logged) -> Logged:
     """Return temperatures by sensor, shape (n,) each [degC], as columns."""
-    names = {COLUMNS[name].of: name for name in _named(Kind.TEMPERATURE)}
+    names = {COLUMNS[name].of: name for name in _named(ColumnKind.TEMPERATURE)}
     return {names[sensor]: values for sensor, values in by_sensor.items()}
 
 
 def currents(current_a: NDArray[np.float64]) -> Logged:
     """Return the currents of the six motors, shape (n, 6) [A], as columns."""
-    return dict(zip(_named(Kind.CURRENT), np.ascontiguousarray(current_a.T), strict=True))
+    return dict(zip(_named(ColumnKind.CURRENT), np.ascontiguousarray(current_a.T), strict=True))
 
 
-def _is(name: str, kind: Kind) -> bool:
+def _is(name: str, kind: ColumnKind) -> bool:
     return name in COLUMNS and COLUMNS[name].kind is kind
 
 
-def _named(kind: Kind) -> list[str]:
+def _named(kind: ColumnKind) -> list[str]:
     """Names of the columns of a kind, in the order of their declaration."""
     return [column.name for column in _DECLARED if column.kind is kind]

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from textual.content import Content
 
 from dbbstation.errors import StationError
-from dbbstation.service.after import Step
 from dbbstation.service.background import Background
 from dbbstation.service.former_sessions import before_and_now
-from dbbstation.service.work import Progress
+from dbbstation.service.job import SessionTask
+from dbbstation.service.work import WorkProgress
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_lines import HEADING, in_force_line, test_line, way_back_lines, worst_lines
 from dbbstation.tui.asking import ChooseQuestion
@@ -74,7 +74,7 @@ class AcceptanceScreen(RowScreen):
         if action == "former":
             return self._after.busy is None and self._found is not None and bool(self._found.formers)
         if action == "cancel":
-            return self._after.busy is Step.ACCEPTANCE
+            return self._after.busy is SessionTask.ACCEPTANCE
         return super().check_action(action, parameters)
 
     def chosen_another(self) -> None:
@@ -123,7 +123,7 @@ class AcceptanceScreen(RowScreen):
     def _draw(self) -> None:
         if not self.stands:
             return
-        answer = self._after.results[Step.ACCEPTANCE].answer
+        answer = self._after.results[SessionTask.ACCEPTANCE].answer
         sentence, wrong = self._sentence()
         self.say(sentence, wrong=wrong)
         tests: list[dict[str, Any]] = answer.get("tolerances_by_test", [])
@@ -139,7 +139,7 @@ class AcceptanceScreen(RowScreen):
 
     def _sentence(self) -> tuple[str, bool]:
         """Return the sentence at the top, and whether it tells of something wrong."""
-        result = self._after.results[Step.ACCEPTANCE]
+        result = self._after.results[SessionTask.ACCEPTANCE]
         if self._failure:
             return self._failure, True
         if self._after.former is not None and result.progress is not None:
@@ -154,12 +154,12 @@ class AcceptanceScreen(RowScreen):
     def _compared(result: Result) -> tuple[str, bool]:
         """Return what is to be said of the comparison."""
         match result.progress:
-            case Progress.DONE:
+            case WorkProgress.DONE:
                 kind = result.answer["verdict"]["kind"]
                 return texts.ACCEPTANCE_VERDICT[kind], kind == "exceeded"
-            case Progress.FAILED:
+            case WorkProgress.FAILED:
                 return result.failure, True
-            case Progress.CANCELLED:
+            case WorkProgress.CANCELLED:
                 return texts.ACCEPTANCE_CANCELLED, False
         stage = result.stage or texts.STEP_BEGINS
         return texts.ACCEPTANCE_BUSY.format(stage=stage, passed=duration(result.passed_s)), False
@@ -177,5 +177,5 @@ class AcceptanceScreen(RowScreen):
             told.append(Content.styled(texts.RUN_BY_NOW.format(by=in_force_line(now)), style))
         if after.former is not None:
             told += [Content(text) for text in way_back_lines(after.former, after.kept)]
-        path = after.results[Step.ACCEPTANCE].path
+        path = after.results[SessionTask.ACCEPTANCE].path
         return [*told, *([] if path is None else [Content.styled(str(path), "bold")])]

@@ -20,7 +20,7 @@ from dbbstation.service.messages import Message, Weight
 from dbbstation.service.operated import JobAnswer
 from dbbstation.service.shop_temperature import note_temperature, shop_degc
 from dbbstation.service.verdicts import give_verdict
-from dbbstation.station.commands import Command, Judge, Note, Quit
+from dbbstation.station.commands import AddNote, Command, Judge, Quit
 from dbbstation.station.events import Noted
 from dbbstation.station.states import FINAL, RECORDING, VERDICT, State
 from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
@@ -475,8 +475,8 @@ class StationApp(App[None]):
     def _note_temperature(self, degc: float, then: Callable[[], None]) -> None:
         """Note a temperature [degC] by the sequence, or in the session's file where the sequence is over."""
         runner, folder = self._runner, Path(self.board.session)
-        if runner is None or Note in self.board.allowed:
-            self.send(Note(ambient_temp_c=degc))
+        if runner is None or AddNote in self.board.allowed:
+            self.send(AddNote(ambient_temp_c=degc))
             then()
             return
 

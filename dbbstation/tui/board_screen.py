@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from dbbstation.quality.answer import Word
+from dbbstation.quality.answer import Advice
 from dbbstation.station.commands import Accept, Command, Pause, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.states import RECORDING, VERDICT
 from dbbstation.tui.explained import ExplainedScreen
@@ -114,13 +114,13 @@ class RunScreen(BoardScreen):
     def action_next(self) -> None:
         """Do what the word on the run says: accept it, or measure it again. Nothing that is wrong is accepted so."""
         completed = self.desk.board.completed
-        again = completed is None or completed.answer.word is Word.REPEAT
+        again = completed is None or completed.answer.word is Advice.REPEAT
         self.desk.send(COMMANDS["repeat" if again else "accept"])
 
     def action_accept(self) -> None:
         """Accept the run; one with something wrong for a reason only."""
         completed = self.desk.board.completed
-        if completed is None or completed.answer.word is not Word.REPEAT:
+        if completed is None or completed.answer.word is not Advice.REPEAT:
             self.desk.send(Accept())
             return
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from dbbstation.service.board import Verdict
+from dbbstation.service.board import RunDecision
 from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
@@ -30,14 +30,16 @@ class FiguresPanel(Panel):
         wide = self.content_size.width >= _WIDE
         centre = f"{'X':>7}{'Y':>7}" if wide else ""
         titles = f"{'figures [µm]':{_NAME}}{centre}{'centre':>{_DISTANCE[wide]}}{'mean':>{_MEAN[wide]}}{'circul.':>8}"
-        rows = [_row(result, board.verdicts.get(result.run.label, Verdict.NONE), wide=wide) for result in board.results]
+        rows = [
+            _row(result, board.verdicts.get(result.run.label, RunDecision.NONE), wide=wide) for result in board.results
+        ]
         empty = Content.styled("of the finished runs stand here", "dim")
         return lines(Content.styled(titles, "dim"), *(rows or [empty]))
 
 
-def _row(completed: RunCompleted, verdict: Verdict, *, wide: bool) -> Content:
+def _row(completed: RunCompleted, verdict: RunDecision, *, wide: bool) -> Content:
     figures = completed.figures
-    rejected = verdict is Verdict.REJECTED
+    rejected = verdict is RunDecision.REJECTED
     name = f"{_short(f'x {completed.run.label}' if rejected else completed.run.label):{_NAME}}"
     if figures is None:
         return Content(f"{name}no circle")

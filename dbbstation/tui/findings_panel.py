@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from dbbstation.quality.answer import Word, rank
-from dbbstation.quality.finding import Verdict, against_limit
+from dbbstation.quality.answer import Advice, rank
+from dbbstation.quality.finding import FindingVerdict, against_limit
 from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
@@ -19,9 +19,9 @@ _ROW = 37
 """Columns of a row where the panel has no size yet: as many as the right side has on the smallest terminal."""
 
 STYLES = {
-    Verdict.GOOD: "$text-success",
-    Verdict.CANNOT_TELL: "$text-warning",
-    Verdict.WRONG: "bold $text-error",
+    FindingVerdict.GOOD: "$text-success",
+    FindingVerdict.CANNOT_TELL: "$text-warning",
+    FindingVerdict.WRONG: "bold $text-error",
 }
 """Green, amber, red."""
 
@@ -29,9 +29,9 @@ _ORDER = list(reversed(STYLES))
 """What is wrong stands first: it must not be what the screen has no room for."""
 
 WORD_STYLES = {
-    Word.GOOD: "bold reverse $text-success",
-    Word.CANNOT_TELL: "bold reverse $text-warning",
-    Word.REPEAT: "bold reverse $text-error",
+    Advice.GOOD: "bold reverse $text-success",
+    Advice.CANNOT_TELL: "bold reverse $text-warning",
+    Advice.REPEAT: "bold reverse $text-error",
 }
 """The word on a run stands out whatever the colours."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from textual.content import Content
 from textual.widgets import Footer
 
-from dbbstation.quality.answer import Word
+from dbbstation.quality.answer import Advice
 from dbbstation.station.states import RECORDING, State
 from dbbstation.tui.block_letters import HIGH, block_rows, largest
 from dbbstation.tui.board_screen import RunScreen
@@ -30,9 +30,9 @@ NO_LENGTH = "---.----"
 _WIDEST = "hands off"
 
 LARGE_STYLES = {
-    Word.GOOD: "$text-success",
-    Word.CANNOT_TELL: "$text-warning",
-    Word.REPEAT: "bold $text-error",
+    Advice.GOOD: "$text-success",
+    Advice.CANNOT_TELL: "$text-warning",
+    Advice.REPEAT: "bold $text-error",
 }
 """Colours of the word on a run, which the letters say as well."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from textual.content import Content
 
-from dbbstation.service.choice import Part
+from dbbstation.service.choice import SetUpPart
 from dbbstation.service.order import Gate, Order
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.tui import texts
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
-    from dbbstation.service.port_probe import Answer
-    from dbbstation.tui.reception import Reception
+    from dbbstation.service.port_probe import ProbeOutcome
+    from dbbstation.tui.reception import StationDesk
 
 _Kind = TypeVar("_Kind", Order, Gate)
 
-ROWS = tuple(Part)
-_OF_LINE = (Part.INSTRUMENT, Part.PORT)
+ROWS = tuple(SetUpPart)
+_OF_LINE = (SetUpPart.INSTRUMENT, SetUpPart.PORT)
 _NAME = 15
 
 
@@ -53,7 +53,7 @@ class NewScreen(RowScreen):
         ("escape,q", "back", "Back"),
     ]
 
-    def __init__(self, reception: Reception, front: Front, choice: Choice) -> None:
+    def __init__(self, reception: StationDesk, front: Front, choice: Choice) -> None:
         super().__init__()
         self.choice = choice
         self._reception, self._front = reception, front
@@ -88,11 +88,11 @@ class NewScreen(RowScreen):
     def action_empty(self) -> None:
         """Take back what stands in the row."""
         part = ROWS[self.at]
-        if part is Part.INSTRUMENT:
+        if part is SetUpPart.INSTRUMENT:
             self._line(instrument="", profile="", zero_mm=None)
-        elif part is Part.PORT:
+        elif part is SetUpPart.PORT:
             self._line(port="", baud=None)
-        elif part is Part.BAR:
+        elif part is SetUpPart.BAR:
             self._take(bar=None, bar_waiver="")
         elif part in _EMPTY and part not in self._kept():
             self._take(**{_FIELDS[part]: _EMPTY[part]})
@@ -103,26 +103,26 @@ class NewScreen(RowScreen):
         if part in self._kept():
             return
         match part:
-            case Part.MACHINE | Part.PLAN:
+            case SetUpPart.MACHINE | SetUpPart.PLAN:
                 self._choose_file(part)
-            case Part.BAR:
+            case SetUpPart.BAR:
                 self._choose_bar()
-            case Part.INSTRUMENT:
+            case SetUpPart.INSTRUMENT:
                 self._choose_instrument()
-            case Part.PORT:
+            case SetUpPart.PORT:
                 self._choose_port()
-            case Part.ORDER:
+            case SetUpPart.ORDER:
                 self._take(order=_next(self.choice.order))
-            case Part.GATE:
+            case SetUpPart.GATE:
                 self._take(gate=_next(self.choice.gate))
             case _:
                 self._type(part, str(getattr(self.choice, _FIELDS[part]) or ""), lambda text: self._typed(part, text))
 
-    def _kept(self) -> frozenset[Part]:
+    def _kept(self) -> frozenset[SetUpPart]:
         """Rows that a session which exists has by itself."""
         return frozenset(ROWS) - frozenset(_OF_LINE) if self.choice.goes_on else frozenset()
 
-    def _choose_file(self, part: Part) -> None:
+    def _choose_file(self, part: SetUpPart) -> None:
         files = self._front.files(part)
         labels = [*(f"{path.name:28} {path.parent}" for path in files), texts.TYPE_ANOTHER]
         now = getattr(self.choice, _FIELDS[part])
@@ -138,7 +138,7 @@ class NewScreen(RowScreen):
         self._ask(part, labels, files.index(now) if now in files else 0, answered)
 
     def _choose_bar(self) -> None:
-        files = self._front.files(Part.BAR)
+        files = self._front.files(SetUpPart.BAR)
         labels = [*(f"{path.name:28} {path.parent}" for path in files), texts.MEASURE_BAR, texts.TYPE_REASON]
 
         def answered(at: int | None) -> None:
@@ -149,9 +149,9 @@ class NewScreen(RowScreen):
             elif at == len(files):
                 self._measure_bar()
             else:
-                self._type(Part.BAR, self.choice.bar_waiver, lambda text: self._take(bar=None, bar_waiver=text))
+                self._type(SetUpPart.BAR, self.choice.bar_waiver, lambda text: self._take(bar=None, bar_waiver=text))
 
-        self._ask(Part.BAR, labels, 0, answered)
+        self._ask(SetUpPart.BAR, labels, 0, answered)
 
     def _measure_bar(self) -> None:
         line = self.choice.line
@@ -173,9 +173,11 @@ class NewScreen(RowScreen):
                 name, profile = choices[at]
                 self._line(instrument=name, profile=profile, zero_mm=None)
             else:
-                self._type(Part.INSTRUMENT, "", lambda text: self._line(instrument=text, profile="", zero_mm=None))
+                self._type(SetUpPart.INSTRUMENT, "", lambda text: self._line(instrument=text, profile="", zero_mm=None))
 
-        self._ask(Part.INSTRUMENT, [*labels, texts.TYPE_ANOTHER], choices.index(now) if now in choices else 0, answered)
+        self._ask(
+            SetUpPart.INSTRUMENT, [*labels, texts.TYPE_ANOTHER], choices.index(now) if now in choices else 0, answered
+        )
 
     def _choose_port(self) -> None:
         found = self._front.ports()
@@ -189,34 +191,37 @@ class NewScreen(RowScreen):
                 self._line(port=names[at], baud=self.choice.line.baud)
                 self.action_probe()
             else:
-                self._type(Part.PORT, self.choice.line.port, self._port_typed)
+                self._type(SetUpPart.PORT, self.choice.line.port, self._port_typed)
 
         self._ask(
-            Part.PORT, labels, names.index(self.choice.line.port) if self.choice.line.port in names else 0, answered
+            SetUpPart.PORT,
+            labels,
+            names.index(self.choice.line.port) if self.choice.line.port in names else 0,
+            answered,
         )
 
     def _port_typed(self, port: str) -> None:
         self._line(port=port)
         self.action_probe()
 
-    def _ask(self, part: Part, labels: list[str], at: int, then: Callable[[int | None], None]) -> None:
+    def _ask(self, part: SetUpPart, labels: list[str], at: int, then: Callable[[int | None], None]) -> None:
         self.app.push_screen(ChooseQuestion(texts.CHOOSE_TITLE.format(part=texts.PARTS[part]), labels, at), then)
 
-    def _type(self, part: Part, text: str, then: Callable[[str], None]) -> None:
+    def _type(self, part: SetUpPart, text: str, then: Callable[[str], None]) -> None:
         def answered(typed: str | None) -> None:
             if typed:
                 then(typed)
 
         self.app.push_screen(TypeQuestion(texts.PARTS[part], text), answered)
 
-    def _typed(self, part: Part, text: str) -> None:
-        if part is Part.TEMPERATURE:
+    def _typed(self, part: SetUpPart, text: str) -> None:
+        if part is SetUpPart.TEMPERATURE:
             temp_c = shop_degc(text)
             if temp_c is None:
                 self.say(texts.NO_NUMBER.format(text=text), wrong=True)
             else:
                 self._take(ambient_temp_c=temp_c)
-        elif part in {Part.MACHINE, Part.PLAN, Part.FOLDER, Part.PROGRAMS}:
+        elif part in {SetUpPart.MACHINE, SetUpPart.PLAN, SetUpPart.FOLDER, SetUpPart.PROGRAMS}:
             self._take(**{_FIELDS[part]: (self._front.under / Path(text).expanduser())})
         else:
             self._take(**{_FIELDS[part]: text})
@@ -236,31 +241,31 @@ class NewScreen(RowScreen):
         else:
             self.say(texts.NEW_COMPLETE)
 
-    def _row(self, part: Part, *, missing: bool) -> Content:
+    def _row(self, part: SetUpPart, *, missing: bool) -> Content:
         sign = "!" if missing else "·"
-        value = texts.NEW_KEPT if part in self._kept() and part is not Part.FOLDER else self._value(part)
+        value = texts.NEW_KEPT if part in self._kept() and part is not SetUpPart.FOLDER else self._value(part)
         style = "$text-warning" if missing else ""
         return Content.assemble((f"{sign} {texts.PARTS[part]:{_NAME}} ", style), (value, "bold"))
 
-    def _value(self, part: Part) -> str:
+    def _value(self, part: SetUpPart) -> str:
         choice, line = self.choice, self.choice.line
         said = {
-            Part.INSTRUMENT: " ".join(filter(None, (line.instrument, line.profile))) or texts.NOT_CHOSEN,
-            Part.PORT: line.port or texts.NOT_CHOSEN,
-            Part.ORDER: texts.ORDER_WORDS[choice.order],
-            Part.GATE: texts.GATE_WORDS[choice.gate],
+            SetUpPart.INSTRUMENT: " ".join(filter(None, (line.instrument, line.profile))) or texts.NOT_CHOSEN,
+            SetUpPart.PORT: line.port or texts.NOT_CHOSEN,
+            SetUpPart.ORDER: texts.ORDER_WORDS[choice.order],
+            SetUpPart.GATE: texts.GATE_WORDS[choice.gate],
         }
         if line.virtual:
-            said[Part.BAR] = texts.VIRTUAL_BAR
+            said[SetUpPart.BAR] = texts.VIRTUAL_BAR
         elif choice.bar_waiver:
-            said[Part.BAR] = texts.WITHOUT_BAR.format(reason=choice.bar_waiver)
+            said[SetUpPart.BAR] = texts.WITHOUT_BAR.format(reason=choice.bar_waiver)
         return said.get(part) or self._field(part)
 
-    def _field(self, part: Part) -> str:
+    def _field(self, part: SetUpPart) -> str:
         value = getattr(self.choice, _FIELDS[part])
         if value in {None, ""}:
             return texts.NEW_EMPTY.get(part, texts.NOT_CHOSEN)
-        if part is Part.TEMPERATURE:
+        if part is SetUpPart.TEMPERATURE:
             return f"{value:g} °C"
         return f"{value.name}  ({value.parent})" if isinstance(value, Path) else str(value)
 
@@ -275,7 +280,7 @@ class NewScreen(RowScreen):
         self.choice = choice
         self._show()
 
-    def _answered(self, answer: Answer) -> None:
+    def _answered(self, answer: ProbeOutcome) -> None:
         form = texts.NEW_ANSWERS if answer.answers else texts.NEW_SILENT
         self.say(form.format(port=answer.port, text=answer.text), wrong=not answer.answers)
 
@@ -284,27 +289,27 @@ class NewScreen(RowScreen):
 
 
 _FIELDS = {
-    Part.MACHINE: "machine",
-    Part.PLAN: "plan",
-    Part.FOLDER: "folder",
-    Part.BAR: "bar",
-    Part.PROGRAMS: "programs",
-    Part.OPERATOR: "operator",
-    Part.SERIAL_NUMBER: "serial_number",
-    Part.JOB: "job",
-    Part.TEMPERATURE: "ambient_temp_c",
+    SetUpPart.MACHINE: "machine",
+    SetUpPart.PLAN: "plan",
+    SetUpPart.FOLDER: "folder",
+    SetUpPart.BAR: "bar",
+    SetUpPart.PROGRAMS: "programs",
+    SetUpPart.OPERATOR: "operator",
+    SetUpPart.SERIAL_NUMBER: "serial_number",
+    SetUpPart.JOB: "job",
+    SetUpPart.TEMPERATURE: "ambient_temp_c",
 }
 """Field of the choice that a row shows."""
 
-_EMPTY: dict[Part, object] = {
-    Part.MACHINE: None,
-    Part.PLAN: None,
-    Part.FOLDER: None,
-    Part.PROGRAMS: None,
-    Part.OPERATOR: "",
-    Part.SERIAL_NUMBER: "",
-    Part.JOB: "",
-    Part.TEMPERATURE: None,
+_EMPTY: dict[SetUpPart, object] = {
+    SetUpPart.MACHINE: None,
+    SetUpPart.PLAN: None,
+    SetUpPart.FOLDER: None,
+    SetUpPart.PROGRAMS: None,
+    SetUpPart.OPERATOR: "",
+    SetUpPart.SERIAL_NUMBER: "",
+    SetUpPart.JOB: "",
+    SetUpPart.TEMPERATURE: None,
 }
 
 

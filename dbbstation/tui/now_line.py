@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from dbbstation.quality.answer import Word
+from dbbstation.quality.answer import Advice
 from dbbstation.station.states import RECORDING, State
 from dbbstation.tui.panel import Panel
 from dbbstation.tui.sentences import now, now_for_operator
@@ -34,7 +34,9 @@ class NowLine(Panel):
         """Show the sentence, and whether it asks for something, in colour as well."""
         super().show(board)
         wrong = (
-            board.state is State.COMPLETE and board.completed is not None and board.completed.answer.word is Word.REPEAT
+            board.state is State.COMPLETE
+            and board.completed is not None
+            and board.completed.answer.word is Advice.REPEAT
         )
         self.set_class(board.fault is not None or board.state is State.FLAWED or wrong, "-fault")
         self.set_class(board.fault is None and board.state in _ASKING and not wrong, "-asking")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -39,9 +38,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.operated import Answered, JobAnswer, Operated
-    from dbbstation.tui.board_screen import Desk
-    from dbbstation.tui.reception import Reception
-    from dbbstation.tui.shown import Shown
+    from dbbstation.tui.reception import StationDesk
 
 _NAME = 16
 
@@ -57,7 +54,7 @@ class JobScreen(RowScreen):
 
     help_name = "job"
 
-    def __init__(self, reception: Reception, front: Front, operated: Operated) -> None:
+    def __init__(self, reception: StationDesk, front: Front, operated: Operated) -> None:
         super().__init__()
         self._reception, self._front, self._operated = reception, front, operated
         self._choice: Choice | None = None
@@ -171,9 +168,6 @@ class OperateScreen(RunScreen):
     """
 
     help_name = "operate"
-
-    def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
-        super().__init__(desk, shown, clock=clock)
 
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""

@@ -10,7 +10,7 @@ from textual.content import Content
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.duration import circles_s
 from dbbstation.quality.finding import against_limit
-from dbbstation.service.board import Mark, Verdict
+from dbbstation.service.board import Mark, RunDecision
 from dbbstation.service.messages import problem_alone
 from dbbstation.station.commands import GoTo
 from dbbstation.tui import texts
@@ -42,7 +42,7 @@ _SHORTEST_NAME = 5
 
 
 @dataclass
-class Choice:
+class ChosenTest:
     """The chosen test and direction.
 
     Attributes:
@@ -101,7 +101,7 @@ class PlateMap(Panel):
     Where there is not, a row per test with a sign for each direction and the greater circularity; the list has the words.
     """
 
-    def __init__(self, shown: Shown, choice: Choice, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+    def __init__(self, shown: Shown, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._show = shown
         self._choice = choice
@@ -188,7 +188,7 @@ class TestList(Panel):
     __test__ = False
     """Not one of pytest's."""
 
-    def __init__(self, choice: Choice, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+    def __init__(self, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._choice = choice
 
@@ -222,7 +222,7 @@ class TestList(Panel):
 class ChosenRun(Panel):
     """The chosen run: figures, verdict with its reason, what was found wrong; which of how many it is."""
 
-    def __init__(self, shown: Shown, choice: Choice, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+    def __init__(self, shown: Shown, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._show = shown
         self._choice = choice
@@ -254,7 +254,7 @@ def _figures(completed: RunCompleted) -> str:
 def _decided(board: Board, completed: RunCompleted) -> Content:
     """Verdict and reason, then each finding that is wrong with number and limit."""
     label = completed.run.label
-    verdict = board.verdicts.get(label, Verdict.NONE).value or texts.NO_VERDICT
+    verdict = board.verdicts.get(label, RunDecision.NONE).value or texts.NO_VERDICT
     reason = board.reasons.get(label, "")
     parts = [Content(f"{verdict}: {reason}" if reason else verdict)]
     parts += [

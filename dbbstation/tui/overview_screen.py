@@ -8,12 +8,12 @@ from textual.binding import Binding
 from textual.containers import Horizontal
 from textual.widgets import Footer
 
-from dbbstation.quality.answer import Word
-from dbbstation.service.board import Verdict
+from dbbstation.quality.answer import Advice
+from dbbstation.service.board import RunDecision
 from dbbstation.station.commands import GoTo, Judge
 from dbbstation.station.states import State
 from dbbstation.tui.board_screen import BoardScreen
-from dbbstation.tui.overview_panels import Choice, ChosenRun, LeftLine, PlateMap, TestList
+from dbbstation.tui.overview_panels import ChosenRun, ChosenTest, LeftLine, PlateMap, TestList
 from dbbstation.tui.reason_question import ReasonQuestion
 from dbbstation.tui.title_line import TitleLine
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from dbbstation.tui.board_screen import Desk
     from dbbstation.tui.shown import Shown
 
-_VERDICT_BEFORE = {"take_back": Verdict.ACCEPTED, "accept_again": Verdict.REJECTED}
+_VERDICT_BEFORE = {"take_back": RunDecision.ACCEPTED, "accept_again": RunDecision.REJECTED}
 """Which verdict a key takes back."""
 
 
@@ -61,7 +61,7 @@ class OverviewScreen(BoardScreen):
         at = names.index(announced.run.test) if announced and announced.run.test in names else 0
         directions = shown.tests[names[at]].directions if names else ()
         way = directions.index(announced.run.direction) if announced and announced.run.direction in directions else 0
-        self.choice = Choice(names, at, way)
+        self.choice = ChosenTest(names, at, way)
 
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""
@@ -134,7 +134,7 @@ class OverviewScreen(BoardScreen):
         completed = self._run()
         if completed is None:
             return
-        if completed.answer.word is not Word.REPEAT:
+        if completed.answer.word is not Advice.REPEAT:
             self._judge(completed, accepted=True, reason="")
             return
 

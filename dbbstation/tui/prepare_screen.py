@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.held_line import HeldLine
-    from dbbstation.tui.reception import Reception
+    from dbbstation.tui.reception import StationDesk
 
 _GOOD, _OPEN, _NOTE = "✓", "!", "·"
 """Signs: checked and good; not known; to be known."""
@@ -58,7 +58,7 @@ class PrepareScreen(RowScreen):
 
     def __init__(
         self,
-        reception: Reception,
+        reception: StationDesk,
         front: Front,
         choice: Choice,
         prepared: Prepared,

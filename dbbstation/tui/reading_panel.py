@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from dbbstation.plan.circle import Circle
     from dbbstation.service.board import Board
-    from dbbstation.service.seated import Seat
+    from dbbstation.service.seated import BarAtFeedIn
     from dbbstation.station.events import Sample
 
 _STALE_S = 1.5
@@ -77,7 +77,7 @@ class ReadingPanel(Panel):
         )
 
 
-def seat_words(found: Seat) -> str:
+def seat_words(found: BarAtFeedIn) -> str:
     """Say how the bar stands at the feed-in point."""
     if found.seated:
         return SEATED

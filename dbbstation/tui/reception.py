@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _Outcome = TypeVar("_Outcome")
 
 
-class Reception(Protocol):
+class StationDesk(Protocol):
     """Does work in the background, opens jobs, shows results; `StationApp` is one."""
 
     def do(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.service.after import Step
+from dbbstation.service.job import SessionTask
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_lines import worst_lines
 
@@ -15,7 +15,7 @@ _MOST = 6
 """Causes, and sentences of a kind, that are shown; the files have all."""
 
 
-def result_lines(step: Step, answer: Mapping[str, Any]) -> list[str]:
+def result_lines(step: SessionTask, answer: Mapping[str, Any]) -> list[str]:
     """Return what is worth reading of the answer of a step's command."""
     return list(_LINES[step](answer))
 
@@ -77,9 +77,9 @@ def _accepted(answer: Mapping[str, Any]) -> Iterator[str]:
 
 
 _LINES = {
-    Step.CALIBRATE: _calibrated,
-    Step.DIAGNOSE: _diagnosed,
-    Step.PROGRAMS: _programmed,
-    Step.REPORT: _reported,
-    Step.ACCEPTANCE: _accepted,
+    SessionTask.CALIBRATE: _calibrated,
+    SessionTask.DIAGNOSE: _diagnosed,
+    SessionTask.PROGRAMS: _programmed,
+    SessionTask.REPORT: _reported,
+    SessionTask.ACCEPTANCE: _accepted,
 }

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, ClassVar
 from textual.content import Content
 from textual.widgets import OptionList
 
-from dbbstation.service.after import USUAL, Step
-from dbbstation.service.work import Progress
+from dbbstation.service.after import USUAL
+from dbbstation.service.job import SessionTask
+from dbbstation.service.work import WorkProgress
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_screen import AcceptanceScreen
 from dbbstation.tui.durations import duration
@@ -22,8 +23,12 @@ if TYPE_CHECKING:
 
     from dbbstation.service.after import After, Result
 
-STEPS = tuple(Step)
-_STYLES = {Progress.DONE: "$text-success", Progress.FAILED: "$text-error", Progress.CANCELLED: "$text-warning"}
+STEPS = tuple(SessionTask)
+_STYLES = {
+    WorkProgress.DONE: "$text-success",
+    WorkProgress.FAILED: "$text-error",
+    WorkProgress.CANCELLED: "$text-warning",
+}
 
 
 class ResultsScreen(RowScreen):
@@ -67,7 +72,7 @@ class ResultsScreen(RowScreen):
         """Only keys that mean something now stand in the footer and do something."""
         match action:
             case "step":
-                return self._after.can(Step(str(parameters[0])))
+                return self._after.can(SessionTask(str(parameters[0])))
             case "every":
                 return self._after.busy is None
             case "cancel":
@@ -80,14 +85,14 @@ class ResultsScreen(RowScreen):
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
         """Do the chosen step; an acceptance has a screen of its own."""
-        if STEPS[self.at] is Step.ACCEPTANCE:
+        if STEPS[self.at] is SessionTask.ACCEPTANCE:
             self.action_acceptance()
         elif self._after.can(STEPS[self.at]):
             self._begin(STEPS[self.at])
 
     def action_step(self, name: str) -> None:
         """Do one step."""
-        self._begin(Step(name))
+        self._begin(SessionTask(name))
 
     def action_every(self) -> None:
         """Do all steps, one behind the other."""
@@ -95,7 +100,7 @@ class ResultsScreen(RowScreen):
 
     def action_acceptance(self) -> None:
         """Hold the session against one that was measured before."""
-        self._go_to(Step.ACCEPTANCE)
+        self._go_to(SessionTask.ACCEPTANCE)
         self.app.push_screen(AcceptanceScreen(self._after))
 
     def action_cancel(self) -> None:
@@ -115,12 +120,12 @@ class ResultsScreen(RowScreen):
 
         self.app.push_screen(YesQuestion(texts.RESULTS_LEAVE), answered)
 
-    def _begin(self, *steps: Step) -> None:
+    def _begin(self, *steps: SessionTask) -> None:
         self._go_to(steps[0])
         self._after.do(*steps)
         self._draw()
 
-    def _go_to(self, step: Step) -> None:
+    def _go_to(self, step: SessionTask) -> None:
         self.query_one("#rows", OptionList).highlighted = STEPS.index(step)
 
     def _draw(self) -> None:
@@ -137,24 +142,24 @@ class ResultsScreen(RowScreen):
             self._seen = after.busy, after.model
             self.refresh_bindings()
 
-    def _found(self, step: Step) -> Content:
+    def _found(self, step: SessionTask) -> Content:
         result = self._after.results[step]
         match result.progress:
-            case Progress.DONE:
+            case WorkProgress.DONE:
                 rows = [Content.styled(str(result.path), "bold")]
                 return lines(*rows, *(Content(text) for text in result_lines(step, result.answer)))
-            case Progress.FAILED:
+            case WorkProgress.FAILED:
                 return Content.styled(result.failure, "$text-error")
-            case Progress.CANCELLED:
+            case WorkProgress.CANCELLED:
                 return Content(texts.RESULTS_CANCELLED)
-            case Progress.RUNNING:
+            case WorkProgress.RUNNING:
                 return Content("")
-        if step is Step.PROGRAMS and self._after.model is None:
+        if step is SessionTask.PROGRAMS and self._after.model is None:
             return Content(texts.RESULTS_NO_MODEL)
         return Content.styled(texts.RESULTS_EMPTY, "dim")
 
 
-def _row(step: Step, result: Result) -> Content:
+def _row(step: SessionTask, result: Result) -> Content:
     key, title = texts.STEPS[step]
     words = texts.STEP_WORDS[result.progress].format(
         stage=result.stage or texts.STEP_BEGINS, passed=duration(result.passed_s)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.quality.answer import Word
+from dbbstation.quality.answer import Advice
 from dbbstation.service.messages import problem_alone
 from dbbstation.station.states import State
 
@@ -35,7 +35,7 @@ def now_for_operator(board: Board) -> str:
     if board.fault is not None or board.state not in {State.COMPLETE, State.FLAWED} or completed is None:
         return now(board) if board.finished is None else _THROUGH
     found = completed.answer
-    if found.word is Word.REPEAT:
+    if found.word is Advice.REPEAT:
         return f"{found.word}  {completed.run.label}: {_ended(found.causes[0])} Enter measures it again."
     unseen = f"Not to be seen yet: {', '.join(found.unseen)}. " if found.unseen else ""
     return f"{found.word}  {completed.run.label}. {unseen}Enter goes on."
@@ -71,7 +71,7 @@ def _verdict(board: Board) -> str:
     if board.completed is None:
         return "The run is complete."
     name, found = board.completed.run.label, board.completed.answer
-    if found.word is Word.REPEAT:
+    if found.word is Advice.REPEAT:
         more = f" ({len(found.causes) - 1} more)" if len(found.causes) > 1 else ""
         return f"{found.word}  {name}: {_ended(found.causes[0])}{more} Enter or R measures it again; A asks why it counts all the same."
     unseen = f"Not to be seen yet: {', '.join(found.unseen)}. " if found.unseen else ""
@@ -81,9 +81,7 @@ def _verdict(board: Board) -> str:
 def _flawed(board: Board) -> str:
     problem = problem_alone(board.completed) if board.completed else ""
     name = board.completed.run.label if board.completed else "the run"
-    return (
-        f"{Word.REPEAT}  {name} has no usable circle: {_ended(problem)} Enter or R measures it again, X leaves it out."
-    )
+    return f"{Advice.REPEAT}  {name} has no usable circle: {_ended(problem)} Enter or R measures it again, X leaves it out."
 
 
 def _paused(_board: Board) -> str:

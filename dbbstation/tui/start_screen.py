@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.session_list import SessionLine
-    from dbbstation.tui.reception import Reception
+    from dbbstation.tui.reception import StationDesk
 
 _NAME = 22
 
@@ -41,7 +41,7 @@ class StartScreen(RowScreen):
         ("e", "results", "Results"),
     ]
 
-    def __init__(self, reception: Reception, front: Front) -> None:
+    def __init__(self, reception: StationDesk, front: Front) -> None:
         super().__init__()
         self._reception, self._front = reception, front
         self._sessions: tuple[SessionLine, ...] = ()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.service.after import Step
-from dbbstation.service.choice import Part
+from dbbstation.service.choice import SetUpPart
+from dbbstation.service.job import SessionTask
 from dbbstation.service.order import Gate, Order
-from dbbstation.service.work import Progress
+from dbbstation.service.work import WorkProgress
 from dbbstation.station.states import State
 
 if TYPE_CHECKING:
@@ -102,30 +102,30 @@ START_BY = "by {instrument} at {port}"
 START_NO_LINE = "no instrument yet: I chooses one"
 QUIT_OPENS = "The virtual machine is being switched on; a moment."
 
-PARTS: Mapping[Part, str] = {
-    Part.MACHINE: "machine",
-    Part.PLAN: "plan",
-    Part.INSTRUMENT: "instrument",
-    Part.PORT: "port",
-    Part.BAR: "bar",
-    Part.FOLDER: "folder",
-    Part.PROGRAMS: "NC programs",
-    Part.OPERATOR: "operator",
-    Part.SERIAL_NUMBER: "serial number",
-    Part.JOB: "job",
-    Part.TEMPERATURE: "temperature",
-    Part.ORDER: "order of tests",
-    Part.GATE: "drift gate",
+PARTS: Mapping[SetUpPart, str] = {
+    SetUpPart.MACHINE: "machine",
+    SetUpPart.PLAN: "plan",
+    SetUpPart.INSTRUMENT: "instrument",
+    SetUpPart.PORT: "port",
+    SetUpPart.BAR: "bar",
+    SetUpPart.FOLDER: "folder",
+    SetUpPart.PROGRAMS: "NC programs",
+    SetUpPart.OPERATOR: "operator",
+    SetUpPart.SERIAL_NUMBER: "serial number",
+    SetUpPart.JOB: "job",
+    SetUpPart.TEMPERATURE: "temperature",
+    SetUpPart.ORDER: "order of tests",
+    SetUpPart.GATE: "drift gate",
 }
 """Names of the rows of a new session."""
 
-MISSING_PARTS: Mapping[Part, str] = {
-    Part.MACHINE: "the machine's file",
-    Part.PLAN: "the plan",
-    Part.INSTRUMENT: "the instrument",
-    Part.PORT: "the port it is connected to",
-    Part.BAR: "the calibration of the bar, or why it is measured without",
-    Part.FOLDER: "a folder for the session",
+MISSING_PARTS: Mapping[SetUpPart, str] = {
+    SetUpPart.MACHINE: "the machine's file",
+    SetUpPart.PLAN: "the plan",
+    SetUpPart.INSTRUMENT: "the instrument",
+    SetUpPart.PORT: "the port it is connected to",
+    SetUpPart.BAR: "the calibration of the bar, or why it is measured without",
+    SetUpPart.FOLDER: "a folder for the session",
 }
 NEW_MISSING = "Still missing: {parts}. Enter changes a row."
 NEW_COMPLETE = "Nothing is missing: B begins. L listens at the port."
@@ -134,13 +134,13 @@ NEW_ASKS = "Asking {port} for a reading of {instrument} …"
 NEW_ANSWERS = "{port} answers: {text}."
 NEW_SILENT = "{port}: {text}"
 NEW_KEPT = "of the session"
-NEW_EMPTY: Mapping[Part, str] = {
-    Part.BAR: "not measured: Enter chooses, measures or says why not",
-    Part.PROGRAMS: "none: plain circles, started at the control",
-    Part.OPERATOR: "not noted",
-    Part.SERIAL_NUMBER: "not noted",
-    Part.JOB: "not noted",
-    Part.TEMPERATURE: "not read",
+NEW_EMPTY: Mapping[SetUpPart, str] = {
+    SetUpPart.BAR: "not measured: Enter chooses, measures or says why not",
+    SetUpPart.PROGRAMS: "none: plain circles, started at the control",
+    SetUpPart.OPERATOR: "not noted",
+    SetUpPart.SERIAL_NUMBER: "not noted",
+    SetUpPart.JOB: "not noted",
+    SetUpPart.TEMPERATURE: "not read",
 }
 NOT_CHOSEN = "not chosen"
 WITHOUT_BAR = "without: {reason}"
@@ -232,26 +232,26 @@ BAR_READS = "Reading: {done} of {of}. Leave the bar alone."
 BAR_DONE = "The bar reads {long:+.2f} µm long, standard uncertainty {u:.2f} µm. Written to {path}. Esc takes it."
 BAR_DRIFTED = " It drifted by {drift:+.2f} µm meanwhile: give it time to cool down, then B reads it again."
 
-STEPS: Mapping[Step, tuple[str, str]] = {
-    Step.CALIBRATE: ("1", "Calibrate: fit the kinematic parameters"),
-    Step.DIAGNOSE: ("2", "Diagnose: what the calibration leaves out"),
-    Step.PROGRAMS: ("3", "Programs: compensated NC programs of the circles"),
-    Step.REPORT: ("4", "Report: verdict against the shop's tolerances"),
-    Step.ACCEPTANCE: ("5", "Acceptance: before and now, as measured"),
+STEPS: Mapping[SessionTask, tuple[str, str]] = {
+    SessionTask.CALIBRATE: ("1", "Calibrate: fit the kinematic parameters"),
+    SessionTask.DIAGNOSE: ("2", "Diagnose: what the calibration leaves out"),
+    SessionTask.PROGRAMS: ("3", "Programs: compensated NC programs of the circles"),
+    SessionTask.REPORT: ("4", "Report: verdict against the shop's tolerances"),
+    SessionTask.ACCEPTANCE: ("5", "Acceptance: before and now, as measured"),
 }
-STEP_WORDS: Mapping[Progress | None, str] = {
+STEP_WORDS: Mapping[WorkProgress | None, str] = {
     None: "not yet",
-    Progress.RUNNING: "{stage} ({passed})",
-    Progress.DONE: "done in {passed}",
-    Progress.FAILED: "failed",
-    Progress.CANCELLED: "ended",
+    WorkProgress.RUNNING: "{stage} ({passed})",
+    WorkProgress.DONE: "done in {passed}",
+    WorkProgress.FAILED: "failed",
+    WorkProgress.CANCELLED: "ended",
 }
-STEP_SIGNS: Mapping[Progress | None, str] = {
+STEP_SIGNS: Mapping[WorkProgress | None, str] = {
     None: "·",
-    Progress.RUNNING: "▶",
-    Progress.DONE: "✓",
-    Progress.FAILED: "✗",
-    Progress.CANCELLED: "-",
+    WorkProgress.RUNNING: "▶",
+    WorkProgress.DONE: "✓",
+    WorkProgress.FAILED: "✗",
+    WorkProgress.CANCELLED: "-",
 }
 STEP_BEGINS = "beginning"
 RESULTS_IDLE = "Enter does the chosen step, 0 the first four; results go to {folder}."

@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.errors import MachineError
 from dbbstation.sources.contract import Motion, Setup
 from dbbstation.virtual.path import circle_path
-from dbbstation.virtual.truth import Scatter
+from dbbstation.virtual.truth import MeasurementErrors
 from dbbstation.virtual.under_spindle import SET_UP_MM, put_up
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class VirtualMachine:
         self.plan = plan
         self.mountings = 0
         self.mounted: Ball | None = None
-        self._scatter = Scatter(seed, self.sizes.bar_uncertainty_mm, self.sizes.set_up_mm)
+        self._scatter = MeasurementErrors(seed, self.sizes.bar_uncertainty_mm, self.sizes.set_up_mm)
         self._under_spindle: dict[int, tuple[Ball, SetUp, tuple[Fitted, ...]]] = {}
         self._bar = self._scatter.bar(_BAR)
         self._noise = np.random.default_rng([seed, 5])

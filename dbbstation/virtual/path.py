@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.errors import MachineError
 from dbbstation.nc.circle_program import circle_toolpath
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,7 +47,7 @@ def path_of(toolpath: Toolpath) -> CommandedPath:
     Raises:
         MachineError: it does not move.
     """
-    pauses = np.flatnonzero(toolpath.kind == Step.PAUSE)
+    pauses = np.flatnonzero(toolpath.kind == RowKind.PAUSE)
     first = int(pauses[0]) if len(pauses) else 0
     last = int(pauses[-1]) if len(pauses) > 1 else len(toolpath) - 1
     t_s, poses = toolpath.end_s[first : last + 1], toolpath.poses[first : last + 1]

@@ -31,7 +31,7 @@ def random_kinematics(machine: Machine, seed: int) -> tuple[Fitted, ...]:
 
 
 @dataclass
-class Scatter:
+class MeasurementErrors:
     """Errors of the measurement: of each mounting or set-up, of each ball's coordinates, of the bar's length.
 
     Args:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dbbstation.instrument.protocol import Line
+    from dbbstation.instrument.protocol import LineSettings
 
 TOLERANCE = 0.04
 """A UART samples the last bit of ten in its middle: half a bit in ten, less some sampling error, is what it bears."""
 
 
-def heard_at(raw: bytes, line: Line, *, sent_baud: int, heard_baud: int) -> bytes:
+def heard_at(raw: bytes, line: LineSettings, *, sent_baud: int, heard_baud: int) -> bytes:
     """Return what comes out of a receiver at `heard_baud` when `raw` is sent at `sent_baud`, one byte after the other.
 
     Both sides use the data bits, parity and stop bits of `line`; the receiver does not check them, as a serial port
@@ -39,7 +39,7 @@ def heard_at(raw: bytes, line: Line, *, sent_baud: int, heard_baud: int) -> byte
     return bytes(heard)
 
 
-def _sent_bits(byte: int, line: Line) -> list[int]:
+def _sent_bits(byte: int, line: LineSettings) -> list[int]:
     data = [byte >> place & 1 for place in range(line.data_bits)]
     parity = {"none": [], "even": [sum(data) % 2], "odd": [1 - sum(data) % 2]}[line.parity]
     return [0, *data, *parity, *[1] * line.stop_bits]

@@ -14,7 +14,7 @@ import numpy as np
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.nc.dialect import plain
-from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, Step, ToolpathBuilder
+from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, RowKind, ToolpathBuilder
 from dbbstation.nc.words import WordDialect, digits
 
 BEGIN = "G90 G94 G71 G17 G40"
@@ -110,7 +110,7 @@ class _Reader:
         for number, line in enumerate(text.splitlines(), 1):
             code, _, comment = re.sub(r"^N\d+ ", "", line).partition(";")
             if comment:
-                self.path.say(Step.COMMENT, comment.strip(), line=number)
+                self.path.say(RowKind.COMMENT, comment.strip(), line=number)
             if code.strip() and not self.take(code.strip(), number):
                 raise InputError([Problem(self.name, number, 0, f"`{code.strip()}` is not read", "write it otherwise")])
         return self.path.built()
@@ -124,20 +124,20 @@ class _Reader:
         elif first == "M0":
             self.stop(line)
         elif first == "M1":
-            self.path.say(Step.OPTIONAL_STOP, "", line=line)
+            self.path.say(RowKind.OPTIONAL_STOP, "", line=line)
         elif first in {"M2", "M30"}:
             self.path.ending = Ending(first)
         elif first == "G4":
             self.path.dwell(float(words[0][1:]), line=line)
         elif first in SYSTEMS:
             self.path.system = SYSTEMS.index(first) + 1
-            self.path.say(Step.SYSTEM, first, line=line)
+            self.path.say(RowKind.SYSTEM, first, line=line)
         elif first in {"G60", "G64", "G641"}:
             self.path.corner_mm = {"G60": 0.0, "G64": math.inf}.get(first) if not words else float(words[0][5:])
         elif first in {"G53", "G0", "G1"}:
             self.move([first, *words], line)
         elif re.fullmatch(r"(S[\d.]+|M\d+)( M\d+)*", code):
-            self.path.say(Step.FUNCTION, code, line=line)
+            self.path.say(RowKind.FUNCTION, code, line=line)
         else:
             return code == BEGIN
         return True
@@ -147,7 +147,7 @@ class _Reader:
         if message(self.shown) == GUARD and math.isnan(self.pose[0]):
             self.path.guard = ()
         else:
-            self.path.say(Step.PAUSE, self.shown, line=line)
+            self.path.say(RowKind.PAUSE, self.shown, line=line)
         self.shown = ""
 
     def move(self, words, line):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from dbbstation.circles.analysis import analyse, analyse_pair
-from dbbstation.circles.budget import Cause, SetUpKnowledge, budgets, pair_budgets
+from dbbstation.circles.budget import BudgetTerm, SetUpKnowledge, budgets, pair_budgets
 from dbbstation.circles.path import Filter
-from dbbstation.circles.quantity import ABSOLUTE, Quantity
+from dbbstation.circles.quantity import ABSOLUTE, BudgetQuantity
 from tests.circles.test_analysis import CCW, CW, PHI, measured
 
 KNOWN = SetUpKnowledge(u_bar_um=0.5, u_temperature_um=0.6, u_ball_um=1.2, u_ball_z_um=2.0)
@@ -30,10 +30,10 @@ def drawn(chosen, count=60, sigma_mm=5e-4):
 
 def test_centre_and_radius_scatter_as_their_noise_term_says():
     runs = drawn(Filter.NONE)
-    terms = {q: b.terms_um[Cause.NOISE] for q, b in budgets(runs[0], KNOWN).items()}
-    assert 1e3 * np.std([one.centre_mm[0] for one in runs]) == pytest.approx(terms[Quantity.X], rel=0.35)
-    assert 1e3 * np.std([one.centre_mm[1] for one in runs]) == pytest.approx(terms[Quantity.Y], rel=0.35)
-    assert np.std([one.radius_error_um for one in runs]) == pytest.approx(terms[Quantity.RADIUS], rel=0.35)
+    terms = {q: b.terms_um[BudgetTerm.NOISE] for q, b in budgets(runs[0], KNOWN).items()}
+    assert 1e3 * np.std([one.centre_mm[0] for one in runs]) == pytest.approx(terms[BudgetQuantity.X], rel=0.35)
+    assert 1e3 * np.std([one.centre_mm[1] for one in runs]) == pytest.approx(terms[BudgetQuantity.Y], rel=0.35)
+    assert np.std([one.radius_error_um for one in runs]) == pytest.approx(terms[BudgetQuantity.RADIUS], rel=0.35)
 
 
 @pytest.mark.parametrize("chosen", [Filter.NONE, Filter.UPR_15, Filter.UPR_30, Filter.UPR_50])
@@ -41,7 +41,7 @@ def test_g_is_that_of_the_path_without_its_noise(chosen):
     """Of an ellipse of 20 µm with 0.5 µm of noise G reads up to 2 µm more; the stated u is the scatter of what is printed."""
     runs = drawn(chosen, count=30)
     silent = analyse(measured(form, ball_mm=(0.05, 0.02)), chosen=chosen).g_um
-    found = [budgets(one, KNOWN, [Quantity.G])[Quantity.G] for one in runs]
+    found = [budgets(one, KNOWN, [BudgetQuantity.G])[BudgetQuantity.G] for one in runs]
     values, u = np.array([b.value_um for b in found]), np.array([b.u_um for b in found])
     assert np.mean([b.as_read_um for b in found]) > silent + (1.5 if chosen is Filter.NONE else 0.0)
     assert values.mean() == pytest.approx(silent, abs=0.6 * u.mean())
@@ -55,7 +55,7 @@ def test_a_perfect_circle_has_a_g_that_reaches_to_zero():
     raw = measured(lambda theta: 0.0 * theta, phi=np.arange(0.0, 360.0, 0.5))
     for _ in range(40):
         one = analyse(replace(raw, length_mm=raw.length_mm + rng.normal(0.0, 3e-4, len(raw))))
-        g = budgets(one, KNOWN, [Quantity.G])[Quantity.G]
+        g = budgets(one, KNOWN, [BudgetQuantity.G])[BudgetQuantity.G]
         assert g.as_read_um > 1.3
         covered += g.value_um <= 2.0 * g.u_um
     assert covered >= 35
@@ -63,46 +63,46 @@ def test_a_perfect_circle_has_a_g_that_reaches_to_zero():
 
 def test_few_samples_give_no_uncertainty_of_a_range():
     found = budgets(analyse(measured(form, phi=np.arange(0.0, 360.0, 5.0))), KNOWN)
-    assert found[Quantity.G].u_um is None
-    assert "separate noise from form" in found[Quantity.G].why_not
+    assert found[BudgetQuantity.G].u_um is None
+    assert "separate noise from form" in found[BudgetQuantity.G].why_not
 
 
 def test_each_term_has_its_size():
     raw = replace(measured(form, ball_mm=(0.0, -0.3)), start_uncertainty_deg=0.1)
     found = budgets(analyse(raw), KNOWN)
-    assert found[Quantity.RADIUS].terms_um[Cause.BAR] == 0.5
-    assert found[Quantity.F_MAX].terms_um[Cause.TEMPERATURE] == 0.6
-    assert found[Quantity.X].terms_um[Cause.MOUNTING] == 1.2
+    assert found[BudgetQuantity.RADIUS].terms_um[BudgetTerm.BAR] == 0.5
+    assert found[BudgetQuantity.F_MAX].terms_um[BudgetTerm.TEMPERATURE] == 0.6
+    assert found[BudgetQuantity.X].terms_um[BudgetTerm.MOUNTING] == 1.2
     # A turn that begins elsewhere turns the centre: 300 µm in Y become X.
-    assert found[Quantity.X].terms_um[Cause.ANGLE] == pytest.approx(300.0 * np.radians(0.1), rel=1e-3)
-    assert found[Quantity.Y].terms_um[Cause.ANGLE] == pytest.approx(0.0, abs=1e-3)
-    assert Cause.BAR not in found[Quantity.G].terms_um  # a longer bar makes no circle less round
-    total = np.sqrt(sum(term**2 for term in found[Quantity.F_MAX].terms_um.values()))
-    assert found[Quantity.F_MAX].u_um == pytest.approx(total)
+    assert found[BudgetQuantity.X].terms_um[BudgetTerm.ANGLE] == pytest.approx(300.0 * np.radians(0.1), rel=1e-3)
+    assert found[BudgetQuantity.Y].terms_um[BudgetTerm.ANGLE] == pytest.approx(0.0, abs=1e-3)
+    assert BudgetTerm.BAR not in found[BudgetQuantity.G].terms_um  # a longer bar makes no circle less round
+    total = np.sqrt(sum(term**2 for term in found[BudgetQuantity.F_MAX].terms_um.values()))
+    assert found[BudgetQuantity.F_MAX].u_um == pytest.approx(total)
 
 
 def test_what_nobody_stated_is_named_and_leaves_absolute_figures_without_u():
     found = budgets(analyse(measured(form)), SetUpKnowledge(not_absolute="not absolute, because nobody knows the bar"))
-    assert {str(Cause.BAR), str(Cause.TEMPERATURE)} <= set(found[Quantity.F_MAX].missing)
-    assert str(Cause.MOUNTING) in found[Quantity.X].missing
-    assert str(Cause.BAR) not in found[Quantity.G].missing
-    assert {quantity for quantity, budget in found.items() if budget.u_um is None} == ABSOLUTE - {Quantity.D}
+    assert {str(BudgetTerm.BAR), str(BudgetTerm.TEMPERATURE)} <= set(found[BudgetQuantity.F_MAX].missing)
+    assert str(BudgetTerm.MOUNTING) in found[BudgetQuantity.X].missing
+    assert str(BudgetTerm.BAR) not in found[BudgetQuantity.G].missing
+    assert {quantity for quantity, budget in found.items() if budget.u_um is None} == ABSOLUTE - {BudgetQuantity.D}
     pair = analyse_pair(analyse(measured(form, CCW)), analyse(measured(form, CW)))
     both = pair_budgets(pair, SetUpKnowledge(not_absolute="not absolute, because nobody knows the bar"))
-    assert both[Quantity.D].u_um is None
-    assert both[Quantity.D].why_not.startswith("not absolute")
+    assert both[BudgetQuantity.D].u_um is None
+    assert both[BudgetQuantity.D].why_not.startswith("not absolute")
 
 
 def test_a_raised_bar_enlarges_what_the_bar_does():
     raw = measured(form, replace(CCW, elevation_deg=60))
-    found = budgets(analyse(raw), KNOWN)[Quantity.RADIUS]
-    assert found.terms_um[Cause.BAR] == pytest.approx(0.5 / np.cos(np.radians(60)))
-    assert found.terms_um[Cause.MOUNTING] == pytest.approx(2.0 * np.tan(np.radians(60)))
+    found = budgets(analyse(raw), KNOWN)[BudgetQuantity.RADIUS]
+    assert found.terms_um[BudgetTerm.BAR] == pytest.approx(0.5 / np.cos(np.radians(60)))
+    assert found.terms_um[BudgetTerm.MOUNTING] == pytest.approx(2.0 * np.tan(np.radians(60)))
     assert any("height" in cause for cause in found.missing)
 
 
 def test_both_directions_share_their_bar():
     pair = analyse_pair(analyse(measured(form, CCW)), analyse(measured(form, CW)))
     found = pair_budgets(pair, KNOWN)
-    assert found[Quantity.D].terms_um[Cause.BAR] == 0.5
-    assert set(found) == {Quantity.G_BOTH, Quantity.G_BOTH_LS, Quantity.D, Quantity.H}
+    assert found[BudgetQuantity.D].terms_um[BudgetTerm.BAR] == 0.5
+    assert set(found) == {BudgetQuantity.G_BOTH, BudgetQuantity.G_BOTH_LS, BudgetQuantity.D, BudgetQuantity.H}

@@ -26,6 +26,7 @@ PRINT = {
     "cli/progress.py": "draws bars over themselves, whose labels are the program's own words",
     "cli/asking.py": "asks, with escaped questions",
     "cli/import_.py": "asks, with an escaped question",
+    "service/worker.py": "tells the station, which escapes what it shows",
 }
 """Files that write to a terminal themselves, each with its reason."""
 

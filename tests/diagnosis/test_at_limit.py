@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate
-from dbbstation.diagnosis.channel import Channel
+from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.shapes import ranges, samples_of, shapes
 from dbbstation.tasks.diagnose import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
@@ -39,7 +39,7 @@ def test_a_curve_that_all_struts_follow_has_the_points_of_one_variable(tmp_path)
     """Struts of different lengths and loads follow one curve: its points are values of the variable and not of each strut's range."""
     record(tmp_path / "s", seed=1, mechanisms=[], rate_hz=4.0)
     recorded = load_sessions([tmp_path / "s"])
-    channel = Channel(calibrate(recorded.machine, recorded.observations), ())
+    channel = CircleChannel(calibrate(recorded.machine, recorded.observations), ())
     runs = [samples_of(m, channel.machine, r) for m, r in zip(channel.motions, channel.readings, strict=True)]
     alike = [s for s in shapes(ranges(runs)) if s.variable in {"strut-length", "strut-force"} and s.strut is None]
     assert {s.variable for s in alike} == {"strut-length", "strut-force"}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
-from dbbstation.diagnosis.channel import Channel
+from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.shapes import AWAY_MM, TOWARDS, Spring, ranges, samples_of, shapes
 from dbbstation.diagnosis.verdicts import _Judge
@@ -36,7 +36,7 @@ def test_a_signal_period_is_one_that_is_sold(tmp_path):
     fit = calibrate(recorded.machine, recorded.observations, [*default_sources(), *cyclic], start)
     (term,) = [term for term in fit.layout.terms if term.source.name == "bar-cyclic"]
     assert fit.x[term.columns][2] == pytest.approx(20.0, rel=0.01)
-    channel = Channel(calibrate(recorded.machine, recorded.observations), cyclic)
+    channel = CircleChannel(calibrate(recorded.machine, recorded.observations), cyclic)
     swept_um = np.median([1e3 * np.ptp(o.raw.length_mm) for o in recorded.observations])
     periods = [variant.nonlinear[0] for variant in channel.named[0].variants]
     assert periods
@@ -73,7 +73,7 @@ def test_contacts_that_stiffen_under_load_call_in_no_second_cause(tmp_path):
 def test_a_pull_towards_a_place_is_what_statics_says(tmp_path):
     """Beside the kinematics the family leaves less of a hose than the best of a strut's curves does."""
     clean = load_sessions([_still(tmp_path / "clean")])
-    channel = Channel(calibrate(clean.machine, clean.observations), ())
+    channel = CircleChannel(calibrate(clean.machine, clean.observations), ())
     runs = [samples_of(m, channel.machine, r) for m, r in zip(channel.motions, channel.readings, strict=True)]
     every = shapes(ranges(runs))
     assert {s.form.about for s in every if isinstance(s.form, Spring)} == {AWAY_MM}

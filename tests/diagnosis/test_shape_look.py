@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.shape_look import Look, Ranges, looked_for
+from dbbstation.diagnosis.shape_look import Ranges, TemplateScan, looked_for
 from dbbstation.diagnosis.shapes import BALL, EVERY, PLAUSIBLE_MM, READING, TABLE, TOOL, Samples
 from dbbstation.inference.forms import Bump, Wave
 from dbbstation.inference.square_root import Columns
@@ -51,7 +51,7 @@ def problem(rng, hidden, seconds=40.0):
     rows = np.vstack([np.vstack(base), np.r_[NOISE_MM / 1e-3, np.zeros(8)]])
     x = np.linalg.lstsq(rows, np.r_[read, 0.0], rcond=None)[0]
     left = np.split(read - np.vstack(base) @ x, 2)
-    return runs, base, read, Look(runs, left, base, known, np.zeros((0, 9)), NOISE_MM)
+    return runs, base, read, TemplateScan(runs, left, base, known, np.zeros((0, 9)), NOISE_MM)
 
 
 def extent_of(runs):

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from dbbstation.files import kept as module
-from dbbstation.files.kept import Kept, Noted, Stamp, index_file
+from dbbstation.files.kept import Kept, NotedAnchor, Stamp, index_file
 
 STAMP = Stamp(1, 2)
 
@@ -152,10 +152,10 @@ def test_a_cache_folder_that_cannot_be_made_is_told(folder, monkeypatch, tmp_pat
 def test_an_anchor_outlasts_an_index_that_is_begun_anew_on_purpose(folder, monkeypatch):
     keep(folder)
     with Kept(folder) as index:
-        index.note("a", Noted("ab" * 32, "2026-11-23T08:00:00+00:00"))
+        index.note("a", NotedAnchor("ab" * 32, "2026-11-23T08:00:00+00:00"))
     with Kept(folder, begin_anew=True) as index:
         assert index.of("a", STAMP) is None
-        assert index.noted("a") == Noted("ab" * 32, "2026-11-23T08:00:00+00:00")
+        assert index.noted("a") == NotedAnchor("ab" * 32, "2026-11-23T08:00:00+00:00")
     monkeypatch.setattr(module, "VERSION", "another")
     with Kept(folder) as index:
         assert index.noted("a").anchor == "ab" * 32

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dbbstation.history.standardised import Scatter, standardised
+from dbbstation.history.standardised import ScatterRatio, standardised
 
 
 def one_by_one(values, u, k):
@@ -61,7 +61,7 @@ def test_nothing_is_held_against_nothing(count):
 def test_scatter_about_another_level_counts(rng):
     """A new level begins: the scatter is known from before it, by as many degrees of freedom as there were."""
     values = 5.0 + 3.0 * rng.standard_normal(6)
-    found = standardised(values, np.ones(6), 10, Scatter(20, 20 * 9.0))
+    found = standardised(values, np.ones(6), 10, ScatterRatio(20, 20 * 9.0))
     assert not found.by_stated.any()
     ratio = (values[1] - values[0]) / (np.sqrt(2.0) * 3.0)
     assert found.z[1] == pytest.approx(stats.norm.ppf(stats.t.cdf(ratio, 20)))
@@ -69,7 +69,7 @@ def test_scatter_about_another_level_counts(rng):
 
 def test_in_hindsight_the_scatter_of_all_takes_the_place_of_the_stated_uncertainty(rng):
     values = 4.0 * rng.standard_normal(5)
-    found = standardised(values, np.ones(5), 10, hindsight=Scatter(30, 30 * 16.0))
+    found = standardised(values, np.ones(5), 10, hindsight=ScatterRatio(30, 30 * 16.0))
     ratio = (values[1] - values[0]) / (np.sqrt(2.0) * 4.0)
     assert found.z[1] == pytest.approx(stats.norm.ppf(stats.t.cdf(ratio, 30)))
     assert not found.by_stated.any()
@@ -77,5 +77,5 @@ def test_in_hindsight_the_scatter_of_all_takes_the_place_of_the_stated_uncertain
 
 def test_a_scatter_contradicts_what_is_stated_by_chance_alone_once_in_twenty(rng):
     squares = np.sum(rng.standard_normal((4_000, 8)) ** 2, axis=1)
-    share = np.mean([Scatter(8, square).more_than_stated for square in squares])
+    share = np.mean([ScatterRatio(8, square).more_than_stated for square in squares])
     assert share == pytest.approx(0.05, abs=4.0 * np.sqrt(0.05 * 0.95 / 4_000))

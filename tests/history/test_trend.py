@@ -9,11 +9,11 @@ import pytest
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.history.run_length import average_run_length
 from dbbstation.history.summary import history_summary, tidy_rows
-from dbbstation.history.trend import Asked, histories
+from dbbstation.history.trend import TrendOptions, histories
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
 
-ASKED = Asked(2.0)
+ASKED = TrendOptions(2.0)
 
 
 def run(test="a", direction="ccw", circle="here", g=10.0, u=1.0):
@@ -45,7 +45,7 @@ def test_another_circle_under_the_same_name_is_another_quantity():
 def test_the_rate_is_that_of_all_watched_quantities_of_a_machine():
     """Two tests, G and X of each; C is not watched."""
     runs = (run(), run(test="b"))
-    (machine,) = histories([session(k, *runs) for k in range(30)], {}, Asked(2.0, false_alarms=0.01))
+    (machine,) = histories([session(k, *runs) for k in range(30)], {}, TrendOptions(2.0, false_alarms=0.01))
     assert average_run_length(machine.chart) == pytest.approx(4 / 0.01, rel=1e-4)
     assert machine.expected == pytest.approx(0.01 * 29)
 
@@ -87,9 +87,9 @@ def test_the_smallest_limit_that_holds_counts():
         Tolerance(CircleFigure.CIRCULAR_DEVIATION, 12.5, tests=("a",), directions=(Direction.CCW,)),
     )
     sessions = [session(0, run(), run(direction="cw"), run(test="b", g=11.0))]
-    (machine,) = histories(sessions, {}, Asked(2.0, tolerances))
+    (machine,) = histories(sessions, {}, TrendOptions(2.0, tolerances))
     assert [trend(machine, f"G {name}").limit for name in ("a ccw", "a cw", "b ccw")] == [12.5, 20.0, 20.0]
-    summary = history_summary([machine], Asked(2.0, tolerances))
+    summary = history_summary([machine], TrendOptions(2.0, tolerances))
     said = {one["quantity"]: one["conformity"] for one in summary["machines"][0]["quantities"]}
     assert (said["G a ccw"], said["X a ccw"]) == ("within", None)
 
@@ -111,5 +111,5 @@ def test_what_else_is_new_stands_beside_a_change():
 
 
 def test_tests_can_be_chosen():
-    (machine,) = histories([session(0, run(), run(test="b"))], {}, Asked(2.0, exclude=("a",)))
+    (machine,) = histories([session(0, run(), run(test="b"))], {}, TrendOptions(2.0, exclude=("a",)))
     assert {one.subject.test for one in machine.trends} == {"b"}

@@ -8,7 +8,7 @@ from scipy import stats
 
 from dbbstation.history.run_length import chart_for, signalled_within
 from dbbstation.history.standardised import BASELINE
-from dbbstation.history.watch import Verdict, watch
+from dbbstation.history.watch import TrendVerdict, watch
 
 K = 2.0
 ONE = chart_for(1e-5)
@@ -84,7 +84,7 @@ def test_a_large_step_is_seen_by_the_second_session(rng):
     values[:, 30:] += 12.0
     for row in values:
         events = [e for e in watch(row, np.ones(40), ONE, K).events if e.found >= 30]
-        assert (events[0].verdict, events[0].since, events[0].found) == (Verdict.CHANGED, 30, 31)
+        assert (events[0].verdict, events[0].since, events[0].found) == (TrendVerdict.CHANGED, 30, 31)
         assert events[0].difference == pytest.approx(12.0, abs=5.0 * events[0].u_difference)
 
 
@@ -101,10 +101,10 @@ def test_one_session_that_stands_out_does_not_move_the_level(rng):
     values = rng.standard_normal(60)
     values[40] += 15.0
     found = watch(values, np.ones(60), ONE, K)
-    assert [(e.verdict, e.since, e.found) for e in found.events] == [(Verdict.STANDS_OUT, 40, 40)]
+    assert [(e.verdict, e.since, e.found) for e in found.events] == [(TrendVerdict.STANDS_OUT, 40, 40)]
     others = np.delete(values, 40)
     assert found.level[-1] == pytest.approx(others.mean())
-    assert found.verdict is Verdict.STANDS_OUT
+    assert found.verdict is TrendVerdict.STANDS_OUT
 
 
 def test_after_a_change_the_new_level_is_the_baseline(rng):
@@ -112,7 +112,7 @@ def test_after_a_change_the_new_level_is_the_baseline(rng):
     values[30:] += 9.0
     values[60:] -= 5.0
     found = watch(values, np.ones(90), ONE, K)
-    assert [(e.verdict, e.since) for e in found.events] == [(Verdict.CHANGED, 30), (Verdict.CHANGED, 60)]
+    assert [(e.verdict, e.since) for e in found.events] == [(TrendVerdict.CHANGED, 30), (TrendVerdict.CHANGED, 60)]
     assert found.level[29] == pytest.approx(values[:30].mean())
     assert found.level[50] == pytest.approx(values[32:60].mean())
     assert found.level[-1] == pytest.approx(values[62:].mean())
@@ -125,7 +125,7 @@ def test_the_size_of_a_change_is_right_on_average(rng):
     values[:, 40:] += 3.0
     sizes = []
     for row in values:
-        changes = [e for e in watch(row, np.ones(90), ONE, K).events if e.verdict is Verdict.CHANGED]
+        changes = [e for e in watch(row, np.ones(90), ONE, K).events if e.verdict is TrendVerdict.CHANGED]
         sizes += [(e.difference - 3.0) / e.u_difference for e in changes if e.since > 35]
     assert len(sizes) > 190
     assert np.mean(sizes) == pytest.approx(0.0, abs=4.0 / np.sqrt(len(sizes)))
@@ -140,7 +140,7 @@ def test_after_a_change_the_next_session_begins_the_level_and_the_one_after_is_w
     assert found.events[-1].found == 35
     assert found.lacking == lacking
     assert found.watched == count - 1 - (count > 36)
-    assert found.verdict is Verdict.CHANGED
+    assert found.verdict is TrendVerdict.CHANGED
     assert not found.by_stated
 
 
@@ -151,24 +151,24 @@ def test_after_a_change_the_scatter_of_before_is_still_known(rng):
     values[36:] += 60.0
     found = watch(values, np.ones(50), ONE, K)
     assert [(e.verdict, e.since, e.by_stated) for e in found.events] == [
-        (Verdict.CHANGED, 30, False),
-        (Verdict.CHANGED, 36, False),
+        (TrendVerdict.CHANGED, 30, False),
+        (TrendVerdict.CHANGED, 36, False),
     ]
 
 
 def test_one_session_cannot_tell(rng):
     found = watch(rng.standard_normal(1), np.ones(1), ONE, K)
-    assert found.verdict is Verdict.CANNOT_TELL
+    assert found.verdict is TrendVerdict.CANNOT_TELL
     assert found.lacking == 0
 
 
 @pytest.mark.parametrize("count", range(2, BASELINE + 1))
 def test_from_the_second_session_on_a_large_step_is_seen_by_stated_uncertainty(rng, count):
     values = rng.standard_normal(count)
-    assert watch(values, np.ones(count), ONE, K).verdict is Verdict.STEADY
+    assert watch(values, np.ones(count), ONE, K).verdict is TrendVerdict.STEADY
     values[-1] += 20.0
     found = watch(values, np.ones(count), ONE, K)
-    assert [(e.verdict, e.found, e.by_stated) for e in found.events] == [(Verdict.STANDS_OUT, count - 1, True)]
+    assert [(e.verdict, e.found, e.by_stated) for e in found.events] == [(TrendVerdict.STANDS_OUT, count - 1, True)]
     assert found.by_stated
 
 
@@ -184,7 +184,7 @@ def test_a_change_in_the_first_sessions_stays_when_the_chart_takes_over(rng):
     values[5:] += 20.0
     for count in (7, 10, 11, 12, 30, 60):
         found = watch(values[:count], np.ones(count), ONE, K)
-        assert [(e.verdict, e.since) for e in found.events] == [(Verdict.CHANGED, 5)], count
+        assert [(e.verdict, e.since) for e in found.events] == [(TrendVerdict.CHANGED, 5)], count
 
 
 def test_a_few_sessions_give_as_many_false_alarms_as_stated(rng):
@@ -199,8 +199,8 @@ def test_a_few_sessions_give_as_many_false_alarms_as_stated(rng):
 def test_sessions_that_scatter_by_more_than_stated_are_steady_once_that_is_seen(rng):
     """Four times the stated scatter: each of eight values is beyond its limit with a probability of a quarter."""
     values = 4.0 * rng.standard_normal((40, 50))
-    early = [watch(row[:8], np.ones(8), ONE, K).verdict is not Verdict.STEADY for row in values]
-    late = [watch(row, np.ones(50), ONE, K).verdict is not Verdict.STEADY for row in values]
+    early = [watch(row[:8], np.ones(8), ONE, K).verdict is not TrendVerdict.STEADY for row in values]
+    late = [watch(row, np.ones(50), ONE, K).verdict is not TrendVerdict.STEADY for row in values]
     assert np.mean(early) < 0.4
     assert np.mean(late) < 0.05
 
@@ -209,8 +209,8 @@ def test_a_change_within_its_stated_uncertainty_is_none(rng):
     """Ten times the scatter, a tenth of U."""
     values = 0.01 * rng.standard_normal(60)
     values[30:] += 0.1
-    assert watch(values, np.ones(60), ONE, K).verdict is Verdict.STEADY
-    assert watch(values, np.full(60, 0.01), ONE, K).verdict is Verdict.CHANGED
+    assert watch(values, np.ones(60), ONE, K).verdict is TrendVerdict.STEADY
+    assert watch(values, np.full(60, 0.01), ONE, K).verdict is TrendVerdict.CHANGED
 
 
 def test_units_do_not_matter(rng):

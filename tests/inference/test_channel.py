@@ -12,7 +12,7 @@ from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.folds import held_out_error
 from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
-from dbbstation.inference.read_off import Finding, read_off
+from dbbstation.inference.read_off import CauseFinding, read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import Verdict
@@ -56,7 +56,7 @@ def channel(data: Table, laws: tuple[Law, ...] = (), blocks: int = 2) -> Channel
     )
 
 
-def there(findings: tuple[Finding, ...]) -> dict[str, Finding]:
+def there(findings: tuple[CauseFinding, ...]) -> dict[str, CauseFinding]:
     """Findings that are certain."""
     return {finding.name: finding for finding in findings if finding.verdict is Verdict.IDENTIFIED}
 

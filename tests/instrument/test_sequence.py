@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbbstation.errors import InstrumentError
-from dbbstation.instrument.sequence import Sequence
+from dbbstation.instrument.sequence import SampleOrder
 
 
 def placed(counters: list[int], modulus: int = 100_000) -> tuple[list[tuple[int, int]], list[int]]:
     """Accepted counters with what was lost before them, and rejected ones."""
-    sequence = Sequence[int](modulus, "COM3")
+    sequence = SampleOrder[int](modulus, "COM3")
     out = [one for counter in counters for one in sequence.place(counter, counter)]
     accepted = [(one.sample, one.lost) for one in out if one.lost is not None]
     return accepted, [one.sample for one in out if one.lost is None]
@@ -56,7 +56,7 @@ def test_losses_in_a_row_are_losses() -> None:
 
 
 def test_a_restart_is_believed_when_three_lines_count_on_from_behind() -> None:
-    sequence = Sequence[int](100_000, "COM3")
+    sequence = SampleOrder[int](100_000, "COM3")
     for counter in (500, 501, 0, 1):
         sequence.place(counter, counter)
     with pytest.raises(InstrumentError, match="COM3: the sample counter went from 501 to 0 and counts on from there"):
@@ -71,13 +71,13 @@ def test_a_counter_that_stands_still_is_never_a_reading() -> None:
 
 
 def test_a_wire_without_a_counter_holds_nothing() -> None:
-    sequence = Sequence[str](None, "COM3")
+    sequence = SampleOrder[str](None, "COM3")
     assert [one.lost for one in sequence.place(None, "a")] == [0]
 
 
 @given(st.lists(st.integers(0, 99_999), max_size=60))
 def test_no_counters_whatever_make_samples_vanish_or_appear(counters: list[int]) -> None:
-    sequence = Sequence[int](100_000, "COM3")
+    sequence = SampleOrder[int](100_000, "COM3")
     out: list[int] = []
     given_ = 0
     try:

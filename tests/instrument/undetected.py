@@ -24,16 +24,16 @@ from dbbstation.instrument.codec import Decoder, Piece, decode, encode
 from dbbstation.instrument.damaged import Marks
 from dbbstation.instrument.doubt import Doubts
 from dbbstation.instrument.library import known_instruments, load_variants, with_zero
-from dbbstation.instrument.polling import Answer
+from dbbstation.instrument.polling import PolledReply
 from dbbstation.instrument.reading import OK
-from dbbstation.instrument.sequence import Sequence
+from dbbstation.instrument.sequence import SampleOrder
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.trace.reachable import Reachable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from dbbstation.instrument.protocol import Line, Protocol
+    from dbbstation.instrument.protocol import LineSettings, Protocol
     from dbbstation.instrument.reading import Reading
 
 BAR_MM = 150.0
@@ -63,7 +63,7 @@ def usable_variants(names: Iterable[str] = ()) -> list[Protocol]:
     return [with_zero(one, BAR_MM) if one.length.relative else one for one in variants]
 
 
-def on_wire(raw: bytes, line: Line) -> Code:
+def on_wire(raw: bytes, line: LineSettings) -> Code:
     """Return characters with their parity as the eighth bit, where the line has seven and parity."""
     if line.data_bits == 8:
         assert line.parity == "none"
@@ -181,12 +181,12 @@ class Passage:
         """What the driver takes from one reply: the last of its readings; without one it asks again."""
         heard = Decoder(self._protocol, joining=False).feed(raw)
         pieces = [one for one in heard if isinstance(one, Piece)]
-        return [(0, pieces[-1], Answer(pieces[-1], 0.0, raw).clean)] if pieces else []
+        return [(0, pieces[-1], PolledReply(pieces[-1], 0.0, raw).clean)] if pieces else []
 
     def _streamed(self, raw: bytes) -> list[tuple[int, Piece, bool]]:
         decoder = Decoder(self._protocol, joining=False)
         decoder.feed(b"".join(self._frames[:BEFORE]))
-        sequence = Sequence[tuple[int, Piece, bool]](self._protocol.counter_modulus, "wire")
+        sequence = SampleOrder[tuple[int, Piece, bool]](self._protocol.counter_modulus, "wire")
         if self._protocol.counter_modulus is not None:
             for counter in self._sequence_of:
                 sequence.place(counter, None)  # type: ignore[arg-type]  # what comes back is thrown away

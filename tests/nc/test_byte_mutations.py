@@ -16,7 +16,7 @@ from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.source_text import decode
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.nominal import check_nominal
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 from tests.nc.interpreter import events, needs_rs274
 
 WHOLE = b"""%
@@ -88,7 +88,7 @@ def test_every_mutant_is_read_or_refused_at_once_and_in_little_memory(linuxcnc):
             if path is not None:
                 accepted += 1
                 assert np.isfinite(path.poses[path.is_move]).all()
-                assert np.isfinite(path.feed[path.kind == Step.FEED]).all()
+                assert np.isfinite(path.feed[path.kind == RowKind.FEED]).all()
                 check_nominal(path)
         peak = tracemalloc.get_traced_memory()[1]
     finally:

@@ -7,7 +7,7 @@ import numpy as np
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.compensate import compensate_toolpath
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from tests.plant.hexapod import strut_lengths
@@ -23,9 +23,9 @@ def driven(path):
     row, share = path.subdivided(STEP_MM, 0.002)
     known = ~np.isnan(path.before[row][:, 0]) & path.is_move[row]
     row, share = row[known], share[known]
-    longest = np.flatnonzero(path.kind == Step.FEED)
+    longest = np.flatnonzero(path.kind == RowKind.FEED)
     middle = longest[len(longest) // 2]
-    stops = np.flatnonzero(path.kind == Step.DWELL)
+    stops = np.flatnonzero(path.kind == RowKind.DWELL)
     arc = (row > stops[stops < middle][-1]) & (row < stops[stops > middle][0])
     return path.between(row, share), arc
 

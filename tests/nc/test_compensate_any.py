@@ -11,7 +11,7 @@ from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.export import Inverse, compensated_program
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Motion, Need, Owner, Parameter, Texts
 
 PART = """\
@@ -34,7 +34,7 @@ def reached(model: MachineModel, poses: np.ndarray) -> np.ndarray:
 
 
 def at_shares(path, count=40):
-    row = np.repeat(np.flatnonzero(path.kind == Step.FEED), count)
+    row = np.repeat(np.flatnonzero(path.kind == RowKind.FEED), count)
     return row, np.tile(np.arange(1, count + 1) / count, len(row) // count)
 
 
@@ -72,7 +72,7 @@ def test_the_time_of_every_move_stays_even_where_only_the_tilt_changes(linuxcnc,
     wanted = linuxcnc.read(PART, "part.ngc")
     done = compensate_toolpath(wanted, crooked).toolpath
     again = linuxcnc.read(linuxcnc.write(done), "again.ngc")
-    assert np.isfinite(again.feed_mm_min[again.kind == Step.FEED]).all()
+    assert np.isfinite(again.feed_mm_min[again.kind == RowKind.FEED]).all()
     for line in (4, 6, 7, 8, 9):
         took = done.duration_s[done.line == line].sum()
         assert took == pytest.approx(wanted.duration_s[wanted.line == line].sum(), rel=2e-3)

@@ -11,7 +11,7 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import arc_phi_deg, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import Prefer, compensate_toolpath
 from dbbstation.nc.export import Inverse, circle_programs
-from dbbstation.nc.toolpath import Step, Toolpath, in_pieces
+from dbbstation.nc.toolpath import RowKind, Toolpath, in_pieces
 from dbbstation.plan.circle import Circle
 from dbbstation.sources.contract import Motion
 
@@ -43,7 +43,7 @@ def test_thirty_programs_take_the_machine_to_the_nominal_circles(compensated, ta
             wanted = circle.poses(circle.theta_deg(arc_phi_deg(circle, 0.1)))
             path = compensated[f"{name}-{direction}.ngc"]
             # The move down to the first point may be in pieces.
-            arc = path.poses[path.kind == Step.FEED][-len(wanted) - 1 : -1]
+            arc = path.poses[path.kind == RowKind.FEED][-len(wanted) - 1 : -1]
             off = reached(crooked, arc) - wanted
             worst_mm = max(worst_mm, np.linalg.norm(off[:, :3], axis=1).max())
             worst_deg = max(worst_deg, np.abs(off[:, 3:]).max())
@@ -58,9 +58,9 @@ def test_between_the_points_nothing_is_lost_but_the_chord(compensated, table2, c
     for name in ("a", "g", "o"):
         circle = table2.tests[name].circle
         path = compensated[f"{name}-ccw.ngc"]
-        pieces = np.where(path.kind == Step.FEED, 4, 1)
+        pieces = np.where(path.kind == RowKind.FEED, 4, 1)
         row, share = in_pieces(pieces)
-        on_arc = (path.kind[row] == Step.FEED) & (np.abs(path.tip_mm[row] - 0.26) < 0.01)
+        on_arc = (path.kind[row] == RowKind.FEED) & (np.abs(path.tip_mm[row] - 0.26) < 0.01)
         radial, height = off_the_circle_mm(reached(crooked, path.between(row, share)[on_arc]), circle)
         chord = chord_error_mm(circle, 0.1)
         assert chord == pytest.approx(0.0571e-3, rel=1e-3)
@@ -72,7 +72,7 @@ def test_between_the_points_nothing_is_lost_but_the_chord(compensated, table2, c
 def test_feed_in_goes_along_the_bar(compensated, table2, crooked):
     circle = table2.tests["b"].circle
     path = compensated["b-ccw.ngc"]
-    outside, first = path.poses[path.kind == Step.FEED][:2]
+    outside, first = path.poses[path.kind == RowKind.FEED][:2]
     ways = reached(crooked, outside + np.linspace(0.0, 1.0, 7)[:, None] * (first - outside))[:, :3] - circle.ball_mm
     length = np.linalg.norm(ways, axis=1)
     np.testing.assert_allclose(length, np.linspace(circle.bar_mm + circle.feed_in_mm, circle.bar_mm, 7), atol=1e-5)

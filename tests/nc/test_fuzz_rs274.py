@@ -15,7 +15,7 @@ import pytest
 
 from dbbstation.errors import InputError
 from dbbstation.nc.rs274.reader import read_program
-from dbbstation.nc.toolpath import Step, Toolpath
+from dbbstation.nc.toolpath import RowKind, Toolpath
 from tests.nc.grammar import program
 from tests.nc.interpreter import MOTION, Event, events, needs_rs274
 
@@ -122,19 +122,19 @@ def difference(path: Toolpath, they: list[Event]) -> str:
 
 def grouped(path: Toolpath) -> list[tuple[str, np.ndarray]]:
     """Rows of moves, dwells and pauses, moves at feed of one line together."""
-    told = [row for row, kind in enumerate(path.kind) if Step(kind).name in MOTION]
+    told = [row for row, kind in enumerate(path.kind) if RowKind(kind).name in MOTION]
     groups: list[list[int]] = []
     for row in told:
         same = (
             groups
-            and path.kind[row] == Step.FEED == path.kind[groups[-1][-1]]
+            and path.kind[row] == RowKind.FEED == path.kind[groups[-1][-1]]
             and path.line[row] == path.line[groups[-1][-1]]
         )
         if same:
             groups[-1].append(row)
         else:
             groups.append([row])
-    return [(Step(path.kind[rows[0]]).name, np.array(rows)) for rows in groups]
+    return [(RowKind(path.kind[rows[0]]).name, np.array(rows)) for rows in groups]
 
 
 def off_arc_mm(start: np.ndarray, poses: np.ndarray, event: Event) -> float:

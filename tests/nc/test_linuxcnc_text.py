@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.rs274.guard import guard_lines
-from dbbstation.nc.toolpath import Step, ToolpathBuilder
+from dbbstation.nc.toolpath import RowKind, ToolpathBuilder
 from dbbstation.nc.words import digits
 from dbbstation.plan.circle import Circle, Direction
 
@@ -76,14 +76,14 @@ def test_with_the_bar_on_there_are_no_rapids_and_no_stops(linuxcnc):
 def test_clockwise_runs_the_same_points_backwards():
     there = circle_toolpath(SMALL, "ccw", step_deg=30.0)
     back = circle_toolpath(replace(SMALL, direction=Direction.CW), "cw", step_deg=30.0)
-    arc, other = (path.poses[path.kind == Step.FEED][1:-1] for path in (there, back))
+    arc, other = (path.poses[path.kind == RowKind.FEED][1:-1] for path in (there, back))
     np.testing.assert_allclose(other, arc[::-1], atol=1e-9)
 
 
 def test_the_full_turn_has_3600_points_and_the_path_begins_and_ends_outside(all_runs):
     for circle in all_runs:
         path = circle_toolpath(circle, "x")
-        feeds = path.poses[path.kind == Step.FEED]
+        feeds = path.poses[path.kind == RowKind.FEED]
         from_ball = np.linalg.norm(feeds[:, :3] - circle.ball_mm, axis=1)
         assert len(feeds) == 1 + 1 + 3600 + 900 + 1
         np.testing.assert_allclose(from_ball[1:-1], circle.bar_mm, atol=1e-9)
@@ -94,7 +94,7 @@ def test_the_bar_stays_one_line_with_the_path_when_it_is_raised():
     height = -1100.0 + 100.0 * np.sin(np.radians(5.0))
     raised = replace(SMALL, elevation_deg=5.0, centre_mm=(10.0, 20.0, height))
     path = circle_toolpath(raised, "raised")
-    feeds = path.poses[path.kind == Step.FEED]
+    feeds = path.poses[path.kind == RowKind.FEED]
     outside, first = feeds[0, :3] - raised.ball_mm, feeds[1, :3] - raised.ball_mm
     np.testing.assert_allclose(outside / 102.0, first / 100.0, atol=1e-12)
 

@@ -11,7 +11,7 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc import splitting
 from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.splitting import parts_of, runs_of
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 
@@ -77,7 +77,7 @@ def test_an_arc_is_cut_within_its_chord_error(linuxcnc, crooked, monkeypatch):
     np.testing.assert_allclose(parts.toolpath.poses[-1], whole.toolpath.poses[-1], rtol=0.0, atol=2e-6)
     # A part may take one piece more than its share of the whole, and none is much shorter.
     assert 0 <= len(parts.toolpath) - len(whole.toolpath) <= len(parts_of(path, runs_of(path, np.zeros(len(path)))))
-    shortest_mm = [each.toolpath.tip_mm[each.toolpath.kind == Step.FEED].min() for each in (parts, whole)]
+    shortest_mm = [each.toolpath.tip_mm[each.toolpath.kind == RowKind.FEED].min() for each in (parts, whole)]
     assert shortest_mm[0] > 0.9 * shortest_mm[1]
 
 
@@ -87,4 +87,4 @@ def test_parts_begin_with_moves_at_feed(linuxcnc, monkeypatch):
     parts = parts_of(path, runs_of(path, np.zeros(len(path))))
     assert [part.start for part in parts] == [0, *(part.stop for part in parts[:-1])]
     assert parts[-1].stop == len(path)
-    assert all(path.kind[part.start] == Step.FEED and path.tip_mm[part.start] > 0.0 for part in parts[1:])
+    assert all(path.kind[part.start] == RowKind.FEED and path.tip_mm[part.start] > 0.0 for part in parts[1:])

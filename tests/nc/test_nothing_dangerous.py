@@ -19,7 +19,7 @@ from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.reach import check_reach
 from dbbstation.nc.rs274.blocks import LONGEST_BYTES
 from dbbstation.nc.rs274.reader import MOST_ROWS, read_program
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import (
     SMOOTH_MM,
     UNSTATED_MM,
@@ -62,7 +62,7 @@ def test_what_rounding_leaves_of_increments_is_no_move(linuxcnc, crooked):
     written = compensated_program(path, linuxcnc, Inverse(crooked)).text
     done = linuxcnc.read(written, "done.ngc")
     assert max(feeds(written)) <= 120.0
-    assert done.duration_s[done.kind == Step.FEED].sum() == pytest.approx(5.0 + 60.0 * 0.6 / 100.0, rel=1e-3)
+    assert done.duration_s[done.kind == RowKind.FEED].sum() == pytest.approx(5.0 + 60.0 * 0.6 / 100.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("way", ["0.000000009", "0.000000011", "0.0001"])
@@ -135,7 +135,7 @@ def off_um(model: MachineModel, wanted, done) -> float:
     """Greatest distance of the tool from the wanted lines, and of its tilt felt 100 mm away, at drawn places [µm]."""
     draw = np.random.default_rng(3)
     worst = 0.0
-    for line in np.unique(wanted.line[wanted.kind == Step.FEED]):
+    for line in np.unique(wanted.line[wanted.kind == RowKind.FEED]):
         rows = np.flatnonzero(done.line == line)
         row = np.repeat(rows, 37)
         poses = model.actual_poses(Motion(poses=done.between(row, draw.uniform(size=len(row))), is_path=True))

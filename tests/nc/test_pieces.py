@@ -17,7 +17,7 @@ from dbbstation.nc.curve import felt_mm
 from dbbstation.nc.export import Inverse, Program, circle_programs, compensated_program, planner_of
 from dbbstation.nc.pieces import longest, truest
 from dbbstation.nc.planner import KEPT, LookAhead, Planner
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 from dbbstation.plan.plan import Plan
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Motion, Need, Owner, Parameter, Texts
 from tests.nc.test_compensate_any import Wound
@@ -78,7 +78,7 @@ def test_the_chord_error_is_that_of_arc_and_compensation_together(linuxcnc, refe
     """Without errors of the machine the chord of an arc remains: L = sqrt(8 r c), at most a sixth shorter."""
     path = linuxcnc.read("G21 G90\nG0 X50 Y0 Z-1000 A0 B0 C0\nG3 I-50 F600\nM2\n", "arc.ngc")
     done = compensate_toolpath(path, MachineModel(reference), chord_mm=chord_um / 1e3)
-    arc = done.toolpath.kind == Step.FEED
+    arc = done.toolpath.kind == RowKind.FEED
     fewest = 2.0 * np.pi * 50.0 / np.sqrt(8.0 * 50.0 * chord_um / 1e3)
     assert fewest < np.count_nonzero(arc) < 1.2 * fewest
     points = done.toolpath.between(np.repeat(np.flatnonzero(arc), 50), np.tile(np.arange(50) / 50.0, arc.sum()))
@@ -110,7 +110,7 @@ def test_what_is_reported_is_looked_for_at_many_places(linuxcnc, reference):
     path = linuxcnc.read("G21 G90\nG0 X-100 Y0 Z-1000 A0 B0 C0\nG1 X100 F600\nM2\n", "line.ngc")
     done = compensate_toolpath(path, model, chord_mm=None)
     # One move for the line: it leaves the curve by the whole wave, about 10 µm times the height over the strut's way.
-    row = np.flatnonzero(done.toolpath.kind == Step.FEED)
+    row = np.flatnonzero(done.toolpath.kind == RowKind.FEED)
     share = np.linspace(0.0, 1.0, 1001)
     reached = model.actual_poses(
         Motion(poses=done.toolpath.between(np.repeat(row, 1001), np.tile(share, len(row))), is_path=True)
@@ -179,7 +179,7 @@ def test_a_circle_takes_the_step_that_its_feed_needs(linuxcnc, table2, crooked):
     model = MachineModel(machine, crooked.sources)
     (one, _) = circle_programs(table2, machine, linuxcnc, inverse=Inverse(model), tests=["a"])
     path = linuxcnc.read(one.text, one.name)
-    arc_mm = np.median(path.tip_mm[path.kind == Step.FEED])
+    arc_mm = np.median(path.tip_mm[path.kind == RowKind.FEED])
     assert 2.0 * (1000.0 / 60.0) ** 2 / 1000.0 < arc_mm < 0.65
     assert one.chord_um == pytest.approx(1e3 * arc_mm**2 / (8.0 * 150.0), rel=0.05)
     assert one.feed_s <= 1.01 * one.nominal_feed_s

@@ -7,7 +7,7 @@ import pytest
 
 from dbbstation.errors import InputError
 from dbbstation.nc.rs274.reader import read_program
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 
 FIRST = "G21 G90 G94\nG0 X0 Y0 Z-1000 A0 B0 C0\n"
 
@@ -19,7 +19,7 @@ def ends(text: str) -> np.ndarray:
 
 def test_moves_feeds_and_dwells():
     path = read_program(FIRST + "G1 X10 F600\nY5\nG4 P1.5\nG0 Z-990\nM2\n", "part.ngc")
-    assert [Step(kind).name for kind in path.kind] == ["RAPID", "FEED", "FEED", "DWELL", "RAPID"]
+    assert [RowKind(kind).name for kind in path.kind] == ["RAPID", "FEED", "FEED", "DWELL", "RAPID"]
     np.testing.assert_array_equal(path.poses[2], [10, 5, -1000, 0, 0, 0])
     np.testing.assert_array_equal(path.feed_mm_min[1:3], [600, 600])
     np.testing.assert_allclose(path.duration_s[1:4], [1.0, 0.5, 1.5])
@@ -41,7 +41,13 @@ def test_a_turn_without_a_way_takes_its_feed_in_degrees():
 def test_comments_pauses_functions_and_the_end():
     path = read_program("%\n" + FIRST + "(one) ; two\nS1200 M3\n(MSG, look)\nM0\nM1\nM2\nrubbish\n%\n", "part.ngc")
     assert [path.text.get(row, "") for row in range(1, len(path))] == ["one", "two", "S1200 M3", "look", ""]
-    assert [Step(kind).name for kind in path.kind[1:]] == ["COMMENT", "COMMENT", "FUNCTION", "PAUSE", "OPTIONAL_STOP"]
+    assert [RowKind(kind).name for kind in path.kind[1:]] == [
+        "COMMENT",
+        "COMMENT",
+        "FUNCTION",
+        "PAUSE",
+        "OPTIONAL_STOP",
+    ]
     assert len(read_program("%\n" + FIRST + "%\nG0 X5\n", "part.ngc")) == 1
 
 

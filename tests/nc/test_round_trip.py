@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.registry import dialect_named
-from dbbstation.nc.toolpath import Step, Toolpath, ToolpathBuilder
+from dbbstation.nc.toolpath import RowKind, Toolpath, ToolpathBuilder
 
 LINEAR = st.floats(-2000.0, 2000.0)
 ANGLE = st.floats(-180.0, 180.0)
@@ -16,11 +16,11 @@ POSE = st.tuples(LINEAR, LINEAR, LINEAR, ANGLE, ANGLE, ANGLE).map(np.array)
 FEED = st.floats(1e-3, 1e5)
 TEXT = st.text(st.characters(codec="ascii", categories=["L", "N"]), min_size=1, max_size=30)
 STEP = st.one_of(
-    st.tuples(st.just(Step.RAPID), POSE),
-    st.tuples(st.just(Step.FEED), POSE, FEED),
-    st.tuples(st.just(Step.DWELL), st.floats(0.0, 100.0)),
-    st.tuples(st.just(Step.PAUSE), TEXT),
-    st.tuples(st.just(Step.COMMENT), TEXT),
+    st.tuples(st.just(RowKind.RAPID), POSE),
+    st.tuples(st.just(RowKind.FEED), POSE, FEED),
+    st.tuples(st.just(RowKind.DWELL), st.floats(0.0, 100.0)),
+    st.tuples(st.just(RowKind.PAUSE), TEXT),
+    st.tuples(st.just(RowKind.COMMENT), TEXT),
 )
 
 
@@ -28,11 +28,11 @@ def built(first: np.ndarray, steps: list[tuple]) -> Toolpath:
     path = ToolpathBuilder("drawn")
     path.rapid(first)
     for kind, *content in steps:
-        if kind == Step.RAPID:
+        if kind == RowKind.RAPID:
             path.rapid(content[0])
-        elif kind == Step.FEED:
+        elif kind == RowKind.FEED:
             path.feed(content[0][None], content[1])
-        elif kind == Step.DWELL:
+        elif kind == RowKind.DWELL:
             path.dwell(content[0])
         else:
             path.say(kind, content[0])

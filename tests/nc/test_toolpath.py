@@ -11,7 +11,7 @@ from dbbstation.errors import TravelError
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.nc.reach import check_reach
-from dbbstation.nc.toolpath import RAPID_MM_MIN, Step, ToolpathBuilder, rounded
+from dbbstation.nc.toolpath import RAPID_MM_MIN, RowKind, ToolpathBuilder, rounded
 
 HOME = np.array([0.0, 0.0, -1000.0, 0.0, 0.0, 0.0])
 
@@ -26,7 +26,7 @@ def moved(**axes: float) -> np.ndarray:
 @pytest.fixture
 def path():
     builder = ToolpathBuilder("x")
-    builder.say(Step.COMMENT, "hello")
+    builder.say(RowKind.COMMENT, "hello")
     builder.rapid(HOME)
     builder.feed(moved(X=30, Y=40)[None], 3000.0)
     builder.dwell(2.0)

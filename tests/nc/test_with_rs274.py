@@ -10,7 +10,7 @@ import pytest
 
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.compensate import compensate_toolpath
-from dbbstation.nc.toolpath import Step
+from dbbstation.nc.toolpath import RowKind
 from tests.nc.interpreter import calls, needs_rs274
 
 pytestmark = needs_rs274
@@ -77,4 +77,4 @@ def test_it_agrees_about_programs_written_by_hand(canonical, linuxcnc):
     for row, (pose, said) in enumerate(zip(lasts, told, strict=True)):
         unit = 25.4 if row >= 6 else 1.0
         np.testing.assert_allclose(np.array(said) * ([unit] * 3 + [1.0] * 3), pose, atol=0.51e-4 * unit)
-    assert path.dwell_s[path.kind == Step.DWELL].tolist() == [0.25]
+    assert path.dwell_s[path.kind == RowKind.DWELL].tolist() == [0.25]

@@ -24,7 +24,7 @@ from dbbstation.files.recordings.judged import runs_of
 from dbbstation.files.recordings.session import read_session
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.plan.circle import Circle
-from dbbstation.quality.finding import Finding, Name, Verdict
+from dbbstation.quality.finding import Finding, FindingVerdict, Name
 from dbbstation.quality.judge import Judgement, SessionRuns
 from dbbstation.quality.knowledge import HIGHEST_HARMONIC, Run, Seen, seen
 from dbbstation.trace.cut import edges_of, progress_deg
@@ -332,7 +332,7 @@ class Spoilt:
     share: float
     value: float | None
     limit: float
-    verdict: Verdict
+    verdict: FindingVerdict
     also: tuple[str, ...]
 
 
@@ -346,7 +346,7 @@ def spoil(whole: Sound, run: int, name: Name) -> Iterator[Spoilt]:
         judged = _spoilt(whole, run, name, _size(whole, run, name, share * limit))
         after = finding_of(judged, name)
         others = tuple(f"{f.name}" for f in judged.wrong if f.name is not name)
-        verdict = Verdict.CANNOT_TELL if after is None else after.verdict
+        verdict = FindingVerdict.CANNOT_TELL if after is None else after.verdict
         yield Spoilt(name, share, None if after is None else after.value, limit, verdict, others)
 
 
@@ -526,7 +526,7 @@ def main() -> None:
                 seen += 1
                 alarmed += bool(judgement.wrong)
                 wrong.update(f"{f.name}" for f in judgement.wrong)
-                untold.update(f"{f.name}" for f in judgement.findings if f.verdict is Verdict.CANNOT_TELL)
+                untold.update(f"{f.name}" for f in judgement.findings if f.verdict is FindingVerdict.CANNOT_TELL)
                 for f in judgement.wrong:
                     sys.stderr.write(f"{seed} {judgement.run.label}: {f.name} {f.value} > {f.limit}: {f.text}\n")
             seed += 1

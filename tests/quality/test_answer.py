@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from dbbstation.quality.answer import DO, EXPLAINS, SHOWN_BY, Word, answer
-from dbbstation.quality.finding import Finding, Name, Verdict, found, undecided
+from dbbstation.quality.answer import DO, EXPLAINS, SHOWN_BY, Advice, answer
+from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import seen
 from tests.quality.sabotage import at_feed, bumpy, drifting, elsewhere, mirrored, sound
@@ -37,16 +37,16 @@ def test_every_finding_has_its_place_and_what_to_do():
 
 def test_a_first_circle_is_good_only_as_far_as_can_be_seen(whole):
     first = answered(whole, "b ccw 1")
-    assert (first.word, first.causes) == (Word.CANNOT_TELL, ())
+    assert (first.word, first.causes) == (Advice.CANNOT_TELL, ())
     # The other direction will tell both.
     assert first.unseen == ("whether it ran the wrong way round", "whether the ball stands where it stood")
-    assert answered(whole, "b cw 1").word is Word.GOOD
-    decided = [Finding(name, 0.0, 1.0, "µm", Verdict.GOOD, "") for name in Name]
-    assert answer(decided).word is Word.GOOD
+    assert answered(whole, "b cw 1").word is Advice.GOOD
+    decided = [Finding(name, 0.0, 1.0, "µm", FindingVerdict.GOOD, "") for name in Name]
+    assert answer(decided).word is Advice.GOOD
     assert answer([one for one in decided if one.name is not Name.DIRECTION]).unseen == (
         "whether it ran the wrong way round",
     )
-    assert answer([*decided[:-1], undecided(Name.REPEAT, "no earlier run")]).word is Word.GOOD
+    assert answer([*decided[:-1], undecided(Name.REPEAT, "no earlier run")]).word is Advice.GOOD
 
 
 @pytest.mark.parametrize(
@@ -61,13 +61,13 @@ def test_a_first_circle_is_good_only_as_far_as_can_be_seen(whole):
 )
 def test_the_cause_that_explains_the_others_comes_first(whole, spoiler, sizes, begins):
     found_ = answered(whole, "b cw 1", spoiler, *sizes)
-    assert found_.word is Word.REPEAT
+    assert found_.word is Advice.REPEAT
     assert found_.causes[0].startswith(begins), found_.causes
 
 
 def test_a_recording_without_a_circle_is_repeated():
     assert answer((), "no feed-out seen").causes == ("no feed-out seen",)
-    assert answer((), "no feed-out seen").word is Word.REPEAT
-    assert answer(()).word is Word.CANNOT_TELL  # nothing was looked for
+    assert answer((), "no feed-out seen").word is Advice.REPEAT
+    assert answer(()).word is Advice.CANNOT_TELL  # nothing was looked for
     wrong = found(Name.LOST, 3.0, 0.5, "%", "", "lost")
     assert answer([wrong]).causes == (f"lost samples 3.00 of 0.50 %: {DO[Name.LOST]}",)

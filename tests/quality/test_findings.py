@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
-from dbbstation.quality.finding import Name, Verdict
+from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import Run, seen
 from dbbstation.quality.limits import (
@@ -44,8 +44,8 @@ def test_sound_runs_have_no_findings(machine_session):
 @pytest.mark.parametrize("name", list(SPOILERS))
 def test_half_of_a_limit_is_kept_and_twice_is_found(machine_session, name):
     found = {one.share: one for one in spoil(machine_session, label(machine_session, "h ccw 2"), name)}
-    assert found[0.5].verdict is not Verdict.WRONG
-    assert found[2.0].verdict is Verdict.WRONG
+    assert found[0.5].verdict is not FindingVerdict.WRONG
+    assert found[2.0].verdict is FindingVerdict.WRONG
     assert found[2.0].value == pytest.approx(2.0 * found[2.0].limit, rel=0.05)
 
 
@@ -56,7 +56,7 @@ def test_a_bump_of_sixty_micrometres_is_found_anywhere(machine_session):
     one = machine_session.runs[k].run
     for at_deg in range(15, 346, 30):
         spoilt = SPOILERS[Name.BUMP](one.recording, one.circle, 60.0, float(at_deg))
-        assert finding_of(machine_session.with_spoilt(k, spoilt), Name.BUMP).verdict is Verdict.WRONG, at_deg
+        assert finding_of(machine_session.with_spoilt(k, spoilt), Name.BUMP).verdict is FindingVerdict.WRONG, at_deg
 
 
 def test_a_circle_that_is_three_tenths_too_large_is_found_without_a_model(tmp_path):
@@ -74,7 +74,7 @@ def test_a_circle_that_was_run_the_wrong_way_is_found_by_the_other_direction(mac
     assert abs(across) > 5.0, "this machine's circle f lies on the axis through its start: take another seed"
     spoilt = seen(replace(one, recording=mirrored(one.recording, one.circle, 1.0)))
     judged = SessionRuns([*machine_session.runs[:k], spoilt, *machine_session.runs[k + 1 :]]).judge(spoilt)
-    assert finding_of(judged, Name.DIRECTION).verdict is Verdict.WRONG
+    assert finding_of(judged, Name.DIRECTION).verdict is FindingVerdict.WRONG
 
 
 @pytest.mark.slow
@@ -87,9 +87,9 @@ def test_a_wrong_way_is_found_by_the_model_alone(machine_session):
     covariance = one.expected.covariance_mm2 * known_mm**2 / one.expected.covariance_mm2[1, 1]
     known = replace(one, expected=replace(one.expected, covariance_mm2=covariance))
     alone = SessionRuns([]).judge(seen(known))
-    assert finding_of(alone, Name.DIRECTION).verdict is Verdict.GOOD
+    assert finding_of(alone, Name.DIRECTION).verdict is FindingVerdict.GOOD
     back = SessionRuns([]).judge(seen(replace(known, recording=mirrored(one.recording, one.circle, 1.0))))
-    assert finding_of(back, Name.DIRECTION).verdict is Verdict.WRONG
+    assert finding_of(back, Name.DIRECTION).verdict is FindingVerdict.WRONG
 
 
 @pytest.mark.slow
@@ -98,7 +98,7 @@ def test_a_circle_that_lies_on_the_axis_through_its_start_does_not_show_its_dire
     one = replace(machine_session.runs[k].run, expected=None)
     alone = SessionRuns([]).judge(seen(one))
     found = finding_of(alone, Name.DIRECTION)
-    assert found.verdict is Verdict.CANNOT_TELL
+    assert found.verdict is FindingVerdict.CANNOT_TELL
     assert "cannot be seen" in found.text
 
 
@@ -119,7 +119,7 @@ def test_nothing_known_means_cannot_tell(machine_session):
     bare = Run(one.test, 1, "m", one.circle, one.recording, None, 0.5)
     verdicts = {f.name: f.verdict for f in SessionRuns([]).judge(seen(bare)).findings}
     for name in (Name.NOISE, Name.RADIUS, Name.BORE, Name.OTHER_DIRECTION, Name.REPEAT, Name.DIRECTION):
-        assert verdicts[name] is Verdict.CANNOT_TELL
+        assert verdicts[name] is FindingVerdict.CANNOT_TELL
     assert set(verdicts) == set(Name) - {Name.CIRCLE}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.plan.circle import Direction
-from dbbstation.quality.finding import Name, Verdict
+from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import seen
 from tests.quality.sabotage import (
@@ -50,7 +50,7 @@ def test_a_ball_that_was_knocked_between_the_directions_of_the_first_test_is_fou
     assert judged([first], second).wrong == ()
     for size_um in (500.0, -500.0, 50.0):
         knocked = judged([first], spoilt(second, elsewhere, size_um))
-        assert finding_of(knocked, Name.OTHER_DIRECTION).verdict is Verdict.WRONG, size_um
+        assert finding_of(knocked, Name.OTHER_DIRECTION).verdict is FindingVerdict.WRONG, size_um
 
 
 def test_no_limit_of_the_first_pair_is_beyond_what_is_stated(whole):
@@ -70,7 +70,7 @@ def test_a_wrong_start_is_still_wrong_after_a_repeat(whole, start_deg):
     first, second = run(whole, "b ccw 1"), run(whole, "b cw 1")
     again = numbered(spoilt(second, begun_elsewhere, start_deg), 2)
     found = finding_of(judged([first], again), Name.OTHER_DIRECTION)
-    assert found.verdict is Verdict.WRONG
+    assert found.verdict is FindingVerdict.WRONG
     assert "b ccw 1" in found.text
     assert judged([first], numbered(second, 2)).wrong == ()
 
@@ -92,8 +92,8 @@ def test_a_wrong_way_is_found_in_the_first_pair(whole):
     first, second = run(whole, "h ccw 1"), run(whole, "h cw 1")
     assert abs(first.coefficients_um[4]) > 10.0, "this machine's circle lies on the axis through its start"
     found = finding_of(judged([first], spoilt(second, mirrored, 1.0)), Name.DIRECTION)
-    assert found.verdict is Verdict.WRONG
-    assert finding_of(judged([first], second), Name.DIRECTION).verdict is Verdict.GOOD
+    assert found.verdict is FindingVerdict.WRONG
+    assert finding_of(judged([first], second), Name.DIRECTION).verdict is FindingVerdict.GOOD
 
 
 def test_the_circle_of_another_test_is_recognised_once_that_was_measured(whole):
@@ -106,10 +106,10 @@ def test_the_circle_of_another_test_is_recognised_once_that_was_measured(whole):
         recording = replace(other.run.recording, length_mm=other.run.recording.length_mm + noise)
         wrong = seen(replace(own.run, circle=circle, recording=recording))
         found = finding_of(judged(before, wrong), Name.TEST)
-        assert found.verdict is Verdict.WRONG
+        assert found.verdict is FindingVerdict.WRONG
         assert "run b" in found.text
-    assert finding_of(judged(before, own), Name.TEST).verdict is Verdict.GOOD
-    assert finding_of(judged([], own), Name.TEST).verdict is Verdict.CANNOT_TELL
+    assert finding_of(judged(before, own), Name.TEST).verdict is FindingVerdict.GOOD
+    assert finding_of(judged([], own), Name.TEST).verdict is FindingVerdict.CANNOT_TELL
 
 
 @pytest.mark.slow
@@ -120,12 +120,12 @@ def test_the_circle_of_another_test_is_recognised_by_the_model_before_that_was_m
     apart = {one.run.label: np.linalg.norm(one.run.expected.form_um - own.run.expected.form_um) for one in others}
     for one in others:
         found = finding_of(judged([], seen(replace(own.run, recording=one.run.recording))), Name.TEST)
-        assert found.verdict is not Verdict.GOOD
+        assert found.verdict is not FindingVerdict.GOOD
     farthest = run(session, max(apart, key=apart.get))
     found = finding_of(judged([], seen(replace(own.run, recording=farthest.run.recording))), Name.TEST)
-    assert found.verdict is Verdict.WRONG
+    assert found.verdict is FindingVerdict.WRONG
     assert f"test {farthest.run.test} ccw" in found.text
-    assert finding_of(judged([], own), Name.TEST).verdict is Verdict.GOOD
+    assert finding_of(judged([], own), Name.TEST).verdict is FindingVerdict.GOOD
 
 
 def test_a_drift_that_moves_the_centre_less_than_the_plan_leaves_open_is_no_fault(whole):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dbbstation.quality.finding import Verdict
+from dbbstation.quality.finding import FindingVerdict
 from dbbstation.quality.held import HeldLength, equal_limit, held
 from dbbstation.quality.limits import SHARE
 
@@ -134,12 +134,12 @@ class Turn(SimpleNamespace):
 def test_a_recorded_turn_that_stood_still_has_that_as_its_finding():
     t_s, length_mm = readings(5)
     theta_deg = 360.0 * t_s / TURN_S
-    assert held(Turn(t_s=t_s, length_mm=length_mm, theta_deg=theta_deg)).verdict is Verdict.GOOD
+    assert held(Turn(t_s=t_s, length_mm=length_mm, theta_deg=theta_deg)).verdict is FindingVerdict.GOOD
     gone = length_mm.copy()
     gone[1000:1100] = gone[1000]
     found = held(Turn(t_s=t_s, length_mm=gone, theta_deg=theta_deg))
-    assert found.verdict is Verdict.WRONG
+    assert found.verdict is FindingVerdict.WRONG
     assert found.value == pytest.approx(99 * 0.02, abs=0.021)
     assert f"{theta_deg[1000]:.0f} degrees" in found.text
     coarse = held(Turn(t_s=t_s, length_mm=np.round(gone, 2), theta_deg=theta_deg))
-    assert coarse.verdict is Verdict.CANNOT_TELL
+    assert coarse.verdict is FindingVerdict.CANNOT_TELL

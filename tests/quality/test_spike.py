@@ -13,7 +13,7 @@ import pytest
 
 from dbbstation.cli import DONE
 from dbbstation.quality import limits
-from dbbstation.quality.finding import Verdict
+from dbbstation.quality.finding import FindingVerdict
 from dbbstation.quality.spike import spike
 from tests.cli.conftest import call
 from tests.plant.noise import Noise
@@ -39,7 +39,7 @@ def test_five_micrometres_over_one_or_two_readings_are_found_with_their_place(wi
     values = noise(3)
     values[1234 : 1234 + width] += height_um
     found = spike(circle(values), ())
-    assert found.verdict is Verdict.WRONG
+    assert found.verdict is FindingVerdict.WRONG
     assert abs(found.value - 5.0) < 3.0 * 0.4 * np.sqrt(2.0)
     assert found.limit < 4.0
     assert f"at {123.4:.1f} degrees" in found.text or f"at {123.5:.1f} degrees" in found.text
@@ -48,19 +48,19 @@ def test_five_micrometres_over_one_or_two_readings_are_found_with_their_place(wi
 def test_a_form_of_the_machine_is_no_spike():
     phi = np.radians(PHI_DEG)
     form = 20.0 * np.cos(2.0 * phi) + 5.0 * np.cos(7.0 * phi) + 1.0 * np.cos(60.0 * phi)
-    assert spike(circle(form + noise(4)), ()).verdict is Verdict.GOOD
+    assert spike(circle(form + noise(4)), ()).verdict is FindingVerdict.GOOD
 
 
 def test_readings_in_coarse_steps_are_no_spikes():
     """The step is larger than the noise: most readings are the same, and the others a whole step off."""
     for seed in range(20):
-        assert spike(circle(np.round(noise(seed)), 1.0), ()).verdict is Verdict.GOOD
+        assert spike(circle(np.round(noise(seed)), 1.0), ()).verdict is FindingVerdict.GOOD
 
 
 def test_beside_a_gap_neighbours_say_nothing():
     kept = np.r_[0:1000, 1040:3600]
     values = (0.05 * PHI_DEG + noise(5))[kept]
-    assert spike(circle(values, phi_deg=PHI_DEG[kept]), ()).verdict is Verdict.GOOD
+    assert spike(circle(values, phi_deg=PHI_DEG[kept]), ()).verdict is FindingVerdict.GOOD
 
 
 def test_a_spike_that_every_reversal_has_is_the_machines():
@@ -68,15 +68,15 @@ def test_a_spike_that_every_reversal_has_is_the_machines():
     values = noise(6)
     for at in reversals:
         values[round(10 * at)] += 5.0
-    assert spike(circle(values), reversals).verdict is Verdict.GOOD
-    assert spike(circle(values), ()).verdict is Verdict.WRONG
+    assert spike(circle(values), reversals).verdict is FindingVerdict.GOOD
+    assert spike(circle(values), ()).verdict is FindingVerdict.WRONG
     values[920] += 5.0
-    assert spike(circle(values), reversals).verdict is Verdict.WRONG
+    assert spike(circle(values), reversals).verdict is FindingVerdict.WRONG
 
 
 def test_too_few_readings_cannot_tell():
     few = PHI_DEG[::60]
-    assert spike(circle(np.zeros(len(few)), phi_deg=few), ()).verdict is Verdict.CANNOT_TELL
+    assert spike(circle(np.zeros(len(few)), phi_deg=few), ()).verdict is FindingVerdict.CANNOT_TELL
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.7, 0.97])

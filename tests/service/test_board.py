@@ -12,7 +12,7 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.plan import Plan
-from dbbstation.service.board import Board, Mark, SequenceOpened, Verdict
+from dbbstation.service.board import Board, Mark, RunDecision, SequenceOpened
 from dbbstation.service.live_trace import LiveTrace, View, difference
 from dbbstation.service.messages import Weight
 from dbbstation.station import events
@@ -169,7 +169,7 @@ def test_the_place_of_a_ball_under_the_spindle_is_where_the_machine_stands() -> 
 
 def test_a_rejected_run_is_marked_and_its_trace_goes() -> None:
     board = Happening().circle("t0", Direction.CCW).command(Reject()).board()
-    assert board.verdicts == {"t0-ccw-1": Verdict.REJECTED}
+    assert board.verdicts == {"t0-ccw-1": RunDecision.REJECTED}
     assert board.traces == {}
     (row,) = FiguresPanel().text(board).plain.splitlines()[1:]
     assert row.startswith("x ")
@@ -228,7 +228,7 @@ def test_runs_of_earlier_sittings_are_known_rejected_ones_too() -> None:
     board.take(SequenceOpened(happening.schedule.tasks, (), "session-7", known))
     assert board.runs_of("t0", Direction.CCW) == (completed, later)
     assert board.runs_of("t0", Direction.CW) == ()
-    assert (board.verdicts["t0-ccw-2"], board.reasons["t0-ccw-2"]) == (Verdict.REJECTED, "a chip")
+    assert (board.verdicts["t0-ccw-2"], board.reasons["t0-ccw-2"]) == (RunDecision.REJECTED, "a chip")
     # The figures of a test are those of its last run that may count.
     assert board.figures_of("t0", Direction.CCW) == figures
     board.take(events.RunAccepted(later.run))

@@ -13,10 +13,11 @@ import pytest
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
-from dbbstation.service.after import USUAL, After, Step
+from dbbstation.service.after import USUAL, After
 from dbbstation.service.former_sessions import Former, InForce, before_and_now, former_sessions, keep_models
+from dbbstation.service.job import SessionJob, SessionTask
 from dbbstation.service.last_session import last_traces
-from dbbstation.service.work import Progress
+from dbbstation.service.work import WorkProgress
 from tests.plant.mechanisms.balls import CmmScatter
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import BEGUN, Program, record
@@ -105,19 +106,19 @@ def test_the_model_in_force_before_is_copied_once_and_never_overwritten(shop: Pa
 def test_an_acceptance_is_the_report_of_both_sessions(shop: Path) -> None:
     begun: list[Scripted] = []
 
-    def start(arguments: list[str], folder: Path) -> Scripted:
-        begun.append(Scripted(arguments, folder))
+    def start(job: SessionJob, folder: Path) -> Scripted:
+        begun.append(Scripted(job, folder))
         return begun[-1]
 
     after = After(shop / "now", start=start)  # type: ignore[arg-type]
-    assert not after.can(Step.ACCEPTANCE)
-    assert Step.ACCEPTANCE not in USUAL
+    assert not after.can(SessionTask.ACCEPTANCE)
+    assert SessionTask.ACCEPTANCE not in USUAL
     after.accept(before_and_now(shop / "now").formers[1])
     (work,) = begun
-    assert work.arguments[:4] == ["report", str(shop / "now"), "--before", str(shop / "there")]
-    work.progress = Progress.DONE
+    assert (work.job.task, work.job.session, work.job.before) == ("acceptance", shop / "now", shop / "there")
+    work.progress = WorkProgress.DONE
     after.look()
-    assert after.results[Step.ACCEPTANCE].path == after.folder / "acceptance.html"
+    assert after.results[SessionTask.ACCEPTANCE].path == after.folder / "acceptance.html"
     assert [path.parent for path in after.kept] == [after.folder]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -20,16 +22,17 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.duration import circle_s
-from dbbstation.service.after import After, Result, Step
-from dbbstation.service.candidates import Kind, candidates
-from dbbstation.service.choice import Choice, Part
+from dbbstation.service.after import After, Result
+from dbbstation.service.candidates import CandidateFormat, candidates
+from dbbstation.service.choice import Choice, SetUpPart
 from dbbstation.service.front import Front
+from dbbstation.service.job import SessionJob, SessionTask
 from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.service.port_probe import probe
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.shop_temperature import note_temperature, shop_degc
-from dbbstation.service.work import Progress, Work
+from dbbstation.service.work import BackgroundWork, WorkProgress
 from dbbstation.virtual.wire import VirtualInstrument
 from tests.cli.conftest import call
 
@@ -53,9 +56,9 @@ def session(front: Front) -> Path:
     return folder
 
 
-def ended(work: Work) -> Progress:
+def ended(work: BackgroundWork) -> WorkProgress:
     end_s = time.monotonic() + PATIENCE_S
-    while work.progress is Progress.RUNNING:
+    while work.progress is WorkProgress.RUNNING:
         assert time.monotonic() < end_s
         time.sleep(0.02)
     return work.progress
@@ -127,12 +130,12 @@ def test_a_virtual_machine_is_never_offered_unless_it_is_asked_for(front: Front,
     assert front.first_choice().line == REAL
     assert front.goes_on_with(session).line == REAL
     front.memory.write(Remembered().with_session(tried, virtual))
-    assert Part.PORT in front.first_choice().missing()
-    assert Part.PORT in front.goes_on_with(session).missing()
+    assert SetUpPart.PORT in front.first_choice().missing()
+    assert SetUpPart.PORT in front.goes_on_with(session).missing()
     # As a program before this one wrote it.
     text = front.memory.path.read_text()
     front.memory.path.write_text(_with_last_line(text, virtual))
-    assert Part.PORT in front.first_choice().missing()
+    assert SetUpPart.PORT in front.first_choice().missing()
 
 
 def _with_last_line(text: str, line: Line) -> str:
@@ -155,12 +158,12 @@ def test_a_memory_that_cannot_be_kept_harms_nobody(tmp_path: Path) -> None:
 def test_files_to_choose_from_are_known_by_their_format(front: Front, session: Path) -> None:
     shutil.copy(PLAN, front.under / "mine.yaml")
     (front.under / "notes.yaml").write_text("a: 1\n")
-    plans = candidates(Kind.PLAN, front.under)
+    plans = candidates(CandidateFormat.PLAN, front.under)
     assert plans[0] == front.under / "mine.yaml"
     assert PLAN in plans
     assert not [path for path in plans if session in path.parents]
-    assert candidates(Kind.PLAN, front.under, shipped=False) == (front.under / "mine.yaml",)
-    assert MACHINE in candidates(Kind.MACHINE, front.under)
+    assert candidates(CandidateFormat.PLAN, front.under, shipped=False) == (front.under / "mine.yaml",)
+    assert MACHINE in candidates(CandidateFormat.MACHINE, front.under)
 
 
 def test_a_port_answers_with_its_reading_or_says_what_is_wrong() -> None:
@@ -176,7 +179,14 @@ def test_a_port_answers_with_its_reading_or_says_what_is_wrong() -> None:
 
 
 def test_what_is_missing_is_told_in_the_order_it_is_asked_for(front: Front) -> None:
-    assert Choice().missing() == (Part.MACHINE, Part.PLAN, Part.INSTRUMENT, Part.PORT, Part.BAR, Part.FOLDER)
+    assert Choice().missing() == (
+        SetUpPart.MACHINE,
+        SetUpPart.PLAN,
+        SetUpPart.INSTRUMENT,
+        SetUpPart.PORT,
+        SetUpPart.BAR,
+        SetUpPart.FOLDER,
+    )
     assert front.virtual_choice().missing() == ()
     with pytest.raises(ValueError, match="port"):
         front.prepare(Choice())
@@ -202,7 +212,7 @@ def test_a_plan_beyond_the_travel_is_refused(front: Front) -> None:
 
 def test_a_real_session_needs_the_bar_or_a_reason(front: Front) -> None:
     choice = Choice(front.new_folder(), MACHINE, PLAN, REAL)
-    assert choice.missing() == (Part.BAR,)
+    assert choice.missing() == (SetUpPart.BAR,)
     bar = shipped_folder("fixtures") / "bars" / "zerodur.yaml"
     with pytest.raises(InputError, match="last on its calibrator"):
         front.prepare(replace(choice, bar=bar))
@@ -210,45 +220,67 @@ def test_a_real_session_needs_the_bar_or_a_reason(front: Front) -> None:
     assert (waived.job.details.bar_waiver, waived.job.details.job) == ("a first look", "order 4711")
 
 
-def test_work_answers_with_what_its_command_prints(tmp_path: Path) -> None:
-    work = Work(["evaluate", str(SMALL), "--model", str(tmp_path / "none.yaml")], tmp_path)
-    assert ended(work) is Progress.FAILED
-    assert "none.yaml" in work.failure()
+def test_work_answers_with_its_result(session: Path, tmp_path: Path) -> None:
+    work = BackgroundWork(SessionJob(task=SessionTask.CALIBRATE, beside=tmp_path, out="model.yaml"), tmp_path)
+    assert ended(work) is WorkProgress.FAILED
+    assert work.failure().splitlines() == [
+        "ValueError: the job has no session",
+        "this is a fault of dbbstation itself; the log shows what to report",
+    ]
     work.close()
-    work = Work(["check", str(MACHINE)], tmp_path)
-    assert ended(work) is Progress.DONE
-    assert "provenance" in work.answer()
+    gone = SessionJob(task=SessionTask.REPORT, beside=tmp_path, out="report.html", session=tmp_path / "gone")
+    work = BackgroundWork(gone, tmp_path)
+    assert ended(work) is WorkProgress.FAILED
+    assert "gone" in work.failure()
+    assert "fault of dbbstation" not in work.failure()
+    work.close()
+    work = BackgroundWork(gone.model_copy(update={"session": session}), tmp_path)
+    assert ended(work) is WorkProgress.DONE
+    assert work.answer()["report"] == "report.html"
+    assert "dbbstation report monday" in (tmp_path / "report.html").read_text("utf-8")
+    assert work.stage
     work.close()
 
 
-def test_work_can_be_ended(tmp_path: Path) -> None:
-    work = Work(["demo", "--out", str(tmp_path / "demo")], tmp_path)
-    time.sleep(1.0)
-    assert work.progress is Progress.RUNNING
+def test_work_can_be_ended(session: Path, tmp_path: Path) -> None:
+    work = BackgroundWork(
+        SessionJob(task=SessionTask.DIAGNOSE, beside=tmp_path, out="joint.yaml", session=session), tmp_path
+    )
+    end_s = time.monotonic() + PATIENCE_S
+    while not work.stage:
+        assert time.monotonic() < end_s
+        time.sleep(0.02)
     work.cancel()
-    assert ended(work) is Progress.CANCELLED
+    assert ended(work) is WorkProgress.CANCELLED
     work.close()
     assert work.passed_s < PATIENCE_S
+    assert list(tmp_path.glob("joint*")) == []
+
+
+def test_the_station_does_not_load_what_is_computed() -> None:
+    script = "import sys, dbbstation.service.front; sys.exit(','.join(m for m in sys.modules if m.startswith('dbbstation.tasks')))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.stderr.strip() == ""
 
 
 class Scripted:
-    """Stands where a command runs: ends as it is told to."""
+    """Stands where a job is done: ends as it is told to."""
 
     stage = "fit of 6 runs"
     passed_s = 1.0
 
-    def __init__(self, arguments: list[str], folder: Path) -> None:
-        self.arguments, self.folder = arguments, folder
-        self.progress = Progress.RUNNING
+    def __init__(self, job: SessionJob, folder: Path) -> None:
+        self.job, self.folder = job, folder
+        self.progress = WorkProgress.RUNNING
 
     def answer(self) -> dict[str, str]:
-        return {"from": self.arguments[0]}
+        return {"from": self.job.task}
 
     def failure(self) -> str:
         return "it failed"
 
     def cancel(self) -> None:
-        self.progress = Progress.CANCELLED
+        self.progress = WorkProgress.CANCELLED
 
     def close(self) -> None:
         pass
@@ -257,30 +289,30 @@ class Scripted:
 def test_steps_after_a_session_follow_each_other_and_use_the_best_model(session: Path) -> None:
     begun: list[Scripted] = []
 
-    def start(arguments: list[str], folder: Path) -> Scripted:
-        begun.append(Scripted(arguments, folder))
+    def start(job: SessionJob, folder: Path) -> Scripted:
+        begun.append(Scripted(job, folder))
         return begun[-1]
 
     after = After(session, start=start)  # type: ignore[arg-type]
-    assert not after.can(Step.PROGRAMS)
-    after.do(Step.CALIBRATE, Step.PROGRAMS, Step.REPORT)
+    assert not after.can(SessionTask.PROGRAMS)
+    after.do(SessionTask.CALIBRATE, SessionTask.PROGRAMS, SessionTask.REPORT)
     for work in range(3):
         after.look()
         assert after.busy is not None
         assert after.results[after.busy].stage == "fit of 6 runs"
-        begun[work].progress = Progress.DONE
+        begun[work].progress = WorkProgress.DONE
         after.look()
     results = session.parent / "monday-results"
     assert after.busy is None
     assert after.folder == results
-    assert [one.arguments[0] for one in begun] == ["calibrate", "program", "report"]
-    assert all(str(results / "model.yaml") in one.arguments for one in begun[1:])
-    assert after.results[Step.REPORT].path == results / "report.html"
-    after.do(Step.DIAGNOSE, Step.REPORT)
+    assert [one.job.task for one in begun] == ["calibrate", "programs", "report"]
+    assert [one.job.model for one in begun] == [None, results / "model.yaml", results / "model.yaml"]
+    assert after.results[SessionTask.REPORT].path == results / "report.html"
+    after.do(SessionTask.DIAGNOSE, SessionTask.REPORT)
     after.look()
     after.cancel()
     after.look()
-    assert (after.busy, after.results[Step.DIAGNOSE].progress) == (None, Progress.CANCELLED)
+    assert (after.busy, after.results[SessionTask.DIAGNOSE].progress) == (None, WorkProgress.CANCELLED)
     assert after.model == results / "model.yaml"
     # The next sitting goes on with it, as long as the same runs count.
     assert After(session).folder == results
@@ -288,11 +320,11 @@ def test_steps_after_a_session_follow_each_other_and_use_the_best_model(session:
 
 def test_a_failure_ends_the_row_and_says_why(session: Path) -> None:
     after = After(session, start=Scripted)  # type: ignore[arg-type]
-    after.do(Step.CALIBRATE, Step.REPORT)
-    after._running[1].progress = Progress.FAILED
+    after.do(SessionTask.CALIBRATE, SessionTask.REPORT)
+    after._running[1].progress = WorkProgress.FAILED
     after.look()
-    assert after.results[Step.CALIBRATE].failure == "it failed"
-    assert after.results[Step.REPORT] == Result()
+    assert after.results[SessionTask.CALIBRATE].failure == "it failed"
+    assert after.results[SessionTask.REPORT] == Result()
 
 
 def test_virtual_ports_are_offered(front: Front) -> None:

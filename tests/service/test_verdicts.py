@@ -12,13 +12,13 @@ from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
-from dbbstation.service.after import After, Step
+from dbbstation.service.after import After
+from dbbstation.service.job import SessionJob, SessionTask
 from dbbstation.service.verdicts import give_verdict
-from dbbstation.service.work import Progress
+from dbbstation.service.work import WorkProgress
 from dbbstation.station.commands import Judge
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
 VIRTUAL = shipped_folder("fixtures") / "sessions" / "virtual"
@@ -32,10 +32,10 @@ def session(tmp_path: Path) -> Path:
 class Done:
     """Work that is done at once and wrote what it was asked for."""
 
-    progress, stage, passed_s = Progress.DONE, "", 2.5
+    progress, stage, passed_s = WorkProgress.DONE, "", 2.5
 
-    def __init__(self, arguments: Sequence[str], folder: Path) -> None:
-        (folder / arguments[arguments.index("--out") + 1]).write_text("written", encoding="utf-8")
+    def __init__(self, job: SessionJob, folder: Path) -> None:
+        (folder / job.out).write_text("written", encoding="utf-8")
 
     def answer(self) -> dict[str, object]:
         return {"parameters": 42}
@@ -54,21 +54,21 @@ def test_a_verdict_is_given_to_a_session_that_nobody_measures(session: Path) -> 
 
 def test_what_was_worked_out_stands_there_again_until_other_runs_count(session: Path) -> None:
     first = After(session, start=Done)
-    assert first.results[Step.CALIBRATE].progress is None
-    first.do(Step.CALIBRATE)
+    assert first.results[SessionTask.CALIBRATE].progress is None
+    first.do(SessionTask.CALIBRATE)
     first.look()
     assert first.folder.name == "session-results"
     again = After(session, start=Done)
-    found = again.results[Step.CALIBRATE]
-    assert (found.progress, found.answer, found.passed_s) == (Progress.DONE, {"parameters": 42}, 2.5)
+    found = again.results[SessionTask.CALIBRATE]
+    assert (found.progress, found.answer, found.passed_s) == (WorkProgress.DONE, {"parameters": 42}, 2.5)
     assert again.model == found.path == first.folder / "model.yaml"
     assert again.folder == first.folder  # no second folder
-    assert again.results[Step.DIAGNOSE].progress is None
+    assert again.results[SessionTask.DIAGNOSE].progress is None
     assert not again.outdated
     give_verdict(session, Judge("a", Direction.CW, 1, accepted=False, reason="the bar slipped"))
     assert again.outdated
     other = After(session, start=Done)
-    assert (other.results[Step.CALIBRATE].progress, other.folder.name) == (None, "session-results-2")
+    assert (other.results[SessionTask.CALIBRATE].progress, other.folder.name) == (None, "session-results-2")
     give_verdict(session, Judge("a", Direction.CW, 1, accepted=True))
     (first.folder / "model.yaml").unlink()  # a file that is gone was not worked out
-    assert After(session, start=Done).results[Step.CALIBRATE].progress is None
+    assert After(session, start=Done).results[SessionTask.CALIBRATE].progress is None

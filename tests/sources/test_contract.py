@@ -33,7 +33,7 @@ def machine(request, reference, rng):
 def some_values(parameters, rng):
     """Two or three times the usual size, of either sign for what is no time constant."""
     factor = rng.uniform(0.5, 3, len(parameters))
-    signs = np.array([1.0 if parameter.shape else rng.choice([-1.0, 1.0]) for parameter in parameters])
+    signs = np.array([1.0 if parameter.grid else rng.choice([-1.0, 1.0]) for parameter in parameters])
     return signs * factor * [parameter.plausible for parameter in parameters]
 
 
@@ -69,7 +69,7 @@ def test_nothing_comes_of_nothing_and_amplitudes_are_in_proportion(source, machi
     assert set(arrays(source.derivative(motion, machine, np.zeros(len(parameters))))) == set(arrays(nothing))
     if Need.PATH not in source.needs:  # the range of a play hangs on its width
         values = some_values(parameters, rng)
-        doubled = values * np.where([bool(p.shape) for p in parameters], 1.0, 2.0)
+        doubled = values * np.where([bool(p.grid) for p in parameters], 1.0, 2.0)
         once, twice = (arrays(source.effect(motion, machine, v)) for v in (values, doubled))
         assert all(np.allclose(twice[name], 2 * once[name], rtol=1e-12) for name in once)
 
@@ -94,7 +94,7 @@ def test_parameters_and_texts_are_complete(source, machine):
         assert len(parameter.meaning.split()) > 3
         named = re.match(r"(?:strut|joint)_([1-6])_", parameter.name)
         assert parameter.strut == (int(named[1]) if named else None)
-        assert not parameter.shape or min(parameter.shape) <= parameter.plausible <= max(parameter.shape)
+        assert not parameter.grid or min(parameter.grid) <= parameter.plausible <= max(parameter.grid)
     for f in fields(source.texts):
         assert len(getattr(source.texts, f.name)) > 9, f.name
     assert source.belongs_to in Owner

@@ -39,7 +39,7 @@ class Remembering(ErrorSource):
 def drawn(source, machine, rng):
     """Two or three times the usual size, of either sign for amplitudes."""
     parameters = source.parameters(machine)
-    signs = np.array([1.0 if p.shape else rng.choice([-1.0, 1.0]) for p in parameters])
+    signs = np.array([1.0 if p.grid else rng.choice([-1.0, 1.0]) for p in parameters])
     return signs * rng.uniform(0.5, 3, len(parameters)) * [p.plausible for p in parameters]
 
 

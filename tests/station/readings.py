@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.plan.circle import Circle
     from dbbstation.station.events import Event, RunId, Sample
-    from dbbstation.station.run_record import Recorded
+    from dbbstation.station.run_record import RunRecall
     from dbbstation.trace.recording import Recording
 
 RATE_HZ = 20.0
@@ -31,7 +31,7 @@ def run_readings(circle: Circle, begin_s: float = 0.0, rate_hz: float = RATE_HZ)
     return [Reading(begin_s + float(t), float(value)) for t, value in zip(t_s, length, strict=True)]
 
 
-def told_and_untold(told: Sequence[Event]) -> Recorded:
+def told_and_untold(told: Sequence[Event]) -> RunRecall:
     """The recording of a run of which a list of events has the first samples."""
 
     def recorded(run: RunId, behind: Sequence[Sample]) -> Recording:
@@ -50,5 +50,5 @@ def still(length_mm: float | None, seconds: float, begin_s: float = 0.0) -> list
 
 def kinds(events: Iterable[Event]) -> list[str]:
     """Names of events, without those that only carry samples or states."""
-    quiet = {"StateChanged", "ReadingsSeen", "SamplesRecorded", "Progress"}
+    quiet = {"StateChanged", "ReadingsSeen", "SamplesRecorded", "RunProgress"}
     return [name for event in events if (name := type(event).__name__) not in quiet]

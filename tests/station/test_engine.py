@@ -18,7 +18,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import Direction
 from dbbstation.station import events, storage
 from dbbstation.station.assembly import Job, assemble
-from dbbstation.station.commands import Accept, Note, Quit, Repeat, Skip, Start
+from dbbstation.station.commands import Accept, AddNote, Quit, Repeat, Skip, Start
 from dbbstation.station.engine import Station
 from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
@@ -271,7 +271,7 @@ def test_a_clock_that_was_stepped_back_does_not_turn_the_order_of_runs(monkeypat
 def test_what_is_noted_is_kept_with_its_time(plan_file: Path, tmp_path: Path) -> None:
     workplace = assemble(Job(read_machine(MACHINE_FILE), read_inline_plan(plan_file), tmp_path / "session"), Script())
     before = datetime.now(UTC)
-    for command in (Note("a draught from the gate"), Note(ambient_temp_c=21.5), Quit()):
+    for command in (AddNote("a draught from the gate"), AddNote(ambient_temp_c=21.5), Quit()):
         workplace.station.send(command)
     workplace.station.run()
     workplace.close()

@@ -10,7 +10,7 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, GoTo, Judge, Note, Pause, Quit, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.commands import Accept, AddNote, GoTo, Judge, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.detector import Patience
 from dbbstation.station.instructions import instructions
 from dbbstation.station.run_record import recording_of
@@ -57,7 +57,7 @@ def test_a_run_is_told_from_announcement_to_verdict(plan: Plan) -> None:
     assert (announced.run.label, announced.run.mounting, announced.put_up) == ("a-ccw-1", 1, True)
     assert (announced.number, announced.count) == (1, 6)
     assert announced.instructions[0] == "Put the short holder with the ball 9-short into bore 9"
-    assert changed == events.StateChanged(State.ANNOUNCED, frozenset({Start, Skip, Quit, GoTo, Judge, Note, Pause}))
+    assert changed == events.StateChanged(State.ANNOUNCED, frozenset({Start, Skip, Quit, GoTo, Judge, AddNote, Pause}))
     told = one_run(sequencer, plan, "a", Direction.CCW)
     assert kinds(told) == ["RunStarted", "FeedInSeen", "RunCompleted"]
     assert [event.state for event in told if isinstance(event, events.StateChanged)] == [
@@ -71,7 +71,7 @@ def test_a_run_is_told_from_announcement_to_verdict(plan: Plan) -> None:
     assert completed.problem == ""
     assert completed.figures is not None
     assert completed.figures.circularity_um < 0.2
-    progress = [event.swept_deg for event in told if isinstance(event, events.Progress)]
+    progress = [event.swept_deg for event in told if isinstance(event, events.RunProgress)]
     assert progress == sorted(progress)
     assert progress[-1] > 445.0
     accepted = sequencer.command(Accept())

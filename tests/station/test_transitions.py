@@ -11,10 +11,10 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.instrument.reading import Reading
 from dbbstation.plan.circle import Direction
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, GoTo, Judge, Note, Pause, Quit, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.commands import Accept, AddNote, GoTo, Judge, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
-from dbbstation.station.states import COMMAND_CAUSES, FINAL, TRANSITIONS, Cause, State, commands_allowed
+from dbbstation.station.states import COMMAND_CAUSES, FINAL, TRANSITIONS, State, Trigger, commands_allowed
 from tests.station.readings import run_readings, still, told_and_untold
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ COMMANDS = [
     GoTo("a", Direction.CW),
     Judge("a", Direction.CCW, 1, accepted=False),
     Judge("a", Direction.CCW, 1, accepted=True),
-    Note("a draught"),
-    Note(ambient_temp_c=20.5),
+    AddNote("a draught"),
+    AddNote(ambient_temp_c=20.5),
     Pause(),
     Resume(),
 ]
@@ -54,12 +54,12 @@ def test_every_state_can_be_reached_and_left_by_quitting_or_failing() -> None:
         reached |= further
     assert reached == set(State)
     for state in set(State) - FINAL:
-        assert TRANSITIONS[state][Cause.QUIT] is State.STOPPED
-        assert TRANSITIONS[state][Cause.FAILED] is State.FAULTED
+        assert TRANSITIONS[state][Trigger.QUIT] is State.STOPPED
+        assert TRANSITIONS[state][Trigger.FAILED] is State.FAULTED
 
 
 def test_every_cause_leads_somewhere_and_every_command_is_a_cause() -> None:
-    assert {cause for ways in TRANSITIONS.values() for cause in ways} == set(Cause)
+    assert {cause for ways in TRANSITIONS.values() for cause in ways} == set(Trigger)
     assert set(COMMAND_CAUSES) == {type(command) for command in COMMANDS}
 
 

@@ -15,10 +15,10 @@ from dbbstation.model.simulation import setup_of
 from dbbstation.plan.circle import Direction
 from dbbstation.trace import columns
 from dbbstation.trace.average import averaged
-from dbbstation.trace.columns import COLUMNS, Column, Kind, currents, temperatures
+from dbbstation.trace.columns import COLUMNS, Column, ColumnKind, currents, temperatures
 from dbbstation.trace.cut import cut
 
-SPEED = Column("spindle_speed_rpm", Kind.OTHER, "rpm", "speed of the spindle", 1, 1e5)
+SPEED = Column("spindle_speed_rpm", ColumnKind.OTHER, "rpm", "speed of the spindle", 1, 1e5)
 
 
 def test_a_new_column_reaches_the_sources_that_ask_for_it(monkeypatch):
@@ -41,9 +41,9 @@ def test_a_new_column_reaches_the_sources_that_ask_for_it(monkeypatch):
 
 
 def test_the_sensors_and_motors_of_the_format():
-    of = {kind: [column.of for column in COLUMNS.values() if column.kind is kind] for kind in Kind}
-    assert of[Kind.TEMPERATURE] == ["bar", "jig", "machine", *(f"strut{k}" for k in range(1, 7))]
-    assert of[Kind.CURRENT] == [f"motor{k}" for k in range(1, 7)]
+    of = {kind: [column.of for column in COLUMNS.values() if column.kind is kind] for kind in ColumnKind}
+    assert of[ColumnKind.TEMPERATURE] == ["bar", "jig", "machine", *(f"strut{k}" for k in range(1, 7))]
+    assert of[ColumnKind.CURRENT] == [f"motor{k}" for k in range(1, 7)]
 
 
 def test_sensors_and_motors_are_found_by_their_names():

@@ -11,9 +11,10 @@ from textual.pilot import Pilot
 from textual.widgets import OptionList, Static
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.service.after import After, Step
+from dbbstation.service.after import After
 from dbbstation.service.former_sessions import BeforeAndNow
-from dbbstation.service.work import Progress
+from dbbstation.service.job import SessionTask
+from dbbstation.service.work import WorkProgress
 from dbbstation.tui.acceptance_screen import AcceptanceScreen
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.asking import ChooseQuestion
@@ -22,7 +23,7 @@ from dbbstation.tui.results_screen import ResultsScreen
 from tests.service.test_front import Scripted
 from tests.tui.test_session_stills import acceptance, formers, front
 
-ANSWER = acceptance(None)._after.results[Step.ACCEPTANCE].answer  # type: ignore[arg-type]
+ANSWER = acceptance(None)._after.results[SessionTask.ACCEPTANCE].answer  # type: ignore[arg-type]
 FOUND = formers(None)._search(Path())  # type: ignore[arg-type]
 
 
@@ -75,13 +76,13 @@ def test_the_session_before_is_chosen_and_the_verdict_shown(after: After) -> Non
         await pilot.press("x", "c", "d", "p", "r", "a", "1", "0")  # mean nothing here
         assert after.busy is None
         await pilot.press("down", "enter")
-        assert after.busy is Step.ACCEPTANCE
+        assert after.busy is SessionTask.ACCEPTANCE
         assert "Comparing: fit of 6 runs" in texts_of(app, "#row-now")
         _, work = after._running
-        assert work.arguments[2:4] == ["--before", "/shop/monday"]
+        assert work.job.before == Path("/shop/monday")
         await pilot.press("h")  # not while it is being compared
         assert isinstance(app.screen, AcceptanceScreen)
-        work.progress = Progress.DONE
+        work.progress = WorkProgress.DONE
         app.look()
         await pilot.pause()
         assert texts_of(app, "#row-now").startswith("CANNOT TELL")
@@ -113,7 +114,7 @@ def test_a_comparison_can_be_ended_and_made_again(after: After) -> None:
     async def keys(pilot: Pilot[None], app: StationApp) -> None:
         await pilot.press("enter")
         await pilot.pause()
-        assert after.busy is Step.ACCEPTANCE
+        assert after.busy is SessionTask.ACCEPTANCE
         await pilot.press("k")
         await pilot.pause()
         app.look()
@@ -124,7 +125,7 @@ def test_a_comparison_can_be_ended_and_made_again(after: After) -> None:
         assert isinstance(app.screen, ChooseQuestion)
         await pilot.press("enter")
         await pilot.pause()
-        assert after.busy is Step.ACCEPTANCE
+        assert after.busy is SessionTask.ACCEPTANCE
 
     play(after, keys)
 

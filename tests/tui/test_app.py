@@ -21,7 +21,7 @@ from dbbstation.plan.circle import Direction
 from dbbstation.quality.finding import Name, found
 from dbbstation.report.conditions import conditions
 from dbbstation.service.live_trace import LiveTrace
-from dbbstation.station.commands import Accept, GoTo, Judge, Note, Quit, Repeat, Skip
+from dbbstation.station.commands import Accept, AddNote, GoTo, Judge, Quit, Repeat, Skip
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.findings_panel import FindingsPanel
@@ -407,7 +407,7 @@ def test_the_temperature_of_the_shop_is_noted_at_any_time() -> None:
         await type_into(pilot, app, "20,9")
         assert not isinstance(app.screen, TemperatureQuestion)
 
-    assert played(announced(), play).sent == [Note(ambient_temp_c=20.9)]
+    assert played(announced(), play).sent == [AddNote(ambient_temp_c=20.9)]
 
 
 def test_the_temperature_after_circles_is_asked_for_before_the_session_is_left() -> None:
@@ -424,12 +424,12 @@ def test_the_temperature_after_circles_is_asked_for_before_the_session_is_left()
         await pilot.press("q")
 
     after_a_circle = complete().command(Accept())
-    assert played(after_a_circle, noted).sent == [Note(ambient_temp_c=21.0), Quit()]
+    assert played(after_a_circle, noted).sent == [AddNote(ambient_temp_c=21.0), Quit()]
     assert played(complete().command(Accept()), without).sent == [Quit()]
     assert played(announced(), not_asked).sent == [Quit()]
     # Somebody noted it behind the last circle.
-    assert played(complete().command(Accept(), Note(ambient_temp_c=20.5)), not_asked).sent == [Quit()]
-    assert Quit() in played(complete().command(Note("a chip")), without).sent
+    assert played(complete().command(Accept(), AddNote(ambient_temp_c=20.5)), not_asked).sent == [Quit()]
+    assert Quit() in played(complete().command(AddNote("a chip")), without).sent
 
 
 def test_behind_the_last_circle_it_is_written_into_the_session(tmp_path: Path) -> None:

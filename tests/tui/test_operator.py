@@ -17,9 +17,10 @@ from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
 from dbbstation.service.front import Front
+from dbbstation.service.job import SessionJob
 from dbbstation.service.memory import Memory
 from dbbstation.service.operated import Answered, JobAnswer, answer_of, read_operated
-from dbbstation.service.work import Progress
+from dbbstation.service.work import WorkProgress
 from dbbstation.station.commands import Accept, Quit, Repeat
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
@@ -29,7 +30,7 @@ from tests.tui.test_app import Waits
 from tests.tui.test_session_flow import below, now, rows
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    pass
 
 FIXTURES = shipped_folder("fixtures")
 PLANS = shipped_folder("protocols") / "plans"
@@ -47,12 +48,12 @@ def job_file(tmp_path: Path) -> Path:
 class Reported:
     """A report that is made at once."""
 
-    progress, stage, passed_s = Progress.DONE, "", 1.0
+    progress, stage, passed_s = WorkProgress.DONE, "", 1.0
     kind = "within"
 
-    def __init__(self, arguments: Sequence[str], folder: Path) -> None:
-        assert arguments[0] == "--settings"
-        self.settings = read_settings([Path(arguments[1])])
+    def __init__(self, job: SessionJob, folder: Path) -> None:
+        assert job.settings is not None
+        self.settings = read_settings([job.settings])
         (folder / "report.html").write_text("a report", encoding="utf-8")
 
     def answer(self) -> dict[str, object]:

@@ -19,11 +19,11 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
-from dbbstation.service.after import Step
-from dbbstation.service.choice import Part
+from dbbstation.service.choice import SetUpPart
 from dbbstation.service.front import Front
+from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Memory
-from dbbstation.service.work import Progress
+from dbbstation.service.work import WorkProgress
 from dbbstation.station.programs import RunProgram
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
@@ -93,7 +93,7 @@ async def until_start(pilot: Pilot[None], app: StationApp) -> None:
     await until(pilot, lambda: isinstance(app.screen, StartScreen) and "Looking" not in now(app))
 
 
-async def choose(pilot: Pilot[None], app: StationApp, part: Part, wanted: str) -> None:
+async def choose(pilot: Pilot[None], app: StationApp, part: SetUpPart, wanted: str) -> None:
     """Choose for a row of the new session, with arrow keys and Enter."""
     options = app.screen.query_one("#rows", OptionList)
     while options.highlighted != ROWS.index(part):
@@ -112,10 +112,10 @@ async def choose(pilot: Pilot[None], app: StationApp, part: Part, wanted: str) -
 
 async def choose_all(pilot: Pilot[None], app: StationApp) -> None:
     """Choose what a virtual session needs, where nothing is remembered."""
-    await choose(pilot, app, Part.MACHINE, "reference.yaml")
-    await choose(pilot, app, Part.PLAN, "three.yaml")
-    await choose(pilot, app, Part.INSTRUMENT, "streaming-encoder ")
-    await choose(pilot, app, Part.PORT, "10 times")
+    await choose(pilot, app, SetUpPart.MACHINE, "reference.yaml")
+    await choose(pilot, app, SetUpPart.PLAN, "three.yaml")
+    await choose(pilot, app, SetUpPart.INSTRUMENT, "streaming-encoder ")
+    await choose(pilot, app, SetUpPart.PORT, "10 times")
     await until(pilot, lambda: "is switched on when it is needed" in now(app))
 
 
@@ -185,9 +185,9 @@ def test_from_the_start_screen_to_the_path_of_the_report(front: Front) -> None:
         await press(app, "3")  # there is no model yet
         await press(app, "1")
         after = app.screen._after
-        await until(pilot, lambda: after.results[Step.CALIBRATE].progress is Progress.DONE)
+        await until(pilot, lambda: after.results[SessionTask.CALIBRATE].progress is WorkProgress.DONE)
         await press(app, "4")
-        await until(pilot, lambda: after.results[Step.REPORT].progress is Progress.DONE)
+        await until(pilot, lambda: after.results[SessionTask.REPORT].progress is WorkProgress.DONE)
         await until(pilot, lambda: "report.html" in str(app.screen.query_one("#row-text", Static).visual))
         assert "NO VERDICT" in below(app)
         await press(app, "escape")
@@ -220,7 +220,7 @@ def test_a_session_is_gone_on_with_where_it_was_left(front: Front) -> None:
     async def first(pilot: Pilot[None], app: StationApp) -> None:
         await press(app, "v")
         await until(pilot, on(app, NewScreen))
-        await choose(pilot, app, Part.PLAN, "plan.yaml")
+        await choose(pilot, app, SetUpPart.PLAN, "plan.yaml")
         await press(app, "b")
         await confirm_all(pilot, app)
         await measured(pilot, app, 1)
@@ -266,8 +266,8 @@ def test_every_key_goes_back_and_wrong_ones_do_nothing(front: Front) -> None:
         await press(app, "escape")
         await until(pilot, on(app, NewScreen))
         at = app.screen.query_one("#rows", OptionList)
-        while at.highlighted != ROWS.index(Part.TEMPERATURE):
-            await press(app, "up" if (at.highlighted or 0) > ROWS.index(Part.TEMPERATURE) else "down")
+        while at.highlighted != ROWS.index(SetUpPart.TEMPERATURE):
+            await press(app, "up" if (at.highlighted or 0) > ROWS.index(SetUpPart.TEMPERATURE) else "down")
         for typed, said in (("warm", "warm is no temperature"), ("20,5", "Still missing")):
             await press(app, "enter")
             await until(pilot, on(app, TypeQuestion))
@@ -291,7 +291,7 @@ def test_what_a_file_lacks_is_said_and_nothing_is_opened(front: Front) -> None:
     async def keys(pilot: Pilot[None], app: StationApp) -> None:
         await press(app, "v")
         await until(pilot, on(app, NewScreen))
-        await choose(pilot, app, Part.PLAN, "far.yaml")
+        await choose(pilot, app, SetUpPart.PLAN, "far.yaml")
         await press(app, "b")
         await until(pilot, lambda: "test low ccw" in now(app))
         assert isinstance(app.screen, NewScreen)
@@ -346,17 +346,17 @@ def test_work_can_be_ended_and_leaving_it_asks_first(front: Front) -> None:
         await until(pilot, on(app, ResultsScreen))
         after = app.screen._after
         await press(app, "2")
-        await until(pilot, lambda: after.busy is Step.DIAGNOSE)
+        await until(pilot, lambda: after.busy is SessionTask.DIAGNOSE)
         await press(app, "k")
-        await until(pilot, lambda: after.results[Step.DIAGNOSE].progress is Progress.CANCELLED)
+        await until(pilot, lambda: after.results[SessionTask.DIAGNOSE].progress is WorkProgress.CANCELLED)
         await until(pilot, lambda: "ended" in rows(app)[1])
         await press(app, "2")
-        await until(pilot, lambda: after.busy is Step.DIAGNOSE)
+        await until(pilot, lambda: after.busy is SessionTask.DIAGNOSE)
         await press(app, "escape")
         await until(pilot, on(app, YesQuestion))
         await press(app, "n")
         await until(pilot, on(app, ResultsScreen))
-        assert after.busy is Step.DIAGNOSE
+        assert after.busy is SessionTask.DIAGNOSE
         await press(app, "escape")
         await until(pilot, on(app, YesQuestion))
         await press(app, "y")

@@ -20,15 +20,16 @@ import pytest
 
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.reading import Reading
-from dbbstation.service.after import After, Result, Step
+from dbbstation.service.after import After, Result
 from dbbstation.service.bar_calibration import Calibrated
 from dbbstation.service.choice import Choice, Prepared
 from dbbstation.service.former_sessions import BeforeAndNow, Former, InForce
 from dbbstation.service.front import Front
+from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order
 from dbbstation.service.session_list import SessionLine
-from dbbstation.service.work import Progress
+from dbbstation.service.work import WorkProgress
 from dbbstation.station.events import Sample
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_screen import AcceptanceScreen
@@ -165,8 +166,10 @@ def results(_app: StationApp) -> RowScreen:
             "to_do": ["Calibrate the machine: `dbbstation calibrate monday --out model.yaml`."],
         }
     }
-    after.results[Step.REPORT] = Result(Progress.DONE, "", 4.2, answer, "", SHOP / "monday-results" / "report.html")
-    after.results[Step.CALIBRATE] = Result(Progress.CANCELLED, "fit of 6 runs", 1.3)
+    after.results[SessionTask.REPORT] = Result(
+        WorkProgress.DONE, "", 4.2, answer, "", SHOP / "monday-results" / "report.html"
+    )
+    after.results[SessionTask.CALIBRATE] = Result(WorkProgress.CANCELLED, "fit of 6 runs", 1.3)
     return ResultsScreen(after)
 
 
@@ -187,7 +190,7 @@ def acceptance(_app: StationApp) -> RowScreen:
     worst = {**held(7.6, 0.6, 8.0, "cannot tell", "high"), "before": before[0]}
     answer = {"verdict": {"kind": "cannot tell"}, "tolerances": [worst], "tolerances_by_test": tests}
     page = SHOP / "verified-results" / "acceptance.html"
-    after.results[Step.ACCEPTANCE] = Result(Progress.DONE, "", 4.2, answer, "", page)
+    after.results[SessionTask.ACCEPTANCE] = Result(WorkProgress.DONE, "", 4.2, answer, "", page)
     programs = SHOP / "monday" / "programs"
     after.former = Former(SHOP / "monday", MEASURED, InForce(6, 6, programs, (SHOP / "joint-model.yaml",)))
     after.kept = (SHOP / "verified-results" / "former-model-1f0c9a22.yaml",)

@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbbstation.instrument.protocol import Line
+from dbbstation.instrument.protocol import LineSettings
 from dbbstation.virtual.wire_uart import heard_at
 
-LINE = Line(baud=9600)
-SEVEN_EVEN_TWO = Line(baud=9600, data_bits=7, parity="even", stop_bits=2)
+LINE = LineSettings(baud=9600)
+SEVEN_EVEN_TWO = LineSettings(baud=9600, data_bits=7, parity="even", stop_bits=2)
 
 
 @given(st.binary())

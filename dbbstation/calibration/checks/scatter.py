@@ -32,7 +32,7 @@ LEAST_STATED_MM = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Seat:
+class MountingOffset:
     """Where a ball came to stand in one putting-up, mounting and CMM error together.
 
     Attributes:
@@ -89,7 +89,7 @@ class ScatterCheck:
         return None if self.finding is ScatterVerdict.UNTOLD else self.finding is not ScatterVerdict.MORE
 
 
-def seats_of(calibration: Calibration) -> list[Seat]:
+def seats_of(calibration: Calibration) -> list[MountingOffset]:
     """Where every ball stands, and how surprising that is.
 
     A best prediction m of an effect with stated covariance P and remaining covariance V scatters by P - V [Henderson,
@@ -112,7 +112,7 @@ def seats_of(calibration: Calibration) -> list[Seat]:
         known = share > DETERMINED
         along = (axes.T @ (np.asarray(shift) / size))[known]
         seats.append(
-            Seat(
+            MountingOffset(
                 mounting=setup.mounting,
                 ball=setup.ball,
                 stated_mm=size,
@@ -125,13 +125,13 @@ def seats_of(calibration: Calibration) -> list[Seat]:
     return seats
 
 
-def check_scatter(seats: Sequence[Seat]) -> list[ScatterCheck]:
+def check_scatter(seats: Sequence[MountingOffset]) -> list[ScatterCheck]:
     """Compare what balls scatter by with what plan states, sizes apart.
 
     The sum of squares over the determined coordinates is chi-square in units of the true variance; that neighbours
     share errors of the fitted machine makes the interval a little too narrow where few balls determine much.
     """
-    groups: dict[float, list[Seat]] = {}
+    groups: dict[float, list[MountingOffset]] = {}
     for seat in seats:
         if seat.stated_mm[0] >= LEAST_STATED_MM:
             continue
@@ -139,7 +139,7 @@ def check_scatter(seats: Sequence[Seat]) -> list[ScatterCheck]:
     return [_checked(stated_um, group) for stated_um, group in sorted(groups.items())]
 
 
-def _checked(stated_um: float, group: Sequence[Seat]) -> ScatterCheck:
+def _checked(stated_um: float, group: Sequence[MountingOffset]) -> ScatterCheck:
     square, freedom = sum(seat.square for seat in group), sum(seat.freedom for seat in group)
     if freedom == 0:
         return ScatterCheck(stated_um, float("nan"), 0.0, float("inf"), len(group), ScatterVerdict.UNTOLD)

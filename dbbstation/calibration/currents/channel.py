@@ -53,7 +53,7 @@ SMALLEST_NOISE_A = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
+class CurrentChannel:
     """Runs with motor currents.
 
     Attributes:
@@ -69,7 +69,7 @@ class Channel:
     notes: tuple[str, ...]
 
 
-def current_channel(layout: Layout, observations: Sequence[Observation]) -> Channel | None:
+def current_channel(layout: Layout, observations: Sequence[Observation]) -> CurrentChannel | None:
     """Currents of all runs that have them; None for a fit without a source of currents.
 
     Raises:
@@ -92,7 +92,7 @@ def current_channel(layout: Layout, observations: Sequence[Observation]) -> Chan
             "no motor has a current that could be used: " + "; ".join(notes),
             remedy="check how currents are logged, or leave drive-friction out and calibrate from circles",
         )
-    return Channel(motions, current, usable, tuple(notes))
+    return CurrentChannel(motions, current, usable, tuple(notes))
 
 
 def _motion(run: Observation, current_a: NDArray[np.float64]) -> Motion:
@@ -103,7 +103,7 @@ def _motion(run: Observation, current_a: NDArray[np.float64]) -> Motion:
     return replace(run, raw=raw).motion()
 
 
-def current_blocks(layout: Layout, channel: Channel | None, x: NDArray[np.float64]) -> list[Block]:
+def current_blocks(layout: Layout, channel: CurrentChannel | None, x: NDArray[np.float64]) -> list[Block]:
     """Compress the currents about the values x, shape (k,), one block per run and motor with the noise found there."""
     if channel is None:
         return []
@@ -113,7 +113,7 @@ def current_blocks(layout: Layout, channel: Channel | None, x: NDArray[np.float6
 
 
 def linearised(
-    layout: Layout, channel: Channel, x: NDArray[np.float64]
+    layout: Layout, channel: CurrentChannel, x: NDArray[np.float64]
 ) -> tuple[list[tuple[int, Block]], list[list[NDArray[np.float64]]]]:
     """Blocks with their motors, and per motor what each run leaves [A]."""
     model = layout.model(x)
@@ -157,7 +157,7 @@ def _effective(noise: Noise | None) -> float:
     return SMALLEST_NOISE_A if noise is None else max(noise.effective, SMALLEST_NOISE_A)
 
 
-def current_start(layout: Layout, channel: Channel | None) -> dict[str, NDArray[np.float64]]:
+def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, NDArray[np.float64]]:
     """Values by source name from the currents alone, at the nominal geometry, for the joint fit to start from.
 
     Gains multiply loads and frictions, so that a fit that began at zero gain would not see them.

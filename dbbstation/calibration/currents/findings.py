@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.currents.channel import Channel
+    from dbbstation.calibration.currents.channel import CurrentChannel
     from dbbstation.calibration.layout import Layout
     from dbbstation.inference.noise import Noise
     from dbbstation.inference.square_root import Block, Solution
@@ -59,7 +59,7 @@ class MotorFindings:
 
 def motor_findings(
     layout: Layout,
-    channel: Channel | None,
+    channel: CurrentChannel | None,
     x: NDArray[np.float64],
     solution: Solution,
     blocks: Sequence[Block],

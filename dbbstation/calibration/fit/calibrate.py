@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.calibration.currents.channel import current_blocks, current_channel, current_start
 from dbbstation.calibration.currents.findings import MotorFindings, motor_findings
 from dbbstation.calibration.fit.directions import in_words, of_circles
-from dbbstation.calibration.fit.nodes import Nodes, nodes_of, smooth
+from dbbstation.calibration.fit.nodes import RunNodes, nodes_of, smooth
 from dbbstation.calibration.fit.prescription import Name, names_of, prescribed
 from dbbstation.calibration.layout import Layout, lay_out
 from dbbstation.errors import CalibrationError
@@ -221,7 +221,7 @@ def calibrate(
 
 def _approached(
     layout: Layout,
-    runs: Sequence[Observation | Nodes],
+    runs: Sequence[Observation | RunNodes],
     nominal: Sequence[Block],
     left: Sequence[NDArray[np.float64]],
 ) -> tuple[NDArray[np.float64], list[Block]]:
@@ -272,7 +272,7 @@ def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64
     share s was taken say that s / (1 - q) would have hit it (Aitken's rule); the most cautious of these is taken: of parameters of
     shape, and of the whole step along the last.
     """
-    shaped = np.array([bool(p.shape) for term in layout.terms for p in term.parameters])
+    shaped = np.array([bool(p.grid) for term in layout.terms for p in term.parameters])
     now, last = step / layout.known.scale, before / layout.known.scale
     along = float(now @ last) / max(float(last @ last), 1e-300)
     # Of a step that is settled, such as that of a shape while its amplitude is zero, the ratio is one of roundings.
@@ -297,7 +297,7 @@ def _near(
             continue
         for k, parameter in enumerate(term.parameters):
             column = term.columns.start + k
-            if not parameter.shape:
+            if not parameter.grid:
                 prior[column] = min(prior[column], amplitudes_within * parameter.plausible)
             else:
                 nominal[column] = start[term.source.name][k]
@@ -323,7 +323,7 @@ def _start_values(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> N
     return x
 
 
-def looked_at(observations: Sequence[Observation], needs: frozenset[Need]) -> list[Observation | Nodes]:
+def looked_at(observations: Sequence[Observation], needs: frozenset[Need]) -> list[Observation | RunNodes]:
     """Runs as a fit looks at them: through nodes where they are long and sources need no more than pose and time."""
     if not needs <= AT_NODES:
         return list(observations)
@@ -332,7 +332,7 @@ def looked_at(observations: Sequence[Observation], needs: frozenset[Need]) -> li
 
 
 def linearise(
-    layout: Layout, runs: Sequence[Observation | Nodes], x: NDArray[np.float64]
+    layout: Layout, runs: Sequence[Observation | RunNodes], x: NDArray[np.float64]
 ) -> tuple[list[Block], list[NDArray[np.float64]]]:
     """Compress every run about the values x, shape (k,), so that a solution of the blocks is x less its nominal.
 
@@ -341,8 +341,8 @@ def linearise(
     """
     model = layout.model(x)
 
-    def of_run(run: Observation | Nodes) -> tuple[Block, NDArray[np.float64]]:
-        if isinstance(run, Nodes):
+    def of_run(run: Observation | RunNodes) -> tuple[Block, NDArray[np.float64]]:
+        if isinstance(run, RunNodes):
             columns, jacobian, length = _predicted(layout, model, run.coarse, x)
             if smooth(jacobian) and smooth(length[:, None] - run.run.raw.circle.bar_mm):
                 block = run.compressed(columns, jacobian, length, (x - layout.nominal)[columns])
@@ -393,9 +393,9 @@ def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple
     return _residuals(model, looked_at(observations, needs))
 
 
-def _residuals(model: MachineModel, runs: Sequence[Observation | Nodes]) -> tuple[NDArray[np.float64], ...]:
-    def of_run(run: Observation | Nodes) -> NDArray[np.float64]:
-        if isinstance(run, Nodes):
+def _residuals(model: MachineModel, runs: Sequence[Observation | RunNodes]) -> tuple[NDArray[np.float64], ...]:
+    def of_run(run: Observation | RunNodes) -> NDArray[np.float64]:
+        if isinstance(run, RunNodes):
             length = model.bar(run.coarse.motion()).length_mm
             if smooth(length[:, None] - run.run.raw.circle.bar_mm):
                 return run.run.raw.length_mm - run.samples_of(length)
@@ -405,9 +405,9 @@ def _residuals(model: MachineModel, runs: Sequence[Observation | Nodes]) -> tupl
     return tuple(in_parallel(of_run, runs, _usual_length(runs)))
 
 
-def _usual_length(runs: Sequence[Observation | Nodes]) -> int:
+def _usual_length(runs: Sequence[Observation | RunNodes]) -> int:
     """Poses of a run at which a model is asked, on average."""
-    poses = sum(len((run.coarse if isinstance(run, Nodes) else run).raw) for run in runs)
+    poses = sum(len((run.coarse if isinstance(run, RunNodes) else run).raw) for run in runs)
     return poses // max(len(runs), 1)
 
 

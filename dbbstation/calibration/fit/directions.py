@@ -25,7 +25,7 @@ SHOWS_IN_CIRCLES = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Pattern:
+class RigidPattern:
     """A way in which a machine can be wrong as a whole, by source and parameter order."""
 
     text: str
@@ -33,7 +33,7 @@ class Pattern:
     base_mm: NDArray[np.float64]
 
 
-def patterns(base_joints_mm: NDArray[np.float64], axis_of_strut: NDArray[np.float64]) -> list[Pattern]:
+def patterns(base_joints_mm: NDArray[np.float64], axis_of_strut: NDArray[np.float64]) -> list[RigidPattern]:
     """Rigid motions of the base, common strut length and uniform size, in the order they are tried.
 
     Args:
@@ -42,17 +42,17 @@ def patterns(base_joints_mm: NDArray[np.float64], axis_of_strut: NDArray[np.floa
     """
     none, still = np.zeros(STRUTS), np.zeros((STRUTS, 3))
     found = [
-        Pattern(f"all six base joints together along {axis}", none, np.tile(np.eye(3)[k], (STRUTS, 1)))
+        RigidPattern(f"all six base joints together along {axis}", none, np.tile(np.eye(3)[k], (STRUTS, 1)))
         for k, axis in enumerate("XYZ")
     ]
     found += [
-        Pattern(f"all six base joints turned together about {axis}", none, np.cross(np.eye(3)[k], base_joints_mm))
+        RigidPattern(f"all six base joints turned together about {axis}", none, np.cross(np.eye(3)[k], base_joints_mm))
         for k, axis in enumerate("XYZ")
     ]
-    found.append(Pattern("all six struts together in length", np.ones(STRUTS), still))
-    found.append(Pattern("the base joints' circle in size", none, base_joints_mm * np.array([1.0, 1.0, 0.0])))
+    found.append(RigidPattern("all six struts together in length", np.ones(STRUTS), still))
+    found.append(RigidPattern("the base joints' circle in size", none, base_joints_mm * np.array([1.0, 1.0, 0.0])))
     found += [
-        Pattern(
+        RigidPattern(
             f"base joint {i + 1} along its strut together with that strut's length",
             np.eye(STRUTS)[i],
             np.eye(STRUTS)[i][:, None] * axis_of_strut[i],
@@ -106,7 +106,7 @@ def of_circles(layout: Layout, held: NDArray[np.float64]) -> NDArray[np.float64]
     return rows[share > SHOWS_IN_CIRCLES]
 
 
-def _as_columns(pattern: Pattern, names: list[tuple[str, str, str]]) -> NDArray[np.float64] | None:
+def _as_columns(pattern: RigidPattern, names: list[tuple[str, str, str]]) -> NDArray[np.float64] | None:
     """Return the pattern as a vector over the fitted columns; None where the fit does not have them."""
     parts = {"strut-reference-length": pattern.strut_mm, "base-joints": pattern.base_mm.ravel()}
     present = {name for name, _, _ in names}

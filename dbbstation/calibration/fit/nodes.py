@@ -54,7 +54,7 @@ _LAST = 2.0 / PER_SECTOR * np.cos((PER_SECTOR - 1) * np.arccos(_PLACES))
 
 
 @dataclass(frozen=True, eq=False)
-class Nodes:
+class RunNodes:
     """A run and its nodes.
 
     Attributes:
@@ -109,7 +109,7 @@ class Nodes:
         return replace(block, count=len(self.run.raw))
 
 
-def nodes_of(run: Observation) -> Nodes | None:
+def nodes_of(run: Observation) -> RunNodes | None:
     """Return a run's nodes; None for one that is short, or that was commanded sample by sample."""
     raw = run.raw
     if len(raw) < LONG * SECTORS * PER_SECTOR or run.commanded is not None:
@@ -134,7 +134,7 @@ def nodes_of(run: Observation) -> Nodes | None:
     system[place, -1] = raw.length_mm - raw.circle.bar_mm
     by_sector = system.reshape(SECTORS, most, PER_SECTOR + 1)
     triangle = np.asarray(np.linalg.qr(by_sector, mode="r"), dtype=np.float64)
-    return Nodes(
+    return RunNodes(
         run=run,
         coarse=replace(run, raw=nodes),
         roots=np.ascontiguousarray(triangle[:, :-1, :-1]),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri, ndtr
 
-from dbbstation.calibration.checks.scatter import UNKNOWN_MM, Seat, seats_of
+from dbbstation.calibration.checks.scatter import UNKNOWN_MM, MountingOffset, seats_of
 from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Outlier, OutlierKind
 from dbbstation.calibration.outliers.run_remainder import left_of, shift_of
 from dbbstation.errors import CalibrationError
@@ -81,7 +81,12 @@ def off_its_place(fit: Fit, calibration: Calibration, runs: Sequence[Observation
 
 
 def free_ball(
-    fit: Fit, runs: Sequence[Observation], mounting: str, seats: Sequence[Seat], *, together: bool | None = None
+    fit: Fit,
+    runs: Sequence[Observation],
+    mounting: str,
+    seats: Sequence[MountingOffset],
+    *,
+    together: bool | None = None,
 ) -> Step:
     """Let the ball of a mounting stand anywhere, with all its other mountings if it stands alike in them.
 
@@ -204,7 +209,7 @@ def _bar(calibration: Calibration, session: str, why: str) -> Outlier:
     )
 
 
-def _same(a: Seat, b: Seat) -> bool:
+def _same(a: MountingOffset, b: MountingOffset) -> bool:
     sigma = np.sqrt(np.diag(a.spread_mm2)[:2] + np.diag(b.spread_mm2)[:2])
     return bool(np.all(np.abs(a.shift_mm - b.shift_mm)[:2] < SAME_SIGMAS * sigma))
 

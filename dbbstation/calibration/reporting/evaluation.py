@@ -38,7 +38,7 @@ _ALONG = np.column_stack(
 
 
 @dataclass(frozen=True)
-class RunFigures:
+class RunEvaluation:
     """One run.
 
     Attributes:
@@ -72,7 +72,7 @@ class Evaluation:
         nominal_rms_um: the same under the nominal machine [µm].
     """
 
-    runs: tuple[RunFigures, ...]
+    runs: tuple[RunEvaluation, ...]
     residual_rms_um: float
     nominal_rms_um: float
 
@@ -91,7 +91,7 @@ def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evalua
     after = [_figures_of(o, residual) for o, residual in zip(observations, left, strict=True)]
     first = [_first_in_direction(observations, k) for k in range(len(observations))]
     runs = tuple(
-        RunFigures(
+        RunEvaluation(
             test=o.test,
             direction=str(o.raw.circle.direction),
             repeat=o.repeat,

@@ -61,7 +61,7 @@ class Change:
 
     def law(self, log_odds: float) -> Law:
         """Columns and forms for the channel; a form per part of the source and per way of being at work."""
-        amplitudes, shapes = self._amplitudes, [p for p in self._parameters if p.shape]
+        amplitudes, shapes = self._amplitudes, [p for p in self._parameters if p.grid]
         parts = parts_of(amplitudes, self._sets)
         count = len(amplitudes) * self._sets
         choices: list[tuple[tuple[int, ...], float, str]] = []
@@ -140,7 +140,7 @@ class Change:
         return isinstance(self.source, LinearSource) or Need.PATH not in self.source.needs
 
     def _values(self, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        is_shape = np.array([bool(p.shape) for p in self._parameters])
+        is_shape = np.array([bool(p.grid) for p in self._parameters])
         values = np.empty(len(is_shape))
         values[is_shape], values[~is_shape] = point, amplitudes
         return values
@@ -151,7 +151,7 @@ class Change:
 
     @cached_property
     def _amplitudes(self) -> list[Parameter]:
-        return [p for p in self._parameters if not p.shape]
+        return [p for p in self._parameters if not p.grid]
 
     @cached_property
     def _groups(self) -> NDArray[np.int64]:
@@ -169,7 +169,7 @@ class Change:
     @cached_property
     def _whens(self) -> tuple[When, ...]:
         """Ways of being at work that these sessions can show."""
-        point = tuple(p.shape[len(p.shape) // 2] for p in self._parameters if p.shape)
+        point = tuple(p.grid[len(p.grid) // 2] for p in self._parameters if p.grid)
         of_a, of_b = self._of(0, point), self._of(1, point)
         size = max(float(np.linalg.norm(of_a)), float(np.linalg.norm(of_b)), 1e-300)
         apart = float(np.linalg.norm(of_b - of_a)) / size
@@ -177,8 +177,8 @@ class Change:
 
     def _grid(self, k: int, parameter: Parameter) -> tuple[float, ...]:
         """Values of a nonlinear parameter that these runs can show, rising."""
-        middle = [p.shape[len(p.shape) // 2] for p in self._parameters if p.shape]
-        values = tuple(sorted(parameter.shape))
+        middle = [p.grid[len(p.grid) // 2] for p in self._parameters if p.grid]
+        values = tuple(sorted(parameter.grid))
         shown = tuple(v for v in values if self.source.shows(self.sides.motions[1], [*middle[:k], v, *middle[k + 1 :]]))
         return shown or values[:1]
 
@@ -186,7 +186,7 @@ class Change:
         """What the amplitudes of all sets do to the readings of one session, shape (n, p)."""
         count = len(self._amplitudes)
         values = self._values(point, np.zeros(count))
-        amplitudes = [k for k, p in enumerate(self._parameters) if not p.shape]
+        amplitudes = [k for k, p in enumerate(self._parameters) if not p.grid]
         pieces = []
         for group, reading in zip(self._groups, self.sides.readings[side], strict=True):
             derivative = reading.by_source(self.source, self.sides.machine, values)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.compare.pairs import Matching, Pair
     from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.left_over import LeftOver
-    from dbbstation.inference.read_off import Finding, Trial
+    from dbbstation.inference.read_off import CauseFinding, Trial
     from dbbstation.inference.settled import Settled
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
@@ -114,7 +114,7 @@ class Comparison:
 
     matching: Matching
     settled: Settled
-    findings: tuple[Finding, ...]
+    findings: tuple[CauseFinding, ...]
     runs: tuple[RunDifference, ...]
     left: LeftOver
     trial: Trial
@@ -139,7 +139,7 @@ class Comparison:
         return self.probability >= SURE or not self.left.is_noise
 
     @property
-    def there(self) -> tuple[Finding, ...]:
+    def there(self) -> tuple[CauseFinding, ...]:
         """Findings of causes of the most probable set, largest first."""
         by_name = {finding.name: finding for finding in self.findings}
         return tuple(by_name[name] for name in self.effects)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.compare.comparison import Comparison, RunDifference
     from dbbstation.inference.left_over import LeftOver
-    from dbbstation.inference.read_off import Finding
+    from dbbstation.inference.read_off import CauseFinding
 
 SECTORS = 36
 """Means of ten degrees."""
@@ -73,7 +73,7 @@ def by_angle_um(run: RunDifference) -> NDArray[np.float64]:
     )
 
 
-def label_of(finding: Finding) -> str:
+def label_of(finding: CauseFinding) -> str:
     """Name of a cause with its form: which strut, which test, in which session."""
     return f"{finding.name}, {finding.label}" if finding.label else finding.name
 
@@ -130,7 +130,7 @@ def _residual_text(left: LeftOver) -> str:
     return f"The residual is not noise: {worst.name}, {1e3 * worst.rms:.2g} µm rms{where}."
 
 
-def _cause(found: Comparison, finding: Finding) -> dict[str, Any]:
+def _cause(found: Comparison, finding: CauseFinding) -> dict[str, Any]:
     effect = found.effects.get(finding.name)
     return {
         "name": finding.name,

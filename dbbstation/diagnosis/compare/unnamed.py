@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.shapes import EVERY, READING, SIGNED, UNITS, ranges, samples_of, shapes
-from dbbstation.inference.forms import Hats, Lobes, Sign
+from dbbstation.inference.forms import LinearSplines, Lobes, SignForm
 from dbbstation.inference.patterns import Family, Pattern, patterns
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.machine.geometry import STRUTS
@@ -83,8 +83,8 @@ def of_struts(sides: Sides, runs: Sequence[Samples]) -> list[Pattern]:
 def _pattern(shape: Shape, sides: Sides, runs: Sequence[Samples]) -> Pattern:
     samples = sides.averaged(1, [shape.columns(run) for run in runs])
     values = sides.averaged(1, [shape.followed(run.values[shape.variable]) for run in runs])
-    family = Family.CURVE if isinstance(shape.form, (Hats, Lobes)) else Family.LINEAR
-    if isinstance(shape.form, Sign):
+    family = Family.CURVE if isinstance(shape.form, (LinearSplines, Lobes)) else Family.LINEAR
+    if isinstance(shape.form, SignForm):
         family = Family.HYSTERESIS
     if shape.moves == SIGNED:
         family = Family.BY_DIRECTION

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.drive.contract import DriveSource, Form, Scale
+    from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Scale
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.diagnosis.drive.signals import Signals
 
@@ -71,7 +71,7 @@ class DriveChannel:
     channel: Channel
     scale: Scale
     sources: dict[str, DriveSource]
-    of_law: dict[str, tuple[DriveSource, Form]]
+    of_law: dict[str, tuple[DriveSource, DriveForm]]
     shortest_wave_mm: float
 
     def laws_of(self, source: str) -> list[str]:
@@ -101,7 +101,7 @@ def drive_channel(
     if len(recordings.blocks) > 1:
         curves = (*curves, _of_files(recordings))
     scale, shortest = _first_look(recordings, np.hstack([straight, *(p.samples for p in curves)]))
-    of_law: dict[str, tuple[DriveSource, Form]] = {}
+    of_law: dict[str, tuple[DriveSource, DriveForm]] = {}
     laws = []
     for source in sources:
         for form in source.forms(scale):
@@ -182,7 +182,9 @@ def _variables(recordings: Recordings) -> dict[str, Variable]:
     return {variable.name: variable for variable in found if np.ptp(variable.values) > 0.0}
 
 
-def _law(name: str, source: DriveSource, form: Form, recordings: Recordings, variables: dict[str, Variable]) -> Law:
+def _law(
+    name: str, source: DriveSource, form: DriveForm, recordings: Recordings, variables: dict[str, Variable]
+) -> Law:
     @cache
     def columns(values: tuple[float, ...]) -> NDArray[np.float64]:
         return recordings.compared(lambda signals: form.columns(signals, values))

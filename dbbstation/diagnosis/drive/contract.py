@@ -61,7 +61,7 @@ class Scale:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class DriveParameter:
     """One number of a cause.
 
     Attributes:
@@ -80,7 +80,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class DriveForm:
     """One form of a cause.
 
     Attributes:
@@ -92,9 +92,9 @@ class Form:
         tried: independent forms that it was picked from by looking at the recording.
     """
 
-    amplitudes: tuple[Parameter, ...]
+    amplitudes: tuple[DriveParameter, ...]
     columns: Callable[[Signals, tuple[float, ...]], NDArray[np.float64]]
-    shapes: tuple[Parameter, ...] = ()
+    shapes: tuple[DriveParameter, ...] = ()
     grids: tuple[tuple[float, ...], ...] = ()
     label: str = ""
     tried: float = 1.0
@@ -113,7 +113,7 @@ class DriveSource(ABC):
     """That a drive has it so that it matters, before anything is measured."""
 
     @abstractmethod
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """Forms to compare, none where the recordings cannot show the cause.
 
         Args:

@@ -33,7 +33,7 @@ LOOKED_AT = 60
 
 
 @dataclass(frozen=True, eq=False)
-class Explained:
+class ExplainedDrive:
     """What the comparison came to.
 
     Attributes:
@@ -53,7 +53,7 @@ class Explained:
     dropped: Mapping[str, str] = field(default_factory=dict)
 
 
-def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Callable[[str], None]) -> Explained:
+def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Callable[[str], None]) -> ExplainedDrive:
     """Compare sets of causes; refuse what cannot be, and compare again."""
     refused: dict[str, str] = {}
     dropped: dict[str, str] = {}
@@ -86,7 +86,7 @@ def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Ca
             continue
         break
     after = measured(drive, settled, settled.best.members)
-    return Explained(drive, settled, first, after, {**refused, **settled.refused}, dropped)
+    return ExplainedDrive(drive, settled, first, after, {**refused, **settled.refused}, dropped)
 
 
 POINTS_TO = {

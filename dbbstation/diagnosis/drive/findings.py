@@ -9,14 +9,14 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.drive.explain import Explained
-    from dbbstation.diagnosis.drive.held_out import HeldOut
+    from dbbstation.diagnosis.drive.explain import ExplainedDrive
+    from dbbstation.diagnosis.drive.held_out import DriveHeldOut
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.inference.verdict import Gains, Value, Verdict
 
 
 @dataclass(frozen=True)
-class Number:
+class IdentifiedValue:
     """A parameter of the model.
 
     Attributes:
@@ -58,7 +58,7 @@ class DriveFinding:
     whole_n: float
     rest_n: float
     parameters: dict[str, Value]
-    parts: tuple[Part, ...]
+    parts: tuple[DrivePart, ...]
     text: str
     at_end: tuple[str, ...] = ()
     complement: Complement | None = None
@@ -81,7 +81,7 @@ class Complement:
 
 
 @dataclass(frozen=True)
-class Part:
+class DrivePart:
     """One wave, pulse or form of a cause.
 
     Attributes:
@@ -96,7 +96,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Effect:
+class UnmodelledForce:
     """A force without a name.
 
     Attributes:
@@ -139,7 +139,7 @@ class DriveLocation:
 
 
 @dataclass(frozen=True)
-class Step:
+class DriveStep:
     """A model on the way from the base to the last one, and how it predicts the stretch that was held back.
 
     Attributes:
@@ -170,12 +170,12 @@ class Rest:
     rms_n: float
     probability: float
     variable: str | None
-    effects: tuple[Effect, ...]
+    effects: tuple[UnmodelledForce, ...]
     text: str
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class FrictionCurve:
     """Friction against speed, all causes that hang on the speed together.
 
     Attributes:
@@ -217,12 +217,12 @@ class DriveDiagnosis:
         curve: friction against speed.
     """
 
-    explained: Explained
+    explained: ExplainedDrive
     mismatch: bool
     misfit_rms_n: float
     probability: float
-    before: dict[str, Number]
-    after: dict[str, Number]
+    before: dict[str, IdentifiedValue]
+    after: dict[str, IdentifiedValue]
     friction: dict[str, dict[str, Value]]
     chosen: tuple[str, ...]
     vague: tuple[str, ...]
@@ -230,14 +230,14 @@ class DriveDiagnosis:
     model_n: NDArray[np.float64]
     whole_n: NDArray[np.float64]
     held_back_s: tuple[float, float]
-    steps: tuple[Step, ...]
+    steps: tuple[DriveStep, ...]
     locations: tuple[DriveLocation, ...]
     findings: tuple[DriveFinding, ...]
     rest: Rest
     rest_locations: tuple[DriveLocation, ...]
     cannot_tell: tuple[str, ...]
-    curve: Curve
-    held_out: HeldOut | None = None
+    curve: FrictionCurve
+    held_out: DriveHeldOut | None = None
 
     @property
     def recordings(self) -> Recordings:

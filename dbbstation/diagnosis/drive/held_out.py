@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class DriveHeldOut:
     """Predictions of parts that were held out, everything chosen anew without each of them.
 
     Attributes:
@@ -46,7 +46,7 @@ class HeldOut:
         return is_worse(self.corrected_n, self.reference_n)
 
 
-def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> HeldOut:
+def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> DriveHeldOut:
     """Hold back parts in turn, whole recordings from five on, else ten stretches, and predict them.
 
     Samples as far from a part as the low-pass reaches take no part either: they contain some of its force.
@@ -77,7 +77,7 @@ def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> HeldOut:
             brought[source][number] = error(others) - whole
     count = len(channel.residual)
     gains = {source: Gains(tuple(each)) for source, each in brought.items() if any(each)}
-    return HeldOut(gains, len(parts), float(np.sqrt(reference / count)), float(np.sqrt(corrected / count)))
+    return DriveHeldOut(gains, len(parts), float(np.sqrt(reference / count)), float(np.sqrt(corrected / count)))
 
 
 GAP_PERIODS = 0.5

@@ -9,10 +9,17 @@ import numpy as np
 
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS, METHOD_SHARE, VISCOUS
 from dbbstation.diagnosis.drive.explain import explain
-from dbbstation.diagnosis.drive.findings import Curve, DriveDiagnosis, DriveFinding, Number, Rest, Step
+from dbbstation.diagnosis.drive.findings import (
+    DriveDiagnosis,
+    DriveFinding,
+    DriveStep,
+    FrictionCurve,
+    IdentifiedValue,
+    Rest,
+)
 from dbbstation.diagnosis.drive.fit import DriveFit, base_values, fit
 from dbbstation.diagnosis.drive.held_out import held_out
-from dbbstation.diagnosis.drive.limits import VAGUE, Limits, limits_of, mass_is_known, sentences
+from dbbstation.diagnosis.drive.limits import VAGUE, DriveLimits, limits_of, mass_is_known, sentences
 from dbbstation.diagnosis.drive.locate import locate
 from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.verdicts import Verdicts
@@ -27,7 +34,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.contract import DriveSource
-    from dbbstation.diagnosis.drive.explain import Explained
+    from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.trace.drive_recording import DriveRecording
 
@@ -95,7 +102,7 @@ def identify(
         mismatch=mismatch,
         misfit_rms_n=_beyond(put_together.force_n - before.force_n(), noise.sigma),
         probability=misfit.probability,
-        before={name: Number(value, known[name]) for name, value in before.base.items()},
+        before={name: IdentifiedValue(value, known[name]) for name, value in before.base.items()},
         after=_numbers(explained, values, known, limits),
         friction=_per_direction(after, values)
         if limits.several_speeds and limits.reverses and VISCOUS in values
@@ -124,7 +131,7 @@ def _is_known(viscous: Value, speed_m_s: float, force_n: float) -> bool:
     return viscous.uncertainty < VAGUE * max(viscous.value, 0.1 * force_n / speed_m_s)
 
 
-def _left_of_base(explained: Explained) -> LeftOver:
+def _left_of_base(explained: ExplainedDrive) -> LeftOver:
     """What the base alone leaves, tested."""
     settled = explained.settled
     alone = replace(settled.posterior, hypotheses=(Hypothesis((), 0.0),))
@@ -136,7 +143,7 @@ def _beyond(residual: NDArray[np.float64], sigma: float) -> float:
     return float(np.sqrt(max(float(np.mean(residual**2)) - sigma**2, 0.0)))
 
 
-def _rest(explained: Explained, verdicts: Verdicts, model_n: NDArray[np.float64]) -> Rest:
+def _rest(explained: ExplainedDrive, verdicts: Verdicts, model_n: NDArray[np.float64]) -> Rest:
     """What is left of the force without a name."""
     recordings, settled = explained.drive.recordings, explained.settled
     least = METHOD_SHARE * recordings.scale.force_n
@@ -161,11 +168,11 @@ def _rest(explained: Explained, verdicts: Verdicts, model_n: NDArray[np.float64]
 
 
 def _numbers(
-    explained: Explained, values: dict[str, Value], known: dict[str, bool], limits: Limits
-) -> dict[str, Number]:
+    explained: ExplainedDrive, values: dict[str, Value], known: dict[str, bool], limits: DriveLimits
+) -> dict[str, IdentifiedValue]:
     """Base parameters, and what shifts the force of both directions."""
     nothing = {name: Value(float("nan"), float("inf"), unit) for name, unit in BASE_UNITS.items()}
-    numbers = {name: Number((nothing | values)[name], known[name]) for name in (MASS, VISCOUS)}
+    numbers = {name: IdentifiedValue((nothing | values)[name], known[name]) for name in (MASS, VISCOUS)}
     after = explained.after
     for member in after.members:
         if member.cause.name not in explained.drive.of_law:
@@ -173,7 +180,7 @@ def _numbers(
         # Whether it is a load or asymmetric friction, it is what the drive needs more one way than the other.
         found = after.parameters(member.cause.name)
         for parameter in OFFSETS & set(found):
-            numbers["offset_n"] = Number(found[parameter], limits.reverses)
+            numbers["offset_n"] = IdentifiedValue(found[parameter], limits.reverses)
     return numbers
 
 
@@ -203,7 +210,7 @@ def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict
     return sides
 
 
-def _steps(explained: Explained, verdicts: Verdicts, held_back: NDArray[np.bool_]) -> list[Step]:
+def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: NDArray[np.bool_]) -> list[DriveStep]:
     """Base and one source after another, each fitted without the held-back stretch and judged on it."""
     drive, settled = explained.drive, explained.settled
     by_name = {member.cause.name: member for member in settled.best.members}
@@ -218,7 +225,7 @@ def _steps(explained: Explained, verdicts: Verdicts, held_back: NDArray[np.bool_
         out, inside = (
             float(np.linalg.norm(left[rows]) / np.linalg.norm(force[rows])) for rows in (held_back, ~held_back)
         )
-        steps.append(Step(added, out, inside, fitted.all_values()))
+        steps.append(DriveStep(added, out, inside, fitted.all_values()))
     return steps
 
 
@@ -241,7 +248,7 @@ def _with_weight(finding: DriveFinding, values: dict[str, Value]) -> DriveFindin
     return replace(finding, text=f"{finding.text} {more}")
 
 
-def _curve(explained: Explained) -> Curve:
+def _curve(explained: ExplainedDrive) -> FrictionCurve:
     """Friction against speed as fitted: viscous friction and all causes that hang on the speed."""
     drive, fitted = explained.drive, explained.after
     recordings, scale = drive.recordings, drive.scale
@@ -272,7 +279,7 @@ def _curve(explained: Explained) -> Curve:
             shapes = tuple(fitted.parameters(name)[p.name].value for p in drive.of_law[name][1].shapes)
             columns[:, fitted.columns_of(name)] = drive.of_law[name][1].columns(pretended, shapes)
     variance = np.einsum("ij,jk,ik->i", columns, fitted.covariance, columns)
-    return Curve(speed, columns @ fitted.values, np.sqrt(np.maximum(variance, 0.0)))
+    return FrictionCurve(speed, columns @ fitted.values, np.sqrt(np.maximum(variance, 0.0)))
 
 
 NEAR_ZERO = 0.01

@@ -12,7 +12,7 @@ from dbbstation.diagnosis.drive.sources.coulomb_friction import COULOMB_SHARE
 from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
-    from dbbstation.diagnosis.drive.explain import Explained
+    from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.inference.verdict import Value
 
 ACCELERATES = 5.0
@@ -23,7 +23,7 @@ VAGUE = 0.3
 
 
 @dataclass(frozen=True)
-class Limits:
+class DriveLimits:
     """What cannot be distinguished.
 
     Attributes:
@@ -37,7 +37,7 @@ class Limits:
     reverses: bool
 
 
-def limits_of(explained: Explained) -> Limits:
+def limits_of(explained: ExplainedDrive) -> DriveLimits:
     """Look at what the drive did.
 
     Coulomb friction counts as distinguished from viscous friction where it shows beside mass, viscous friction and a delay between
@@ -53,19 +53,19 @@ def limits_of(explained: Explained) -> Limits:
     rest = float(np.linalg.norm(columns[:, -1] - columns[:, :-1] @ beside))
     seen = COULOMB_SHARE * recordings.scale.force_n * rest / explained.settled.noise.innovation
     noise = float(np.sqrt(np.mean([one.acceleration_noise_m_s2**2 for one in recordings.signals])))
-    return Limits(
+    return DriveLimits(
         accelerates=float(np.sqrt(np.mean(acceleration**2))) > ACCELERATES * noise,
         several_speeds=bool(seen >= OUT),
         reverses=recordings.scale.both_ways,
     )
 
 
-def mass_is_known(limits: Limits, mass: Value | None) -> bool:
+def mass_is_known(limits: DriveLimits, mass: Value | None) -> bool:
     """Whether the recordings tell the mass."""
     return mass is not None and limits.accelerates and mass.uncertainty < VAGUE * mass.value
 
 
-def sentences(limits: Limits, explained: Explained, known: dict[str, bool]) -> tuple[str, ...]:
+def sentences(limits: DriveLimits, explained: ExplainedDrive, known: dict[str, bool]) -> tuple[str, ...]:
     """Sentences for people: what cannot be determined, what can be said still, and what to record."""
     sentences = list(explained.dropped.values())
     if not known[MASS] and MASS not in explained.dropped:

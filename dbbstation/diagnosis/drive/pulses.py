@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import betaincc, betaln, expit
 from scipy.stats import chi2
 
-from dbbstation.diagnosis.drive.findings import Complement, Part
+from dbbstation.diagnosis.drive.findings import Complement, DrivePart
 from dbbstation.diagnosis.drive.fit import fit
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.curves import Stretches
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.drive.explain import Explained
+    from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.recordings import Recordings
 
 APART = 4.0
@@ -65,7 +65,7 @@ class Edges:
         return float(expit(anywhere - more_often - NAMED_ODDS))
 
 
-def edges_of(recordings: Recordings, parts: Sequence[Part]) -> Edges:
+def edges_of(recordings: Recordings, parts: Sequence[DrivePart]) -> Edges:
     """Where stretches of time begin and end.
 
     Args:
@@ -91,7 +91,7 @@ def _at_turns(recordings: Recordings, times: NDArray[np.float64]) -> NDArray[np.
     return found
 
 
-def distinct_pushes(parts: Sequence[Part]) -> int:
+def distinct_pushes(parts: Sequence[DrivePart]) -> int:
     """How many pushes stretches of time are, those of one size counted once: a machine that pushes again pushes as hard.
 
     Args:
@@ -100,7 +100,7 @@ def distinct_pushes(parts: Sequence[Part]) -> int:
     return len(parts) - max(len(equal_pushes(parts)) - 1, 0)
 
 
-def equal_pushes(parts: Sequence[Part]) -> list[Part]:
+def equal_pushes(parts: Sequence[DrivePart]) -> list[DrivePart]:
     """The most stretches of time that can be of one size together, by chi-square about their weighted mean, in their order."""
     order = sorted(range(len(parts)), key=lambda k: parts[k].parameters["force_n"].value)
     sizes = [parts[k].parameters["force_n"] for k in order]
@@ -117,7 +117,7 @@ def _of_one_size(sizes: Sequence[Value]) -> bool:
     return len(sizes) < 2 or squares <= float(chi2.ppf(ONE_SIZE, len(sizes) - 1))  # noqa: PLR2004 - one agrees with itself
 
 
-def complement_of(parts: Sequence[Part], first_s: float, last_s: float) -> Complement | None:
+def complement_of(parts: Sequence[DrivePart], first_s: float, last_s: float) -> Complement | None:
     """The stretches between pulses of one size, with the opposite force; None where there are not two such pulses.
 
     Args:
@@ -143,7 +143,7 @@ def pooled(sizes: Sequence[Value]) -> Value:
     return Value(mean, float(np.sqrt(max(scatter, 1.0) / weights.sum())), sizes[0].unit)
 
 
-def pulse_parts(explained: Explained, names: Sequence[str]) -> list[Part]:
+def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[DrivePart]:
     """Stretches of time in which the force differs from what it is before and behind them, or from what it is most of the time.
 
     Stretches that were found may overlap; what they are together has levels, of which neighbours that do not differ by
@@ -176,8 +176,8 @@ def pulse_parts(explained: Explained, names: Sequence[str]) -> list[Part]:
         found = size(one - other)
         return abs(found.value) > APART * found.uncertainty
 
-    def part(first: float, last: float, less: NDArray[np.float64]) -> Part:
-        return Part("", {"force_n": size(less), "duration_s": Value(last - first, apart, "s")}, (first, last))
+    def part(first: float, last: float, less: NDArray[np.float64]) -> DrivePart:
+        return DrivePart("", {"force_n": size(less), "duration_s": Value(last - first, apart, "s")}, (first, last))
 
     edges = _distinct(np.concatenate([times[[0, -1]], within.ravel()]), apart)
     levels: list[tuple[float, float, NDArray[np.float64]]] = []

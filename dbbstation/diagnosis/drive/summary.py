@@ -16,10 +16,10 @@ if TYPE_CHECKING:
         DriveDiagnosis,
         DriveFinding,
         DriveLocation,
-        Number,
-        Step,
+        DriveStep,
+        IdentifiedValue,
     )
-    from dbbstation.diagnosis.drive.held_out import HeldOut
+    from dbbstation.diagnosis.drive.held_out import DriveHeldOut
     from dbbstation.inference.verdict import Value
 
 
@@ -106,7 +106,7 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _number(number: Number) -> dict[str, Any]:
+def _number(number: IdentifiedValue) -> dict[str, Any]:
     known = math.isfinite(number.value.uncertainty)
     return {
         "value": number.value.value if known else None,
@@ -122,7 +122,7 @@ def _values(values: Mapping[str, Value]) -> dict[str, Any]:
     }
 
 
-def _step(step: Step) -> dict[str, Any]:
+def _step(step: DriveStep) -> dict[str, Any]:
     return {
         "added": step.added or None,
         "relative_force_error": step.relative_force_error,
@@ -184,7 +184,7 @@ def _source(finding: DriveFinding) -> dict[str, Any]:
     }
 
 
-def _held_out(held: HeldOut | None) -> dict[str, Any] | None:
+def _held_out(held: DriveHeldOut | None) -> dict[str, Any] | None:
     if held is None:
         return None
     return {

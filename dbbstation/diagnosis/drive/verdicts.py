@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.channel import METHOD_SHARE
-from dbbstation.diagnosis.drive.findings import DriveFinding, Effect, Part
+from dbbstation.diagnosis.drive.findings import DriveFinding, DrivePart, UnmodelledForce
 from dbbstation.diagnosis.drive.naming import COGGING, COULOMB, TRANSIENT, acts, source_of
 from dbbstation.diagnosis.drive.noise_rival import probability_beside_noise
 from dbbstation.diagnosis.drive.pulses import MOST_PUSHES, complement_of, distinct_pushes, edges_of, pulse_parts
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.diagnosis.drive.contract import DriveSource
-    from dbbstation.diagnosis.drive.explain import Explained
+    from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.findings import Complement
-    from dbbstation.diagnosis.drive.held_out import HeldOut
-    from dbbstation.inference.read_off import Finding
+    from dbbstation.diagnosis.drive.held_out import DriveHeldOut
+    from dbbstation.inference.read_off import CauseFinding
 
 CLAIMS = frozenset({Verdict.IDENTIFIED, Verdict.AMBIGUOUS})
 PREDICTS = frozenset({Verdict.IDENTIFIED, Verdict.HAPPENED})
@@ -40,7 +40,7 @@ class Verdicts:
         held: predictions of held-out parts; None: not asked for.
     """
 
-    def __init__(self, explained: Explained, *, several_speeds: bool, held: HeldOut | None = None) -> None:
+    def __init__(self, explained: ExplainedDrive, *, several_speeds: bool, held: DriveHeldOut | None = None) -> None:
         self._held = held
         self._explained, self._drive, self._several = explained, explained.drive, several_speeds
         self._raw = read_off(explained.settled)
@@ -85,7 +85,7 @@ class Verdicts:
         """Source that a member belongs to; empty where it has no name."""
         return self._source_of.get(name, "")
 
-    def effects(self) -> tuple[Effect, ...]:
+    def effects(self) -> tuple[UnmodelledForce, ...]:
         """Forces without a name that are there, largest first."""
         found = []
         for one in self._raw:
@@ -95,7 +95,9 @@ class Verdicts:
                 which = 1.0 + float(np.argmax(one.blocks))
                 text = f"offset of {one.label}" if one.label else "offset of each recording"
                 found.append(
-                    Effect(text, "recording", one.probability, one.rms, which, which, "(number of the recording)")
+                    UnmodelledForce(
+                        text, "recording", one.probability, one.rms, which, which, "(number of the recording)"
+                    )
                 )
                 continue
             if not one.spans:
@@ -103,10 +105,10 @@ class Verdicts:
             span = one.spans[0]
             turns = one.family in {Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION}
             variable = f"{span.variable} by direction" if turns else span.variable
-            found.append(Effect(one.name, variable, one.probability, one.rms, span.low, span.high, span.unit))
+            found.append(UnmodelledForce(one.name, variable, one.probability, one.rms, span.low, span.high, span.unit))
         return tuple(sorted(found, key=lambda e: -e.rms_n))
 
-    def _source(self, finding: Finding) -> str:
+    def _source(self, finding: CauseFinding) -> str:
         """Name of the source that a finding belongs to; empty where it has none."""
         return source_of(self._drive, self._explained.settled.bank.patterns, finding.name)
 
@@ -169,13 +171,13 @@ class Verdicts:
         gains = self._held.gains.get(source, Gains(()))
         return claim(SURE, OUT, acts(source), gains, worse=self._held.is_worse)
 
-    def _at_end(self, there: Sequence[Finding]) -> dict[str, str]:
+    def _at_end(self, there: Sequence[CauseFinding]) -> dict[str, str]:
         """Numbers of laws that lie at the end of what is tried, and what that is."""
         laws = [f.name for f in there if f.name in self._drive.of_law and self._is_member(f)]
         ends = [(name, span) for law in laws for name, span in self._explained.after.at_end(law).items()]
         return {name: f"{low:.3g} to {high:.3g}" for name, (low, high) in ends}
 
-    def _as_sure_as_it_is(self, finding: Finding) -> Finding:
+    def _as_sure_as_it_is(self, finding: CauseFinding) -> CauseFinding:
         """A finding whose values are known as well as stretches and bands agree on them: noise alone would call them surer."""
         if finding.verdict is Verdict.IDENTIFIED and finding.family is Family.PULSES:
             return self._as_sure_as_its_edges(finding)
@@ -193,7 +195,7 @@ class Verdicts:
         )
         return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
 
-    def _as_sure_as_its_edges(self, finding: Finding) -> Finding:
+    def _as_sure_as_its_edges(self, finding: CauseFinding) -> CauseFinding:
         """Stretches of time that are few, are no noise, and do not begin and end with the motion as where a law is wrong."""
         if not self._pulses:
             why = "None of its stretches stands out of those beside it."
@@ -228,7 +230,7 @@ class Verdicts:
         return probability_beside_noise(self._explained.settled)
 
     @cached_property
-    def _pulses(self) -> tuple[Part, ...]:
+    def _pulses(self) -> tuple[DrivePart, ...]:
         """Levels of all stretches of time that are there and do not turn with the travel."""
         names = [
             f.name for f in self._raw if f.family is Family.PULSES and f.verdict in CLAIMS and f.name in self.named
@@ -240,15 +242,15 @@ class Verdicts:
         time = self._drive.recordings.time_s
         return complement_of(self._pulses, float(time[0]), float(time[-1]))
 
-    def _is_member(self, finding: Finding) -> bool:
+    def _is_member(self, finding: CauseFinding) -> bool:
         return finding.name in self._explained.settled.best.names
 
-    def _probability(self, names: Sequence[str], own: Sequence[Finding]) -> float:
+    def _probability(self, names: Sequence[str], own: Sequence[CauseFinding]) -> float:
         """That any form of a source is there, or one of its class."""
         alone = self._explained.settled.posterior.probability(names) if names else 0.0
         return max([alone, *(f.probability for f in own)]) if own else alone
 
-    def _alike(self, source: DriveSource, findings: Sequence[Finding]) -> tuple[str, ...]:
+    def _alike(self, source: DriveSource, findings: Sequence[CauseFinding]) -> tuple[str, ...]:
         """Other sources that would do as well in its place, with values that can be."""
         names = set()
         for finding in findings:
@@ -271,7 +273,7 @@ class Verdicts:
         size = amplitude if not parameter.positive else abs(amplitude)
         return source.possible(after.all_values() | {parameter.name: size}, self._drive.scale)
 
-    def _text(self, source: DriveSource, verdict: Verdict, alike: Sequence[str], there: Sequence[Finding]) -> str:
+    def _text(self, source: DriveSource, verdict: Verdict, alike: Sequence[str], there: Sequence[CauseFinding]) -> str:
         if verdict is Verdict.IDENTIFIED:
             return f"{source.texts.what} {source.texts.confirm}"
         if verdict is Verdict.HAPPENED:
@@ -288,7 +290,7 @@ class Verdicts:
         gains = Gains(()) if self._held is None else self._held.gains.get(source, Gains(()))
         return f"brings too little where it was not fitted: something in {gains.with_gain} of {self._held.parts if self._held else 0} held-out parts"
 
-    def _absent(self, source: DriveSource, own: Sequence[Finding]) -> tuple[Verdict, str]:
+    def _absent(self, source: DriveSource, own: Sequence[CauseFinding]) -> tuple[Verdict, str]:
         """Verdict on what is not in the model, and why."""
         looked_for = {COGGING: lambda: self._no_cogging(own), TRANSIENT: self._no_transient}
         if why := self._hidden(source, own):
@@ -306,7 +308,7 @@ class Verdicts:
         not_needed = "It would have been seen at its plausible size and was not needed."
         return Verdict.RULED_OUT, refused[0] if refused else not_needed
 
-    def _hidden(self, source: DriveSource, own: Sequence[Finding]) -> str:
+    def _hidden(self, source: DriveSource, own: Sequence[CauseFinding]) -> str:
         """Why a cause could not have been seen, whatever was compared; empty where it could."""
         scale = self._drive.scale
         if faint := [f for f in own if self._is_member(f)]:
@@ -322,7 +324,7 @@ class Verdicts:
             )
         return ""
 
-    def _no_cogging(self, own: Sequence[Finding]) -> tuple[Verdict, str]:
+    def _no_cogging(self, own: Sequence[CauseFinding]) -> tuple[Verdict, str]:
         """No wave was found: within the band there is none, and beyond it there may be."""
         scale, shortest = self._drive.scale, self._drive.shortest_wave_mm
         if not np.isfinite(shortest):
@@ -362,16 +364,16 @@ class Verdicts:
             f"A force of {size:.2g} N for {rows * apart:.2g} s would have been seen; a shorter one is not in the band.",
         )
 
-    def _values(self, finding: Finding) -> dict[str, Value]:
+    def _values(self, finding: CauseFinding) -> dict[str, Value]:
         if finding.name in self._drive.of_law and self._is_member(finding):
             return self._explained.after.parameters(finding.name)
         return finding.values if finding.family is None else {}
 
-    def _parts(self, finding: Finding) -> list[Part]:
+    def _parts(self, finding: CauseFinding) -> list[DrivePart]:
         """Every wave or form by itself."""
         if finding.name in self._drive.of_law:
-            return [Part(self._drive.of_law[finding.name][1].label, self._values(finding))]
-        return [Part(finding.name, dict(finding.values))]
+            return [DrivePart(self._drive.of_law[finding.name][1].label, self._values(finding))]
+        return [DrivePart(finding.name, dict(finding.values))]
 
 
 def _in_words(complement: Complement) -> str:

@@ -11,7 +11,7 @@ from dbbstation.diagnosis.simulator.fit import not_told_apart
 from dbbstation.diagnosis.simulator.held import held_out_error, parts
 from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
 from dbbstation.diagnosis.simulator.search import compared, search
-from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, State, Work
+from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.read_off import Trial, read_off
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.model import Model
     from dbbstation.diagnosis.simulator.nodes import Node
     from dbbstation.diagnosis.simulator.own import PortSource
-    from dbbstation.diagnosis.simulator.search import Found
+    from dbbstation.diagnosis.simulator.search import SearchOutcome
     from dbbstation.diagnosis.simulator.terms import Term
     from dbbstation.diagnosis.simulator.work import Run
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.left_over import LeftOver
-    from dbbstation.inference.read_off import Finding
+    from dbbstation.inference.read_off import CauseFinding
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Moved:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class SimulatorComparison:
     """What is said of a simulator and its recordings.
 
     Attributes:
@@ -74,8 +74,8 @@ class Answer:
 
     model: Model
     base: Node
-    found: Found
-    findings: tuple[Finding, ...]
+    found: SearchOutcome
+    findings: tuple[CauseFinding, ...]
     parameters: tuple[Moved, ...]
     left: LeftOver
     held_out: HeldOutError | None
@@ -85,7 +85,7 @@ class Answer:
     stopped: str = ""
 
     @property
-    def work(self) -> Work:
+    def work(self) -> SimulationRuns:
         """Simulations."""
         return self.base.work
 
@@ -95,7 +95,7 @@ class Answer:
         return self.found.state.terms
 
     @property
-    def identified(self) -> tuple[Finding, ...]:
+    def identified(self) -> tuple[CauseFinding, ...]:
         """Findings of what is there and predicts, where that was asked."""
         return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)
 
@@ -113,7 +113,7 @@ def find(
     own: Sequence[PortSource] = (),
     hold_out: bool = True,
     progress: Callable[..., None] = lambda *_: None,
-) -> Answer:
+) -> SimulatorComparison:
     """Find what a simulator lacks, and at which of its ports.
 
     Args:
@@ -126,11 +126,11 @@ def find(
     Raises:
         CalibrationError: a simulation that failed, with its input.
     """
-    stated = State(tuple(p.value for p in model.parameters))
-    work = Work(model, run, np.ones(len(model.outputs)))
+    stated = FittedState(tuple(p.value for p in model.parameters))
+    work = SimulationRuns(model, run, np.ones(len(model.outputs)))
     as_simulated = work.residuals([stated])[0]
     if len(model.outputs) > 1:
-        work = Work(model, run, _scales(work, stated))
+        work = SimulationRuns(model, run, _scales(work, stated))
         as_simulated = work.residuals([stated])[0]
     nodes = Nodes(work, own, progress)
     base = nodes.base(stated)
@@ -144,7 +144,7 @@ def find(
     return _said(nodes, base, found, held_out, as_simulated, stopped)
 
 
-def _scales(work: Work, stated: State) -> NDArray[np.float64]:
+def _scales(work: SimulationRuns, stated: FittedState) -> NDArray[np.float64]:
     """What outputs are divided by, so that all have the noise of the first: from what differs between neighbouring residuals."""
     residual, outputs = work.residuals([stated])[0], len(work.model.outputs)
     noise = []
@@ -160,11 +160,11 @@ def _scales(work: Work, stated: State) -> NDArray[np.float64]:
 def _said(
     nodes: Nodes,
     base: Node,
-    found: Found,
+    found: SearchOutcome,
     held_out: HeldOutError | None,
     as_simulated: NDArray[np.float64],
     stopped: str,
-) -> Answer:
+) -> SimulatorComparison:
     node, settled = found.node, found.settled
     refits = refits_without(settled, [rows for _, rows in parts(nodes.work)])
     try:
@@ -172,7 +172,7 @@ def _said(
     except BudgetSpentError:
         nonlinear = {term.name: np.inf for term in found.state.terms}
     findings = tuple(_judged(one, found, nonlinear) for one in read_off(settled, Trial(held_out, refits)))
-    return Answer(
+    return SimulatorComparison(
         model=nodes.work.model,
         base=base,
         found=found,
@@ -187,7 +187,7 @@ def _said(
     )
 
 
-def _judged(one: Finding, found: Found, nonlinear: Mapping[str, float]) -> Finding:
+def _judged(one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, float]) -> CauseFinding:
     """A finding whose values are those of the term, and without a claim where linear and true answer differ."""
     inside = {c.name: (c, term) for c, term in zip(found.node.inside, found.state.terms, strict=True)}
     if one.name not in inside:
@@ -208,7 +208,7 @@ def _judged(one: Finding, found: Found, nonlinear: Mapping[str, float]) -> Findi
     return one
 
 
-def _nonlinear(work: Work, found: Found) -> dict[str, float]:
+def _nonlinear(work: SimulationRuns, found: SearchOutcome) -> dict[str, float]:
     """By how much the true answer to a move of one standard uncertainty of an amplitude departs from the linear one, by term."""
     weigh, sigma = noise_of(found.settled)
     fitted, first, apart = found.node.fitted, len(work.model.parameters), {}
@@ -226,7 +226,7 @@ def _nonlinear(work: Work, found: Found) -> dict[str, float]:
     return apart
 
 
-def _parameters(base: Node, found: Found) -> tuple[Moved, ...]:
+def _parameters(base: Node, found: SearchOutcome) -> tuple[Moved, ...]:
     """Parameters as stated, refitted, and beside what was found."""
     weigh, sigma = noise_of(found.settled)
     model, fitted = base.work.model, found.node.fitted

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import BSpline
 
-from dbbstation.diagnosis.simulator.terms import DEGREE, IN_PLACE, Form, Term, bends
+from dbbstation.diagnosis.simulator.terms import DEGREE, IN_PLACE, Term, TermForm, bends
 from dbbstation.diagnosis.simulator.work import sizes
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.patterns import log_odds
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.simulator.model import Port
+    from dbbstation.diagnosis.simulator.model import SimulatorPort
     from dbbstation.diagnosis.simulator.own import PortSource
 
 ROUNDINGS = (0.01, 0.1)
@@ -68,7 +68,7 @@ class Candidate:
 
 
 def candidates(
-    ports: Sequence[Port],
+    ports: Sequence[SimulatorPort],
     signals: Mapping[str, Mapping[str, NDArray[np.float64]]],
     own: Sequence[PortSource] = (),
     times: NDArray[np.float64] | None = None,
@@ -89,20 +89,20 @@ def candidates(
             found += _at(port, {s: at[s] for s in port.signals if len(np.unique(at[s])) >= DISTINCT}, span)
     for source in own:
         parameters = source.parameters()
-        amplitudes = [p for p in parameters if not p.shape]
-        shaped = [p for p in parameters if p.shape]
-        middle = tuple(p.shape[len(p.shape) // 2] for p in shaped)
+        amplitudes = [p for p in parameters if not p.grid]
+        shaped = [p for p in parameters if p.grid]
+        middle = tuple(p.grid[len(p.grid) // 2] for p in shaped)
         found.append(
             Candidate(
-                Term(source.port, Form.OWN, (), (0.0,) * len(amplitudes), middle, own=source),
+                Term(source.port, TermForm.OWN, (), (0.0,) * len(amplitudes), middle, own=source),
                 tuple(p.name for p in (*amplitudes, *shaped)),
                 tuple(p.unit for p in (*amplitudes, *shaped)),
-                tuple(p.shape for p in shaped),
+                tuple(p.grid for p in shaped),
                 NAMED_ODDS,
                 tuple(p.positive for p in amplitudes),
             )
         )
-    count = {form: sum(one.term.form is form for one in found) for form in Form}
+    count = {form: sum(one.term.form is form for one in found) for form in TermForm}
     return tuple(one if one.term.own else replace(one, log_odds=log_odds(count[one.term.form])) for one in found)
 
 
@@ -112,9 +112,9 @@ def _span(times: NDArray[np.float64]) -> tuple[float, float]:
     return float(np.median(steps)), float(times.max() - times.min())
 
 
-def _at(port: Port, signals: Mapping[str, NDArray[np.float64]], span: tuple[float, float]) -> list[Candidate]:
+def _at(port: SimulatorPort, signals: Mapping[str, NDArray[np.float64]], span: tuple[float, float]) -> list[Candidate]:
     """Forms at one port over signals that change there, shape (calls,)."""
-    found = [_candidate(port, Form.CONSTANT, (), ("value",), (port.unit,))]
+    found = [_candidate(port, TermForm.CONSTANT, (), ("value",), (port.unit,))]
     greatest = sizes(signals)
     for name, values in signals.items():
         unit, size = port.signals[name], greatest[name]
@@ -122,51 +122,53 @@ def _at(port: Port, signals: Mapping[str, NDArray[np.float64]], span: tuple[floa
             for order in (1.0, 2.0):
                 fixed = (PERIODS[unit], order)
                 found.append(
-                    _candidate(port, Form.PERIODIC, (name,), ("cosine", "sine"), (port.unit,) * 2, fixed=fixed)
+                    _candidate(port, TermForm.PERIODIC, (name,), ("cosine", "sine"), (port.unit,) * 2, fixed=fixed)
                 )
-        for form, power in ((Form.LINEAR, ""), (Form.SQUARE, "²"), (Form.DRAG, "²"), (Form.CUBIC, "³")):
-            if form is not Form.DRAG or values.min() < 0.0 < values.max():
+        for form, power in ((TermForm.LINEAR, ""), (TermForm.SQUARE, "²"), (TermForm.DRAG, "²"), (TermForm.CUBIC, "³")):
+            if form is not TermForm.DRAG or values.min() < 0.0 < values.max():
                 found.append(_candidate(port, form, (name,), ("coefficient",), (_per(port.unit, unit, power),)))
         places, longest = np.quantile(values, np.linspace(0.0, 1.0, LENGTHS + 2)[1:-1]), span[1] / 3.0
-        found.append(_candidate(port, Form.CURVE, (name,), *_curve(port, values)))
+        found.append(_candidate(port, TermForm.CURVE, (name,), *_curve(port, values)))
         found.append(
-            _candidate(port, Form.HINGE, (name,), ("slope", "place"), (_per(port.unit, unit), unit), grid=tuple(places))
+            _candidate(
+                port, TermForm.HINGE, (name,), ("slope", "place"), (_per(port.unit, unit), unit), grid=tuple(places)
+            )
         )
         constants = tuple(np.geomspace(2.0 * span[0], max(longest, 4.0 * span[0]), LENGTHS).tolist())
         found.append(
             _candidate(
-                port, Form.MEMORY, (name,), ("gain", "time constant"), (_per(port.unit, unit), "s"), grid=constants
+                port, TermForm.MEMORY, (name,), ("gain", "time constant"), (_per(port.unit, unit), "s"), grid=constants
             )
         )
         if values.min() < 0.0 < values.max():
             turns = tuple(share * size for share in ROUNDINGS)
-            found.append(_candidate(port, Form.SIGN, (name,), ("size", "rounding"), (port.unit, unit), grid=turns))
+            found.append(_candidate(port, TermForm.SIGN, (name,), ("size", "rounding"), (port.unit, unit), grid=turns))
             widths = tuple((size * np.geomspace(0.03, 0.6, LENGTHS)).tolist())
             found.append(
                 _candidate(
-                    port, Form.LIMIT, (name,), ("slope", "half width"), (_per(port.unit, unit), unit), grid=widths
+                    port, TermForm.LIMIT, (name,), ("slope", "half width"), (_per(port.unit, unit), unit), grid=widths
                 )
             )
         widths = tuple((0.5 * float(np.ptp(values)) * np.geomspace(0.01, 0.5, LENGTHS)).tolist())
-        found.append(_candidate(port, Form.SLIP, (name,), ("size", "half width"), (port.unit, unit), grid=widths))
+        found.append(_candidate(port, TermForm.SLIP, (name,), ("size", "half width"), (port.unit, unit), grid=widths))
         if unit == port.unit:
             whiles = tuple(np.geomspace(span[0], max(0.1 * span[1], 2.0 * span[0]), LENGTHS + 1).tolist())
-            tried = {Form.DELAY: whiles, Form.LAG: whiles, Form.PLAY: widths}
+            tried = {TermForm.DELAY: whiles, TermForm.LAG: whiles, TermForm.PLAY: widths}
             for form, what, of in (
-                (Form.DELAY, "dead time", "s"),
-                (Form.LAG, "time constant", "s"),
-                (Form.PLAY, "half width", unit),
+                (TermForm.DELAY, "dead time", "s"),
+                (TermForm.LAG, "time constant", "s"),
+                (TermForm.PLAY, "half width", unit),
             ):
                 found.append(replace(_candidate(port, form, (name,), (what,), (of,)), tried=tried[form]))
     for one, other in combinations(signals, 2):
         units = _per(_per(port.unit, port.signals[one]), port.signals[other])
-        found.append(_candidate(port, Form.PRODUCT, (one, other), ("coefficient",), (units,)))
+        found.append(_candidate(port, TermForm.PRODUCT, (one, other), ("coefficient",), (units,)))
     return found
 
 
 def _candidate(
-    port: Port,
-    form: Form,
+    port: SimulatorPort,
+    form: TermForm,
     signals: tuple[str, ...],
     names: tuple[str, ...],
     units: tuple[str, ...],
@@ -185,7 +187,9 @@ def _candidate(
     )
 
 
-def _curve(port: Port, values: NDArray[np.float64]) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
+def _curve(
+    port: SimulatorPort, values: NDArray[np.float64]
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
     """Names, units and knots of a cubic spline over the range of a signal, its inner knots where as many values lie below as between."""
     low, high = float(values.min()), float(values.max())
     room = 0.05 * (high - low)

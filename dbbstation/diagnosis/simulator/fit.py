@@ -11,15 +11,15 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from dbbstation.diagnosis.simulator.terms import IN_PLACE
-from dbbstation.diagnosis.simulator.work import Direction, State
+from dbbstation.diagnosis.simulator.work import FittedState, PerturbedParameter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.simulator.model import Parameter
-    from dbbstation.diagnosis.simulator.work import Work
+    from dbbstation.diagnosis.simulator.model import SimulatorParameter
+    from dbbstation.diagnosis.simulator.work import SimulationRuns
 
     Weigh = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
@@ -44,7 +44,7 @@ uncertainty is more than thirty times what it would be alone."""
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class SimulatorFit:
     """A refit.
 
     Attributes:
@@ -56,7 +56,7 @@ class Fitted:
         starts: sums of squares that other starts ended at.
     """
 
-    state: State
+    state: FittedState
     residual: NDArray[np.float64]
     columns: NDArray[np.float64]
     curved: NDArray[np.float64]
@@ -69,7 +69,7 @@ def plain(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return rows
 
 
-def directions_of(work: Work, state: State) -> list[Direction]:
+def directions_of(work: SimulationRuns, state: FittedState) -> list[PerturbedParameter]:
     """All numbers of a state, each with a first dose inside its bounds."""
     low, high = bounds_of(work, state)
     numbers = state.numbers
@@ -84,11 +84,11 @@ def directions_of(work: Work, state: State) -> list[Direction]:
         up, down = high[k] - numbers[k], numbers[k] - low[k]
         sign = 1.0 if up >= 2.0 * dose or up >= down else -1.0
         work.doses[key] = sign * dose
-        found.append(Direction(key, sign * dose, k))
+        found.append(PerturbedParameter(key, sign * dose, k))
     return found
 
 
-def bounds_of(work: Work, state: State) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def bounds_of(work: SimulationRuns, state: FittedState) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Least and greatest value of each number of a state, shape (m,)."""
     low = [p.low for p in work.model.parameters]
     high = [p.high for p in work.model.parameters]
@@ -110,14 +110,14 @@ REACH = 10.0
 
 
 def fit(
-    work: Work,
-    start: State,
+    work: SimulationRuns,
+    start: FittedState,
     weigh: Weigh = plain,
     *,
     sigma: float = 0.0,
     several: bool = False,
     most_steps: int = MOST_STEPS,
-) -> Fitted:
+) -> SimulatorFit:
     """Fit all numbers of a state to the recordings [Branch, Coleman and Li, SIAM J. Sci. Comput. 21 (1999) 1].
 
     Args:
@@ -136,12 +136,14 @@ def fit(
     best = int(np.argmin(squares))
     state, residual = ended[best]
     answers = work.answers(state, directions_of(work, state), _rms(residual))
-    return Fitted(
+    return SimulatorFit(
         state, residual, answers.columns, answers.curved, squares[best], tuple(np.delete(squares, best).tolist())
     )
 
 
-def _from(work: Work, start: State, weigh: Weigh, sigma: float, most_steps: int) -> tuple[State, NDArray[np.float64]]:
+def _from(
+    work: SimulationRuns, start: FittedState, weigh: Weigh, sigma: float, most_steps: int
+) -> tuple[FittedState, NDArray[np.float64]]:
     low, high = bounds_of(work, start)
     if not len(low):
         return start, work.residuals([start])[0]
@@ -179,7 +181,7 @@ def _from(work: Work, start: State, weigh: Weigh, sigma: float, most_steps: int)
 
 
 def _weighed(
-    work: Work, state: State, residual: NDArray[np.float64], weigh: Weigh, sigma: float
+    work: SimulationRuns, state: FittedState, residual: NDArray[np.float64], weigh: Weigh, sigma: float
 ) -> NDArray[np.float64]:
     """Weighed rows, and parameters less what was known of them, in standard uncertainties."""
     if not np.isfinite(residual).all():
@@ -188,7 +190,7 @@ def _weighed(
     return np.concatenate([weigh(residual) / sigma, rows @ state.numbers - stated])
 
 
-def _known(parameters: Sequence[Parameter], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _known(parameters: Sequence[SimulatorParameter], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """What was known of parameters as rows of a fit, shape (p, m), and their right side, shape (p,)."""
     known = [(k, p) for k, p in enumerate(parameters) if p.uncertainty is not None]
     rows = np.zeros((len(known), max(count, len(parameters))))
@@ -197,14 +199,16 @@ def _known(parameters: Sequence[Parameter], count: int) -> tuple[NDArray[np.floa
     return rows, np.array([p.value / p.uncertainty for _, p in known])  # type: ignore[operator]  # the same
 
 
-def _squares(work: Work, weigh: Weigh, sigma: float, states: Sequence[State]) -> list[float]:
+def _squares(work: SimulationRuns, weigh: Weigh, sigma: float, states: Sequence[FittedState]) -> list[float]:
     left = work.residuals(states, strict=False)
     return [
         float(np.sum(_weighed(work, state, rows, weigh, sigma) ** 2)) for state, rows in zip(states, left, strict=True)
     ]
 
 
-def _elsewhere(work: Work, start: State, squares: Callable[[Sequence[State]], list[float]]) -> list[State]:
+def _elsewhere(
+    work: SimulationRuns, start: FittedState, squares: Callable[[Sequence[FittedState]], list[float]]
+) -> list[FittedState]:
     """The best of several states spread over what the parameters may be."""
     parameters = work.model.parameters
     if not parameters:
@@ -213,13 +217,15 @@ def _elsewhere(work: Work, start: State, squares: Callable[[Sequence[State]], li
     low = np.maximum(np.array([p.low for p in parameters]), np.array(start.values) - spread)
     high = np.minimum(np.array([p.high for p in parameters]), np.array(start.values) + spread)
     draws = qmc.Sobol(len(parameters), scramble=True, rng=1).random(16)[:STARTS]
-    states = [State(tuple((low + (high - low) * draw).tolist()), start.terms) for draw in draws]
+    states = [FittedState(tuple((low + (high - low) * draw).tolist()), start.terms) for draw in draws]
     found = squares(states)
     order = np.argsort(found)[: GONE_ON - 1]
     return [states[int(k)] for k in order if np.isfinite(found[int(k)])]
 
 
-def near(work: Work, fitted: Fitted, weigh: Weigh, sigma: float, rounds: int = 6) -> tuple[State, NDArray[np.float64]]:
+def near(
+    work: SimulationRuns, fitted: SimulatorFit, weigh: Weigh, sigma: float, rounds: int = 6
+) -> tuple[FittedState, NDArray[np.float64]]:
     """Refit to some of the rows, from a fit to all of them: Gauss-Newton steps by the answers there, each simulated anew.
 
     Args:

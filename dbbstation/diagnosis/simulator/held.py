@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
-    from dbbstation.diagnosis.simulator.search import Found
-    from dbbstation.diagnosis.simulator.work import State, Work
+    from dbbstation.diagnosis.simulator.search import SearchOutcome
+    from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
     from dbbstation.inference.settled import Settled
 
 
-def parts(work: Work) -> list[tuple[str, NDArray[np.bool_]]]:
+def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:
     """Parts that are held back: whole runs where there are five or more, else ten stretches of time, all outputs together."""
     runs, outputs = work.model.runs, len(work.model.outputs)
     blocks = [work.blocks[k * outputs : (k + 1) * outputs] for k in range(len(runs))]
@@ -57,7 +57,7 @@ def parts(work: Work) -> list[tuple[str, NDArray[np.bool_]]]:
 
 
 def held_out_error(
-    nodes: Nodes, base: Node, found: Found, stated: State, progress: Callable[[str, int, int], None]
+    nodes: Nodes, base: Node, found: SearchOutcome, stated: FittedState, progress: Callable[[str, int, int], None]
 ) -> HeldOutError:
     """Hold parts back in turn; choose terms anew, refit, simulate.
 
@@ -89,7 +89,7 @@ def held_out_error(
     return HeldOutError(tuple(folds))
 
 
-def _without(node: Node, out: NDArray[np.bool_], found: Found) -> Settled:
+def _without(node: Node, out: NDArray[np.bool_], found: SearchOutcome) -> Settled:
     """Comparison about a node without some rows, shape (n,)."""
     return compared_quickly(node.channel.without(out).thinned(FOLD_ROWS), found.settled.beginning)
 

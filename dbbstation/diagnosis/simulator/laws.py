@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.simulator.terms import Form
-from dbbstation.diagnosis.simulator.work import Direction
+from dbbstation.diagnosis.simulator.terms import TermForm
+from dbbstation.diagnosis.simulator.work import PerturbedParameter
 from dbbstation.inference.channel import Law
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.simulator.candidates import Candidate
-    from dbbstation.diagnosis.simulator.work import State, Work
+    from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
     from dbbstation.inference.channel import Discrepancy
 
     Curves = Mapping[tuple[str, str], NDArray[np.float64]]
@@ -34,12 +34,12 @@ FORM_UNCERTAINTY = 0.02
 LOOSE_FORM_UNCERTAINTY = 0.1
 """The same of friction, plays and memories."""
 
-LOOSE = frozenset({Form.SIGN, Form.SLIP, Form.PLAY, Form.MEMORY})
+LOOSE = frozenset({TermForm.SIGN, TermForm.SLIP, TermForm.PLAY, TermForm.MEMORY})
 
 
 def laws(
-    work: Work,
-    state: State,
+    work: SimulationRuns,
+    state: FittedState,
     found: Sequence[Candidate],
     size: float,
     curved_most: float,
@@ -72,7 +72,7 @@ def laws(
     curves = {
         (one.term.port, one.term.signals[0]): columns[one.name][0]
         for one in dosed
-        if one.term.form is Form.CURVE and one.name in columns
+        if one.term.form is TermForm.CURVE and one.name in columns
     }
     laid_out = [_law(one, columns[one.name], size, curves) for one in dosed if one.name in columns]
     for one in found:
@@ -85,7 +85,7 @@ def laws(
     return laid_out, refused
 
 
-def curve_answers(work: Work, state: State, curves: Sequence[Candidate], size: float) -> Curves:
+def curve_answers(work: SimulationRuns, state: FittedState, curves: Sequence[Candidate], size: float) -> Curves:
     """Answers to curves about a state, by port and signal; those that nothing answers to are left out."""
     answers = work.answers(state, [d for one in curves for d in _directions(one, ())], size)
     found, first = {}, 0
@@ -99,14 +99,14 @@ def curve_answers(work: Work, state: State, curves: Sequence[Candidate], size: f
 
 def form_uncertainty(one: Candidate) -> float:
     """Share of its effect by which real objects depart from a candidate's form."""
-    if one.term.form in {Form.CONSTANT, Form.OWN}:
+    if one.term.form in {TermForm.CONSTANT, TermForm.OWN}:
         return 0.0
     return LOOSE_FORM_UNCERTAINTY if one.term.form in LOOSE else FORM_UNCERTAINTY
 
 
 def discrepancy(one: Candidate, curves: Curves) -> Discrepancy | None:
     """Columns of what a form may be off by: smooth curves over the signals of its port, each as large as the effect."""
-    taken = one.term.signals if one.term.form is Form.CURVE else ()
+    taken = one.term.signals if one.term.form is TermForm.CURVE else ()
     own = [columns for (port, signal), columns in curves.items() if port == one.term.port and signal not in taken]
     if not own or not form_uncertainty(one):
         return None
@@ -121,11 +121,11 @@ def discrepancy(one: Candidate, curves: Curves) -> Discrepancy | None:
     return beside
 
 
-def _directions(one: Candidate, point: tuple[float, ...]) -> list[Direction]:
+def _directions(one: Candidate, point: tuple[float, ...]) -> list[PerturbedParameter]:
     amplitudes = len(one.term.amplitudes)
     term = one.term.with_numbers([0.0] * amplitudes + list(point))
     keys = [(one.name, str(k), *(f"{value:.12g}" for value in point)) for k in range(amplitudes)]
-    return [Direction(key, 1e-3, k, term) for k, key in enumerate(keys)]
+    return [PerturbedParameter(key, 1e-3, k, term) for k, key in enumerate(keys)]
 
 
 def _law(one: Candidate, columns: NDArray[np.float64], size: float, curves: Curves) -> Law:
@@ -146,10 +146,10 @@ def _law(one: Candidate, columns: NDArray[np.float64], size: float, curves: Curv
     )
 
 
-def _in_place(work: Work, state: State, one: Candidate, size: float) -> Law | None:
+def _in_place(work: SimulationRuns, state: FittedState, one: Candidate, size: float) -> Law | None:
     """Law of what comes in the place of a signal: its share, at sizes between those that were tried; None where nothing answers."""
     before = work.residuals([state])[0]
-    states = [Direction((one.name,), 0.0, 0, one.term).at(state, value) for value in one.tried]
+    states = [PerturbedParameter((one.name,), 0.0, 0, one.term).at(state, value) for value in one.tried]
     answers = [before - after for after in work.residuals(states, strict=False)]
     usable = [k for k, answer in enumerate(answers) if answer.any() and np.abs(answer).max() < MOST_ANSWER * size]
     if len(usable) < FEWEST_SIZES:

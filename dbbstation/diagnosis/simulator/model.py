@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class SimulatorParameter:
     """A number of the simulator that is fitted anew with every hypothesis.
 
     Attributes:
@@ -46,7 +46,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Port:
+class SimulatorPort:
     """A place of the simulator where something may act.
 
     Attributes:
@@ -78,7 +78,7 @@ class Output:
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class SimulatorRecording:
     """One recording.
 
     Attributes:
@@ -108,10 +108,10 @@ class Model:
     """
 
     name: str
-    parameters: tuple[Parameter, ...]
-    ports: tuple[Port, ...]
+    parameters: tuple[SimulatorParameter, ...]
+    ports: tuple[SimulatorPort, ...]
     outputs: tuple[Output, ...]
-    runs: tuple[Recorded, ...]
+    runs: tuple[SimulatorRecording, ...]
 
     def of_run(self, run: int, values: Sequence[float]) -> tuple[tuple[str, float], ...]:
         """What `simulate` is given of values of all parameters, shape (k,), in one run."""
@@ -120,7 +120,7 @@ class Model:
 
 
 @dataclass(frozen=True)
-class Ask:
+class SimulationRequest:
     """One simulation.
 
     Attributes:
@@ -137,7 +137,7 @@ class Ask:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class SimulationOutcome:
     """What came of one simulation.
 
     Attributes:

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.candidates import Candidate, candidates
-from dbbstation.diagnosis.simulator.fit import Fitted, fit, plain
+from dbbstation.diagnosis.simulator.fit import SimulatorFit, fit, plain
 from dbbstation.diagnosis.simulator.laws import SHARE, curve_answers, discrepancy, form_uncertainty, laws
-from dbbstation.diagnosis.simulator.terms import Form
-from dbbstation.diagnosis.simulator.work import AGREE, State
+from dbbstation.diagnosis.simulator.terms import TermForm
+from dbbstation.diagnosis.simulator.work import AGREE, FittedState
 from dbbstation.diagnosis.table.data import rounding_of
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.named_values import named_values
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.fit import Weigh
     from dbbstation.diagnosis.simulator.laws import Curves
     from dbbstation.diagnosis.simulator.own import PortSource
-    from dbbstation.diagnosis.simulator.work import Work
+    from dbbstation.diagnosis.simulator.work import SimulationRuns
     from dbbstation.inference.settled import Settled
 
 MOST_STEPS = 8
@@ -48,8 +48,8 @@ class Node:
         own: physics of the user's own.
     """
 
-    work: Work
-    fitted: Fitted
+    work: SimulationRuns
+    fitted: SimulatorFit
     inside: tuple[Candidate, ...]
     size: float
     own: Sequence[PortSource] = ()
@@ -84,11 +84,11 @@ class Node:
         found = {
             (one.term.port, one.term.signals[0]): self.answers_of(one.name)
             for one in self.inside
-            if one.term.form is Form.CURVE
+            if one.term.form is TermForm.CURVE
         }
         ports = {one.term.port for one in self.inside if form_uncertainty(one)}
         curves = [
-            one for one in (self.outside if ports else ()) if one.term.form is Form.CURVE and one.term.port in ports
+            one for one in (self.outside if ports else ()) if one.term.form is TermForm.CURVE and one.term.port in ports
         ]
         return {**found, **curve_answers(self.work, self.fitted.state, curves, self.size)}
 
@@ -183,12 +183,12 @@ class Nodes:
         progress: called with what is being done.
     """
 
-    work: Work
+    work: SimulationRuns
     own: Sequence[PortSource] = ()
     progress: Callable[[str], None] = lambda _: None
     known: dict[frozenset[str], Node] = field(default_factory=dict)
 
-    def base(self, start: State) -> Node:
+    def base(self, start: FittedState) -> Node:
         """The simulator as it is, refitted from several starts."""
         self.progress("refit")
         fitted = fit(self.work, start, several=True)
@@ -203,7 +203,7 @@ class Nodes:
         if names not in self.known:
             self.progress(f"refit with {one.name}")
             term = one.term.with_numbers(_inside(one, node.numbers_of(settled, one)))
-            state = State(node.fitted.state.values, (*node.fitted.state.terms, term))
+            state = FittedState(node.fitted.state.values, (*node.fitted.state.terms, term))
             self.known[names] = self._fitted(node, state, (*node.inside, one), weigh, sigma)
         return self.known[names]
 
@@ -215,7 +215,7 @@ class Nodes:
             terms = zip(node.inside, node.fitted.state.terms, strict=True)
             kept = [(one, term) for one, term in terms if one.name in names]
             new = [one.term.with_numbers(_inside(one, node.numbers_of(settled, one))) for one in more]
-            state = State(node.fitted.state.values, (*(term for _, term in kept), *new))
+            state = FittedState(node.fitted.state.values, (*(term for _, term in kept), *new))
             self.known[names] = self._fitted(node, state, (*(one for one, _ in kept), *more), *noise_of(settled))
         return self.known[names]
 
@@ -227,7 +227,7 @@ class Nodes:
             kept = [
                 (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True) if one.name != name
             ]
-            state = State(node.fitted.state.values, tuple(term for _, term in kept))
+            state = FittedState(node.fitted.state.values, tuple(term for _, term in kept))
             self.known[names] = self._fitted(node, state, tuple(one for one, _ in kept), weigh, sigma)
         return self.known[names]
 
@@ -236,7 +236,9 @@ class Nodes:
         self.known[node.names] = self._fitted(node, node.fitted.state, node.inside, weigh, sigma)
         return self.known[node.names]
 
-    def _fitted(self, node: Node, state: State, inside: tuple[Candidate, ...], weigh: Weigh, sigma: float) -> Node:
+    def _fitted(
+        self, node: Node, state: FittedState, inside: tuple[Candidate, ...], weigh: Weigh, sigma: float
+    ) -> Node:
         fitted = fit(self.work, state, weigh, sigma=sigma, most_steps=MOST_STEPS)
         return replace(node, fitted=fitted, inside=inside)
 

@@ -22,7 +22,7 @@ class PortSource(ABC):
 
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
-        """Return its numbers: amplitudes first, which it is proportional to, then those with a `shape`, which it is not."""
+        """Return its numbers: amplitudes first, which it is proportional to, then those with a `grid`, which it is not."""
 
     @abstractmethod
     def value(self, t: float, signals: Mapping[str, float], parameters: Mapping[str, float]) -> float:

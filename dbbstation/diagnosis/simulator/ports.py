@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.simulator.model import Answer
+from dbbstation.diagnosis.simulator.model import SimulationOutcome
 from dbbstation.diagnosis.simulator.terms import evaluator
 from dbbstation.inference.memory import lagging
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.simulator.contract import Simulator
-    from dbbstation.diagnosis.simulator.model import Ask, Model, Port
+    from dbbstation.diagnosis.simulator.model import Model, SimulationRequest, SimulatorPort
     from dbbstation.diagnosis.simulator.terms import Evaluate
 
 
@@ -35,7 +35,9 @@ class Ports:
         records: whether signals are kept.
     """
 
-    def __init__(self, ports: Sequence[Port], acting: Mapping[str, Sequence[Evaluate]], *, records: bool) -> None:
+    def __init__(
+        self, ports: Sequence[SimulatorPort], acting: Mapping[str, Sequence[Evaluate]], *, records: bool
+    ) -> None:
         self._names = tuple(port.name for port in ports)
         self._kept: dict[str, list[tuple[float, ...]]] = {port.name: [] for port in ports}
         self._signals = {port.name: tuple(port.signals) for port in ports}
@@ -83,7 +85,7 @@ class Ports:
         return lambda _t, _signals: 0.0
 
 
-def simulated(simulator: Simulator, model: Model, ask: Ask) -> Answer:
+def simulated(simulator: Simulator, model: Model, ask: SimulationRequest) -> SimulationOutcome:
     """Run a simulator once.
 
     Raises:
@@ -102,7 +104,7 @@ def simulated(simulator: Simulator, model: Model, ask: Ask) -> Answer:
             if isinstance(error, ValueError) and "math" not in str(error):
                 raise
             # Numbers beyond what arithmetic has, or functions of infinity: it ran away.
-            return Answer(np.full((len(model.outputs), len(run)), np.nan))
+            return SimulationOutcome(np.full((len(model.outputs), len(run)), np.nan))
     found = np.empty((len(model.outputs), len(run)))
     for k, output in enumerate(model.outputs):
         if output.name not in outputs:
@@ -112,4 +114,4 @@ def simulated(simulator: Simulator, model: Model, ask: Ask) -> Answer:
             raise SimulationFault(f"output `{output.name}` has the shape {values.shape}, {len(run)} rows are expected")
         finite = output.filter_s > 0.0 and bool(np.isfinite(values).all())
         found[k] = values + lagging(values, run.inputs["t"], output.filter_s) if finite else values
-    return Answer(found, ports.recorded() if ask.records else {})
+    return SimulationOutcome(found, ports.recorded() if ask.records else {})

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.simulator.candidates import Candidate
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
-    from dbbstation.diagnosis.simulator.work import State
+    from dbbstation.diagnosis.simulator.work import FittedState
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.settled import Beginning, Settled
 
@@ -39,7 +39,7 @@ STILL = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SearchOutcome:
     """What a search ended at.
 
     Attributes:
@@ -53,7 +53,7 @@ class Found:
 
     node: Node
     settled: Settled
-    state: State
+    state: FittedState
     residual: np.ndarray
     is_settled: bool
     stopped: str = ""
@@ -69,7 +69,7 @@ def compared_quickly(channel: Channel, beginning: Beginning) -> Settled:
     return settle(channel, look=False, static=False, most_expanded=0, thorough=False, beginnings=(beginning,))
 
 
-def search(nodes: Nodes, base: Node, compare: Callable[[Node], Settled], *, refits: bool = True) -> Found:
+def search(nodes: Nodes, base: Node, compare: Callable[[Node], Settled], *, refits: bool = True) -> SearchOutcome:
     """Put in what is missing, one term after the other.
 
     Args:
@@ -98,9 +98,9 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Node], Settled], *, refi
         stopped = error.what
     if refits:
         still = not stopped and _moves(node, settled) < STILL and node.names <= settled.best.names
-        return Found(node, settled, node.fitted.state, node.fitted.residual, still, stopped)
+        return SearchOutcome(node, settled, node.fitted.state, node.fitted.residual, still, stopped)
     state, residual = near(nodes.work, node.fitted, *noise_of(settled))
-    return Found(node, settled, state, residual, is_settled=True)
+    return SearchOutcome(node, settled, state, residual, is_settled=True)
 
 
 MOST_REFITS = 4

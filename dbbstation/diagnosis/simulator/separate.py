@@ -12,10 +12,10 @@ from dbbstation.inference.verdict import OUT, Verdict
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.simulator.answer import Answer
+    from dbbstation.diagnosis.simulator.answer import SimulatorComparison
 
 
-def separating_input(answer: Answer) -> list[dict[str, Any]]:
+def separating_input(answer: SimulatorComparison) -> list[dict[str, Any]]:
     """Proposals for each pair of terms that the recordings do not tell apart.
 
     The answers of both to the inputs that there were are compared beside the parameters: in which stretch of time they differ most, in
@@ -70,7 +70,7 @@ def _repeated(repeats: int) -> str:
     return f"{repeats} times" if repeats > 1 else "once more"
 
 
-def _column(answer: Answer, name: str) -> NDArray[np.float64]:
+def _column(answer: SimulatorComparison, name: str) -> NDArray[np.float64]:
     """Effect of a term over all rows, as large as it is, or as it would be in the best place of another."""
     found = answer.found
     settled, best = found.settled, found.settled.best

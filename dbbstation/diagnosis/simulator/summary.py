@@ -9,12 +9,12 @@ from dbbstation.diagnosis.simulator.separate import separating_input
 from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
-    from dbbstation.diagnosis.simulator.answer import Answer, Moved
-    from dbbstation.inference.read_off import Finding
+    from dbbstation.diagnosis.simulator.answer import Moved, SimulatorComparison
+    from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.verdict import Value
 
 
-def simulator_summary(answer: Answer) -> dict[str, Any]:
+def simulator_summary(answer: SimulatorComparison) -> dict[str, Any]:
     """Everything that is said."""
     found, settled = answer.found, answer.found.settled
     as_simulated, refitted, corrected = answer.rms
@@ -70,7 +70,7 @@ def simulator_summary(answer: Answer) -> dict[str, Any]:
     }
 
 
-def _finding(answer: Answer, one: Finding) -> dict[str, Any]:
+def _finding(answer: SimulatorComparison, one: CauseFinding) -> dict[str, Any]:
     term = next((term for term in answer.terms if term.name == one.name), None)
     port = next((port for port in answer.model.ports if one.name.endswith(f" at {port.name}")), None)
     return {
@@ -101,7 +101,7 @@ def _finding(answer: Answer, one: Finding) -> dict[str, Any]:
     }
 
 
-def _why(one: Finding) -> str:
+def _why(one: CauseFinding) -> str:
     """Sentence for a finding that has none of its own."""
     if one.verdict is Verdict.IDENTIFIED:
         hidden = (

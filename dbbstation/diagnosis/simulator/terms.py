@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Evaluate = Callable[[float, Mapping[str, float]], float]
 
 
-class Form(StrEnum):
+class TermForm(StrEnum):
     """How a term follows its signals x (and z); a is its amplitude."""
 
     CONSTANT = "constant"  # a
@@ -48,10 +48,10 @@ class Form(StrEnum):
     OWN = "own"  # physics of the user's own
 
 
-IN_PLACE = frozenset({Form.DELAY, Form.LAG, Form.PLAY})
+IN_PLACE = frozenset({TermForm.DELAY, TermForm.LAG, TermForm.PLAY})
 """Forms that put something else in the place of a signal. Their amplitude cannot be negative and is not a factor."""
 
-MEMORIES = frozenset({Form.MEMORY, Form.SLIP, *IN_PLACE})
+MEMORIES = frozenset({TermForm.MEMORY, TermForm.SLIP, *IN_PLACE})
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Term:
     """
 
     port: str
-    form: Form
+    form: TermForm
     signals: tuple[str, ...]
     amplitudes: tuple[float, ...] = (0.0,)
     shape: tuple[float, ...] = ()
@@ -82,7 +82,7 @@ class Term:
         if self.own is not None:
             return f"{self.own.name} at {self.port}"
         of = f" of {' and '.join(self.signals)}" if self.signals else ""
-        twice = " twice" if self.form is Form.PERIODIC and self.fixed[1] > 1.0 else ""
+        twice = " twice" if self.form is TermForm.PERIODIC and self.fixed[1] > 1.0 else ""
         return f"{self.form}{twice}{of} at {self.port}"
 
     @property
@@ -102,19 +102,19 @@ def evaluator(term: Term) -> Evaluate:
         return _own(term)
     if term.form in MEMORIES:
         return _remembering(term)
-    return _curve(term) if term.form is Form.CURVE else _momentary(term)
+    return _curve(term) if term.form is TermForm.CURVE else _momentary(term)
 
 
 def _momentary(term: Term) -> Evaluate:
     """Evaluate a term that follows its signals at once."""
     a = term.amplitudes[0]
-    if term.form is Form.CONSTANT:
+    if term.form is TermForm.CONSTANT:
         return lambda _t, _signals: a
     x = term.signals[0]
-    if term.form is Form.PRODUCT:
+    if term.form is TermForm.PRODUCT:
         z = term.signals[1]
         return lambda _t, signals: a * signals[x] * signals[z]
-    if term.form is Form.PERIODIC:
+    if term.form is TermForm.PERIODIC:
         b, turns = term.amplitudes[1], 2.0 * pi * term.fixed[1] / term.fixed[0]
         return lambda _t, signals: a * cos(turns * signals[x]) + b * sin(turns * signals[x])
     of = _plain(term)
@@ -126,13 +126,13 @@ def _plain(term: Term) -> Callable[[float], float]:
     place = term.shape[0] if term.shape else 0.0
     rounding = place * place
     return {
-        Form.LINEAR: lambda x: x,
-        Form.SQUARE: lambda x: x * x,
-        Form.DRAG: lambda x: x * abs(x),
-        Form.CUBIC: lambda x: x * x * x,
-        Form.SIGN: lambda x: x / sqrt(x * x + rounding),
-        Form.HINGE: lambda x: max(x - place, 0.0),
-        Form.LIMIT: lambda x: min(max(x, -place), place),
+        TermForm.LINEAR: lambda x: x,
+        TermForm.SQUARE: lambda x: x * x,
+        TermForm.DRAG: lambda x: x * abs(x),
+        TermForm.CUBIC: lambda x: x * x * x,
+        TermForm.SIGN: lambda x: x / sqrt(x * x + rounding),
+        TermForm.HINGE: lambda x: max(x - place, 0.0),
+        TermForm.LIMIT: lambda x: min(max(x, -place), place),
     }[term.form]
 
 
@@ -181,7 +181,7 @@ def bends(knots: Sequence[float]) -> NDArray[np.float64]:
 def _remembering(term: Term) -> Evaluate:
     """Evaluate a term with a memory: times and states so far, those at or behind the time asked for dropped first."""
     x, a = term.signals[0], term.amplitudes[0]
-    step, out = _delayed(a) if term.form is Form.DELAY else _STEPS[term.form](a, term.shape)
+    step, out = _delayed(a) if term.form is TermForm.DELAY else _STEPS[term.form](a, term.shape)
     times: list[float] = []
     past: list[tuple[float, float]] = []  # signal and state
 
@@ -239,10 +239,10 @@ def _delayed(dead: float) -> tuple[Callable[..., float], Callable[[float, float]
 
 
 _STEPS: Mapping[
-    Form, Callable[[float, tuple[float, ...]], tuple[Callable[..., float], Callable[[float, float], float]]]
+    TermForm, Callable[[float, tuple[float, ...]], tuple[Callable[..., float], Callable[[float, float], float]]]
 ] = {
-    Form.MEMORY: lambda a, shape: (_lagging(shape[0]), lambda now, behind: a * (now + behind)),
-    Form.LAG: lambda a, _: (_lagging(a), lambda _now, behind: behind),
-    Form.PLAY: lambda a, _: (_playing(a), lambda _now, apart: apart),
-    Form.SLIP: lambda a, shape: (_playing(shape[0]), lambda _now, apart: -a * apart / shape[0]),
+    TermForm.MEMORY: lambda a, shape: (_lagging(shape[0]), lambda now, behind: a * (now + behind)),
+    TermForm.LAG: lambda a, _: (_lagging(a), lambda _now, behind: behind),
+    TermForm.PLAY: lambda a, _: (_playing(a), lambda _now, apart: apart),
+    TermForm.SLIP: lambda a, shape: (_playing(shape[0]), lambda _now, apart: -a * apart / shape[0]),
 }

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.simulator.model import Ask
+from dbbstation.diagnosis.simulator.model import SimulationRequest
 from dbbstation.errors import CalibrationError
 
 if TYPE_CHECKING:
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.simulator.model import Answer, Model
+    from dbbstation.diagnosis.simulator.model import Model, SimulationOutcome
     from dbbstation.diagnosis.simulator.terms import Term
 
-    Run = Callable[[Sequence[Ask]], list[Answer]]
+    Run = Callable[[Sequence[SimulationRequest]], list[SimulationOutcome]]
 
 
 class BudgetSpentError(CalibrationError):
@@ -47,7 +47,7 @@ UNSEEN = 1e-9
 
 
 @dataclass(frozen=True)
-class State:
+class FittedState:
     """Values of all numbers that are fitted.
 
     Attributes:
@@ -63,15 +63,15 @@ class State:
         """Values, then the numbers of the terms, shape (m,)."""
         return np.array([*self.values, *(number for term in self.terms for number in term.numbers)])
 
-    def with_numbers(self, numbers: NDArray[np.float64]) -> State:
+    def with_numbers(self, numbers: NDArray[np.float64]) -> FittedState:
         """The same terms with other numbers, shape (m,)."""
         own, first, terms = numbers.tolist(), len(self.values), []
         for term in self.terms:
             terms.append(term.with_numbers(own[first : first + len(term.numbers)]))
             first += len(term.numbers)
-        return State(tuple(own[: len(self.values)]), tuple(terms))
+        return FittedState(tuple(own[: len(self.values)]), tuple(terms))
 
-    def moved(self, place: int, by: float) -> State:
+    def moved(self, place: int, by: float) -> FittedState:
         """The same with one number moved."""
         numbers = self.numbers
         numbers[place] += by
@@ -94,7 +94,7 @@ class Answers:
 
 
 @dataclass(eq=False)
-class Work:
+class SimulationRuns:
     """Simulations of a model.
 
     Attributes:
@@ -122,14 +122,18 @@ class Work:
         """Rows of all runs and outputs."""
         return len(self.time)
 
-    def simulated(self, states: Sequence[State], *, strict: bool = True) -> list[NDArray[np.float64]]:
+    def simulated(self, states: Sequence[FittedState], *, strict: bool = True) -> list[NDArray[np.float64]]:
         """Simulated values of all rows at each state, in units of the outputs, shape (n,).
 
         Raises:
             CalibrationError: one ran away, if `strict`.
         """
         runs = range(len(self.model.runs))
-        asks = [Ask(run, self.model.of_run(run, state.values), state.terms) for state in states for run in runs]
+        asks = [
+            SimulationRequest(run, self.model.of_run(run, state.values), state.terms)
+            for state in states
+            for run in runs
+        ]
         answers, found = self.run(asks), []
         for k in range(len(states)):
             own = answers[k * len(runs) : (k + 1) * len(runs)]
@@ -143,15 +147,17 @@ class Work:
                 )
         return found
 
-    def residuals(self, states: Sequence[State], *, strict: bool = True) -> list[NDArray[np.float64]]:
+    def residuals(self, states: Sequence[FittedState], *, strict: bool = True) -> list[NDArray[np.float64]]:
         """Measured less simulated values, scaled, shape (n,)."""
         with np.errstate(over="ignore", invalid="ignore"):
             return [(self.measured - values) / self.scale for values in self.simulated(states, strict=strict)]
 
-    def signals(self, state: State) -> dict[str, dict[str, NDArray[np.float64]]]:
+    def signals(self, state: FittedState) -> dict[str, dict[str, NDArray[np.float64]]]:
         """Signals at all ports, by port and name, of all calls in all runs."""
         runs = range(len(self.model.runs))
-        answers = self.run([Ask(k, self.model.of_run(k, state.values), state.terms, records=True) for k in runs])
+        answers = self.run(
+            [SimulationRequest(k, self.model.of_run(k, state.values), state.terms, records=True) for k in runs]
+        )
         return {
             port.name: {
                 name: np.concatenate([answer.signals[port.name][name] for answer in answers])
@@ -160,7 +166,7 @@ class Work:
             for port in self.model.ports
         }
 
-    def answers(self, state: State, directions: Sequence[Direction], size: float) -> Answers:
+    def answers(self, state: FittedState, directions: Sequence[PerturbedParameter], size: float) -> Answers:
         """Answers to small doses.
 
         Args:
@@ -208,7 +214,7 @@ class Work:
 
 
 @dataclass(frozen=True)
-class Direction:
+class PerturbedParameter:
     """One number that is dosed: one of the state, or one of a term that is not in it.
 
     Attributes:
@@ -223,7 +229,7 @@ class Direction:
     place: int
     term: Term | None = None
 
-    def at(self, state: State, dose: float) -> State:
+    def at(self, state: FittedState, dose: float) -> FittedState:
         """State with the dose."""
         if self.term is None:
             return state.moved(self.place, dose)
@@ -232,7 +238,7 @@ class Direction:
         return replace(state, terms=(*state.terms, self.term.with_numbers(numbers)))
 
 
-def told(model: Model, ask: Ask) -> str:
+def told(model: Model, ask: SimulationRequest) -> str:
     """A simulation in words: its run, parameters and terms."""
     values = ", ".join(f"{key} = {value:.6g}" for key, value in ask.parameters)
     terms = "".join(f"; {term.name}: {', '.join(f'{n:.4g}' for n in term.numbers)}" for term in ask.terms)

@@ -35,7 +35,7 @@ class TableSource(ABC):
 
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
-        """Return its numbers: amplitudes, which the effect is proportional to, and those with a `shape`, which it is not."""
+        """Return its numbers: amplitudes, which the effect is proportional to, and those with a `grid`, which it is not."""
 
     @abstractmethod
     def columns(self, variables: Mapping[str, NDArray[np.float64]], shapes: Mapping[str, float]) -> NDArray[np.float64]:
@@ -43,5 +43,5 @@ class TableSource(ABC):
 
         Args:
             variables: columns that it needs, by name, shape (n,); rows of a run in time order.
-            shapes: values of the parameters that have a `shape`, by name.
+            shapes: values of the parameters that have a `grid`, by name.
         """

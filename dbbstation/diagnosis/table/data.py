@@ -122,8 +122,8 @@ class Table:
 
     def _law(self, source: TableSource) -> Law:
         parameters = source.parameters()
-        amplitudes = [p for p in parameters if not p.shape]
-        shaped = [p for p in parameters if p.shape]
+        amplitudes = [p for p in parameters if not p.grid]
+        shaped = [p for p in parameters if p.grid]
         given = {name: self.columns[name] for name in source.needs}
         along = source.follows or (source.needs[0] if source.needs else "")
         follows = next((v for v in self.variables if v.name == along), None)
@@ -140,7 +140,7 @@ class Table:
             plausible=np.array([p.plausible for p in amplitudes]),
             parameters=tuple(p.name for p in (*amplitudes, *shaped)),
             units=tuple(p.unit for p in (*amplitudes, *shaped)),
-            grids=tuple(tuple(p.shape) for p in shaped),
+            grids=tuple(tuple(p.grid) for p in shaped),
             positive=tuple(p.positive for p in amplitudes),
             form_uncertainty=source.form_uncertainty,
             follows=follows,

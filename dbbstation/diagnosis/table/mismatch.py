@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.patterns import Pattern
-    from dbbstation.inference.read_off import Finding
+    from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
     from dbbstation.texts import Texts
@@ -46,7 +46,7 @@ FOLD_ROWS = 3000
 
 
 @dataclass(frozen=True)
-class Fitted:
+class RefittedParameter:
     """A base parameter before and after.
 
     Attributes:
@@ -124,10 +124,10 @@ class Mismatch:
 
     table: Table
     settled: Settled
-    findings: tuple[Finding, ...]
+    findings: tuple[CauseFinding, ...]
     shares: tuple[Share, ...]
     resembles: dict[str, dict[str, float]]
-    fitted: tuple[Fitted, ...]
+    fitted: tuple[RefittedParameter, ...]
     left: LeftOver
     held_out: HeldOutError | None
     lacking: dict[str, str]
@@ -136,12 +136,12 @@ class Mismatch:
     cancelling: Cancelling | None = None
 
     @property
-    def there(self) -> tuple[Finding, ...]:
+    def there(self) -> tuple[CauseFinding, ...]:
         """Findings of what is there, or happened once."""
         return tuple(one for one in self.findings if one.verdict in {Verdict.IDENTIFIED, Verdict.HAPPENED})
 
     @property
-    def identified(self) -> tuple[Finding, ...]:
+    def identified(self) -> tuple[CauseFinding, ...]:
         """Findings of what is there and predicts other rows, where that was asked."""
         return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)
 
@@ -166,7 +166,7 @@ class Mismatch:
         return self.offset is not None and abs(self.offset.value) >= OUT * self.offset.uncertainty
 
     @property
-    def parameters(self) -> tuple[Fitted, ...]:
+    def parameters(self) -> tuple[RefittedParameter, ...]:
         """Parameters of the simulation."""
         return tuple(one for one in self.fitted if one.name != OFFSET)
 
@@ -277,7 +277,7 @@ def choose_without(
     return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,))
 
 
-def _second_start(settled: Settled, findings: Sequence[Finding]) -> float:
+def _second_start(settled: Settled, findings: Sequence[CauseFinding]) -> float:
     """Log odds of another end of the search, zero where it is the same but for names that nothing here tells apart."""
     classes = {name: finding.name for finding in findings for name in finding.equivalent}
     other = settled.second_start()
@@ -353,7 +353,7 @@ MOST_CANCELS = 0.5
 three quarters of the squares are gone. Of effects that have nothing to do with each other it is one."""
 
 
-def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[Fitted, ...]:
+def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[RefittedParameter, ...]:
     """Base parameters with the base alone, and beside everything that was found; uncertainties as `read_off` has them."""
     channel, bank, members = settled.channel, settled.bank, settled.best.members
     noise, known, size = settled.noise.innovation, channel.known, channel.base.samples.shape[1]
@@ -373,7 +373,7 @@ def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple
     )
     units = [channel.unit if name == OFFSET else "in its own unit" for name in channel.base.names]
     return tuple(
-        Fitted(
+        RefittedParameter(
             name,
             Value(float(alone.x[k]), float(np.sqrt(max(before[k], 0.0))), units[k]),
             Value(float(beside.x[k]), float(np.sqrt(max(after[k], 0.0))), units[k]).at_least(float(moved[k])),

@@ -11,7 +11,7 @@ from dbbstation.inference.verdict import Acts
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.table.mismatch import Mismatch
-    from dbbstation.inference.read_off import Finding
+    from dbbstation.inference.read_off import CauseFinding
 
 MEANINGS: dict[Family, str] = {
     Family.LINEAR: "It grows in proportion: a scale, a stiffness or an expansion that the simulation has wrong or lacks.",
@@ -35,7 +35,7 @@ MEANINGS: dict[Family, str] = {
 """What each form may mean."""
 
 
-def sentence_of(found: Mismatch, finding: Finding) -> str:
+def sentence_of(found: Mismatch, finding: CauseFinding) -> str:
     """Where an effect is, what its form may mean, and what it resembles; one or more sentences."""
     parts = [_where(found, finding)]
     if finding.family is not None:
@@ -75,7 +75,7 @@ CONFOUNDED = 0.1
 """Share of an effect that parameters conceal from which on this is said."""
 
 
-def _where(found: Mismatch, finding: Finding) -> str:
+def _where(found: Mismatch, finding: CauseFinding) -> str:
     """Ranges, times and blocks."""
     table = found.table
     if finding.rows:

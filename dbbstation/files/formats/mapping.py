@@ -15,7 +15,7 @@ from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
 from dbbstation.trace import columns
-from dbbstation.trace.columns import Kind
+from dbbstation.trace.columns import ColumnKind
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,7 +38,7 @@ IGNORED = "ignored"
 OF_RUNS = (TEST, DIRECTION, REPEAT, MOUNTING, STATE, STARTED)
 """Meanings of columns that say which run a row belongs to, the same in all rows of a run."""
 
-_OF_KIND = {Kind.TEMPERATURE: _TEMPERATURES, Kind.CURRENT: _CURRENTS}
+_OF_KIND = {ColumnKind.TEMPERATURE: _TEMPERATURES, ColumnKind.CURRENT: _CURRENTS}
 
 UNITS: dict[str, dict[str, float]] = {
     TIME: _TIMES,

@@ -29,7 +29,7 @@ class RunState(StrEnum):
 
 
 @dataclass(frozen=True)
-class Program:
+class CommandedProgram:
     """An NC program that was commanded.
 
     Attributes:
@@ -148,7 +148,7 @@ class RunEntry:
     started: datetime | None
     path: Path
     sha256: str
-    program: Program | None
+    program: CommandedProgram | None
     centre_mm: tuple[float, float, float] | None
     chain_sha256: str = ""
     counts: Counts | None = None
@@ -180,8 +180,8 @@ def run_entry(run: RunSchema, folder: Path) -> RunEntry:
     )
 
 
-def _program(program: ProgramSchema, folder: Path) -> Program:
-    return Program(folder / program.file, program.sha256, program.model_sha256 or "")
+def _program(program: ProgramSchema, folder: Path) -> CommandedProgram:
+    return CommandedProgram(folder / program.file, program.sha256, program.model_sha256 or "")
 
 
 def counts_in(header: Mapping[str, str]) -> Counts | None:

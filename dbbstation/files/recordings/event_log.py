@@ -39,7 +39,7 @@ _LINE = re.compile(rb"([0-9a-f]{64})  (\{.*\})")
 
 
 @dataclass(frozen=True)
-class Event:
+class LoggedEvent:
     """One line of the log.
 
     Attributes:
@@ -71,7 +71,7 @@ class EventLog:
     """
 
     path: Path
-    events: tuple[Event, ...] = ()
+    events: tuple[LoggedEvent, ...] = ()
     end: int = 0
     size: int = 0
 
@@ -121,7 +121,7 @@ def read_event_log(folder: Path, faults: list[Problem]) -> EventLog | None:
 
 
 def _parsed(path: Path, data: bytes) -> EventLog:
-    events: list[Event] = []
+    events: list[LoggedEvent] = []
     end, before = 0, ""
     for line in data.splitlines(keepends=True):
         event = _event(line, before)
@@ -132,7 +132,7 @@ def _parsed(path: Path, data: bytes) -> EventLog:
     return EventLog(path, tuple(events), end, len(data))
 
 
-def _event(line: bytes, before: str) -> Event | None:
+def _event(line: bytes, before: str) -> LoggedEvent | None:
     """Return what a line says; None where it is not as it was written."""
     parts = _LINE.fullmatch(line.removesuffix(b"\n"))
     if parts is None or not line.endswith(b"\n") or link(before, parts[2]) != parts[1].decode():
@@ -143,7 +143,7 @@ def _event(line: bytes, before: str) -> Event | None:
         runs, all_runs = said.get("runs", ()), said.get("all_runs")
         for run in (*runs, *(all_runs or ())):
             run_key(run)
-        return Event(
+        return LoggedEvent(
             what=str(said["what"]),
             at=None if at is None else datetime.fromisoformat(at),
             set_to=dict(said.get("set", {})),
@@ -305,7 +305,7 @@ def _refused(log: EventLog, error: OSError) -> OutputError:
     return OutputError(f"cannot be written: {why}", where=str(log.path), remedy=remedy)
 
 
-def runs_told(event: Event) -> str:
+def runs_told(event: LoggedEvent) -> str:
     """Return which runs an event is about, in words, with the reasons of verdicts."""
     told = []
     for run in event.runs:
@@ -316,7 +316,7 @@ def runs_told(event: Event) -> str:
     return ", ".join(told)
 
 
-def keys_told(event: Event) -> Sequence[str]:
+def keys_told(event: LoggedEvent) -> Sequence[str]:
     """Return which keys beside the runs an event is about; not those that change with every run."""
     return [key for key in event.set_to if key != "seal" or event.what not in _OF_RUNS]
 

@@ -12,7 +12,7 @@ from dbbstation.files.formats.machine import machine_text
 from dbbstation.files.formats.plan import plan_text
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.recorded_ground import refuse_recorded
-from dbbstation.files.recordings.entries import Program, RunEntry, RunState
+from dbbstation.files.recordings.entries import CommandedProgram, RunEntry, RunState
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import run_header, run_line, run_name
 from dbbstation.files.recordings.seal import chained, copy_name, is_copy, sealed_over
@@ -100,7 +100,7 @@ def write_session(
         if run.program is not None:
             path = f"{PROGRAMS}/{run.program[0]}"
             files[path] = run.program[1]
-            program = Program(folder / path, hashlib.sha256(run.program[1]).hexdigest(), run.model_sha256)
+            program = CommandedProgram(folder / path, hashlib.sha256(run.program[1]).hexdigest(), run.model_sha256)
         entry = RunEntry(
             test=run.test,
             direction=run.direction,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError, Problem
 from dbbstation.files.atomic import remove_leftovers, write_bytes
-from dbbstation.files.recordings.entries import Note, Program, RunEntry, RunState
+from dbbstation.files.recordings.entries import CommandedProgram, Note, RunEntry, RunState
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import RunWriter, run_name
 from dbbstation.files.recordings.lock import SessionLock
@@ -161,7 +161,7 @@ class SessionWriter:
         *,
         started: datetime,
         mounting: int | None = None,
-        program: Program | None = None,
+        program: CommandedProgram | None = None,
         centre_mm: tuple[float, float, float] | None = None,
         instrument: ReadBy | None = None,
     ) -> RunWriter:
@@ -274,7 +274,7 @@ class SessionWriter:
         self._write("taken in")
         return taken
 
-    def add_program(self, name: str, content: bytes, *, model_sha256: str = "") -> Program:
+    def add_program(self, name: str, content: bytes, *, model_sha256: str = "") -> CommandedProgram:
         """Keep an NC program in the session; one of the same name and content is taken as it is.
 
         Raises:
@@ -284,7 +284,7 @@ class SessionWriter:
         digest = hashlib.sha256(content).hexdigest()
         if not (path.is_file() and sha256_of(path) == digest):
             write_bytes(path, content, rewrites=True)
-        return Program(path, digest, model_sha256)
+        return CommandedProgram(path, digest, model_sha256)
 
     def _seal(self) -> None:
         """Seal a session of an older program before more is recorded into it."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274 import codes
-from dbbstation.nc.rs274.codes import Group
+from dbbstation.nc.rs274.codes import ModalGroup
 from dbbstation.nc.rs274.guard import guard_at
 from dbbstation.nc.rs274.tokens import BadLine, Comment, Place, Word, tokens
 
@@ -33,7 +33,7 @@ MOST_FAULTS = 20
 
 
 @dataclass(slots=True)
-class Block:
+class ProgramBlock:
     """One line.
 
     Attributes:
@@ -47,18 +47,18 @@ class Block:
 
     place: Place
     words: dict[str, Word] = field(default_factory=dict)
-    codes: dict[Group, Word] = field(default_factory=dict)
+    codes: dict[ModalGroup, Word] = field(default_factory=dict)
     comments: list[str] = field(default_factory=list)
     message: str = ""
     guard: tuple[str, ...] | None = None
 
-    def code(self, group: Group) -> float | None:
+    def code(self, group: ModalGroup) -> float | None:
         """Number of the code of a group, None where the line has none."""
         word = self.codes.get(group)
         return None if word is None else word.value
 
 
-def blocks(text: str, file: str, faults: list[Problem]) -> Iterator[Block]:
+def blocks(text: str, file: str, faults: list[Problem]) -> Iterator[ProgramBlock]:
     """All lines up to the program's end, one by one, so that a long program is read in little memory.
 
     Args:
@@ -77,7 +77,7 @@ def blocks(text: str, file: str, faults: list[Problem]) -> Iterator[Block]:
         place = Place(file, number)
         guard = guard_at(lines[number - 1 : number - 1 + MOST_GUARD]) if _MAY_GUARD.match(line) else None
         if guard is not None:
-            yield Block(place, guard=guard[0])
+            yield ProgramBlock(place, guard=guard[0])
             behind_guard = number - 1 + guard[1]
             continue
         try:
@@ -88,7 +88,7 @@ def blocks(text: str, file: str, faults: list[Problem]) -> Iterator[Block]:
                 return
             continue
         yield block
-        if block.code(Group.STOP) in {2.0, 30.0}:
+        if block.code(ModalGroup.STOP) in {2.0, 30.0}:
             if percent and not any(_is_percent(after) for after in lines[number:]):
                 faults.append(_cut_short(file, lines, "the % that closes it"))
             return
@@ -132,8 +132,8 @@ def _one_line(line: str, place: Place) -> str:
     return line
 
 
-def _block(line: str, place: Place) -> Block:
-    block = Block(place)
+def _block(line: str, place: Place) -> ProgramBlock:
+    block = ProgramBlock(place)
     for token in tokens(line, place):
         if isinstance(token, Comment):
             _take_comment(block, token)
@@ -160,7 +160,7 @@ _ACTIVE = re.compile(
 _PYTHON = re.compile(r"py,|pyrun,|pyreload", re.IGNORECASE)
 
 
-def _take_comment(block: Block, comment: Comment) -> None:
+def _take_comment(block: ProgramBlock, comment: Comment) -> None:
     """Add a comment. Of several in brackets LinuxCNC looks at the last one only [measured with rs274 2.9]."""
     text = comment.text.lstrip(BLANKS)
     if _PYTHON.match(text):
@@ -175,7 +175,7 @@ def _take_comment(block: Block, comment: Comment) -> None:
         block.comments.append(text.rstrip(BLANKS))
 
 
-def _take_code(block: Block, word: Word) -> None:
+def _take_code(block: ProgramBlock, word: Word) -> None:
     known = codes.G_CODES if word.letter == "G" else codes.M_CODES
     group = known.get(word.value)
     name = codes.name(word.letter, word.value)

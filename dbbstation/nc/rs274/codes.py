@@ -7,7 +7,7 @@ from enum import StrEnum
 from dbbstation.nc.toolpath import SYSTEMS
 
 
-class Group(StrEnum):
+class ModalGroup(StrEnum):
     """Codes of one group exclude each other in a line."""
 
     MOTION = "motion"
@@ -27,40 +27,40 @@ class Group(StrEnum):
     COOLANT = "coolant"
 
 
-G_CODES: dict[float, Group] = {
-    0: Group.MOTION,
-    1: Group.MOTION,
-    2: Group.MOTION,
-    3: Group.MOTION,
-    4: Group.ONCE,
-    17: Group.PLANE,
-    20: Group.UNITS,
-    21: Group.UNITS,
-    40: Group.CUTTER,
-    49: Group.TOOL_LENGTH,
-    53: Group.ONCE,
-    **{float(name[1:]): Group.OFFSET for name in SYSTEMS},
-    61: Group.PATH,
-    64: Group.PATH,
-    80: Group.CYCLE,
-    90: Group.DISTANCE,
-    91: Group.DISTANCE,
-    90.1: Group.ARC_DISTANCE,
-    91.1: Group.ARC_DISTANCE,
-    94: Group.FEED_MODE,
+G_CODES: dict[float, ModalGroup] = {
+    0: ModalGroup.MOTION,
+    1: ModalGroup.MOTION,
+    2: ModalGroup.MOTION,
+    3: ModalGroup.MOTION,
+    4: ModalGroup.ONCE,
+    17: ModalGroup.PLANE,
+    20: ModalGroup.UNITS,
+    21: ModalGroup.UNITS,
+    40: ModalGroup.CUTTER,
+    49: ModalGroup.TOOL_LENGTH,
+    53: ModalGroup.ONCE,
+    **{float(name[1:]): ModalGroup.OFFSET for name in SYSTEMS},
+    61: ModalGroup.PATH,
+    64: ModalGroup.PATH,
+    80: ModalGroup.CYCLE,
+    90: ModalGroup.DISTANCE,
+    91: ModalGroup.DISTANCE,
+    90.1: ModalGroup.ARC_DISTANCE,
+    91.1: ModalGroup.ARC_DISTANCE,
+    94: ModalGroup.FEED_MODE,
 }
 
-M_CODES: dict[float, Group] = {
-    0: Group.STOP,
-    1: Group.STOP,
-    2: Group.STOP,
-    30: Group.STOP,
-    3: Group.SPINDLE,
-    4: Group.SPINDLE,
-    5: Group.SPINDLE,
-    7: Group.COOLANT,
-    8: Group.COOLANT,
-    9: Group.COOLANT,
+M_CODES: dict[float, ModalGroup] = {
+    0: ModalGroup.STOP,
+    1: ModalGroup.STOP,
+    2: ModalGroup.STOP,
+    30: ModalGroup.STOP,
+    3: ModalGroup.SPINDLE,
+    4: ModalGroup.SPINDLE,
+    5: ModalGroup.SPINDLE,
+    7: ModalGroup.COOLANT,
+    8: ModalGroup.COOLANT,
+    9: ModalGroup.COOLANT,
 }
 
 LETTERS = frozenset("ABCFGIJMNPQRSXYZ")

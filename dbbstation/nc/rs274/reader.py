@@ -10,10 +10,10 @@ import numpy as np
 from dbbstation.errors import InputError, Problem
 from dbbstation.nc.dialect import plain
 from dbbstation.nc.rs274.arcs import Arc, centre_by_radius
-from dbbstation.nc.rs274.blocks import Block, blocks
-from dbbstation.nc.rs274.codes import Group, name
+from dbbstation.nc.rs274.blocks import ProgramBlock, blocks
+from dbbstation.nc.rs274.codes import ModalGroup, name
 from dbbstation.nc.rs274.tokens import BadLine
-from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, Step, Toolpath, ToolpathBuilder
+from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, RowKind, Toolpath, ToolpathBuilder
 from dbbstation.nc.words import number
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class _Interpreter:
         self._absolute = True
         self._absolute_centres = False
 
-    def run(self, block: Block) -> None:
+    def run(self, block: ProgramBlock) -> None:
         """Execute one block in the order that RS274/NGC gives [RS274/NGC 3.8]."""
         if "N" in block.words:
             numbered = int(block.words["N"].value)
@@ -99,7 +99,7 @@ class _Interpreter:
         self._feed(block)
         self._functions(block)
         self._shared_words(block)
-        if block.code(Group.ONCE) == DWELL:
+        if block.code(ModalGroup.ONCE) == DWELL:
             self.path.dwell(self._dwell_s(block), line=block.place.line)
         self._modes(block)
         self._move(block)
@@ -108,7 +108,7 @@ class _Interpreter:
         if len(self.path) > MOST_ROWS:
             raise _too_long(block)
 
-    def _said(self, block: Block) -> None:
+    def _said(self, block: ProgramBlock) -> None:
         if block.guard is not None:
             if self._motion is not None:
                 what = "a guard against offsets after the first move"
@@ -116,12 +116,12 @@ class _Interpreter:
             self.path.guard = block.guard
         for comment in block.comments:
             if comment:
-                self.path.say(Step.COMMENT, comment, line=block.place.line)
+                self.path.say(RowKind.COMMENT, comment, line=block.place.line)
         if block.message:
-            self.path.say(Step.MESSAGE, block.message, line=block.place.line)
+            self.path.say(RowKind.MESSAGE, block.message, line=block.place.line)
 
-    def _units(self, block: Block) -> None:
-        units = block.code(Group.UNITS)
+    def _units(self, block: ProgramBlock) -> None:
+        units = block.code(ModalGroup.UNITS)
         if units is None:
             return
         unit_mm = MM_PER_INCH if units == 20.0 else 1.0  # noqa: PLR2004
@@ -132,8 +132,8 @@ class _Interpreter:
             raise block.place.fault(column, what, f"write {code} in a line before")
         self._unit_mm = unit_mm
 
-    def _feed(self, block: Block) -> None:
-        if Group.FEED_MODE in block.codes:
+    def _feed(self, block: ProgramBlock) -> None:
+        if ModalGroup.FEED_MODE in block.codes:
             # LinuxCNC forgets F at every G94, even where it was in force already.
             self._speed = Feed(0.0, 0.0)
         word = block.words.pop("F", None)
@@ -143,67 +143,67 @@ class _Interpreter:
             # Degrees are degrees in G20 as well: only the speed of the tool tip counts in inches.
             self._speed = Feed(word.value * self._unit_mm, word.value)
 
-    def _functions(self, block: Block) -> None:
+    def _functions(self, block: ProgramBlock) -> None:
         speed = block.words.get("S")
         if speed is not None and speed.value < 0.0:
             raise block.place.fault(speed.column, f"the spindle's speed is negative (S{speed.value:g})", "use M3 or M4")
-        said = [block.words.pop("S", None), block.codes.get(Group.SPINDLE), block.codes.get(Group.COOLANT)]
+        said = [block.words.pop("S", None), block.codes.get(ModalGroup.SPINDLE), block.codes.get(ModalGroup.COOLANT)]
         text = " ".join(f"{word.letter}{number(word.value)}" for word in said if word is not None)
         if text:
-            self.path.say(Step.FUNCTION, text, line=block.place.line)
+            self.path.say(RowKind.FUNCTION, text, line=block.place.line)
 
-    def _shared_words(self, block: Block) -> None:
+    def _shared_words(self, block: ProgramBlock) -> None:
         """Refuse codes in one line that take the same word, or of which one undoes the other."""
         if not block.codes:
             return
-        users = [self._in_line(block, Group.ONCE, {DWELL}), self._in_line(block, Group.PATH, {64.0})]
-        users += [self._in_line(block, Group.MOTION, {CLOCKWISE, COUNTER_CLOCKWISE}) or self._modal_arc(block)]
+        users = [self._in_line(block, ModalGroup.ONCE, {DWELL}), self._in_line(block, ModalGroup.PATH, {64.0})]
+        users += [self._in_line(block, ModalGroup.MOTION, {CLOCKWISE, COUNTER_CLOCKWISE}) or self._modal_arc(block)]
         both = [code for code in users if code]
         if len(both) > 1 and ("P" in block.words or both[0] == name("G", DWELL)):
             column = block.words["P"].column if "P" in block.words else 1
             what = f"{' and '.join(both)} both take P"
             raise block.place.fault(column, what, "write them in separate lines")
-        if Group.CYCLE in block.codes and Group.MOTION in block.codes:
-            column = block.codes[Group.CYCLE].column
+        if ModalGroup.CYCLE in block.codes and ModalGroup.MOTION in block.codes:
+            column = block.codes[ModalGroup.CYCLE].column
             raise block.place.fault(column, "G80 ends the motion that the same line begins", "remove one of them")
 
     @staticmethod
-    def _in_line(block: Block, group: Group, values: set[float]) -> str:
+    def _in_line(block: ProgramBlock, group: ModalGroup, values: set[float]) -> str:
         value = block.code(group)
         return name("G", value) if value in values and value is not None else ""
 
-    def _modal_arc(self, block: Block) -> str:
+    def _modal_arc(self, block: ProgramBlock) -> str:
         """The arc that this line makes without saying so again; empty where it makes none."""
-        is_arc = self._motion in {CLOCKWISE, COUNTER_CLOCKWISE} and Group.MOTION not in block.codes
+        is_arc = self._motion in {CLOCKWISE, COUNTER_CLOCKWISE} and ModalGroup.MOTION not in block.codes
         return name("G", self._motion or 0.0) if is_arc and block.words.keys() & set(AXES + "IJ") else ""
 
-    def _dwell_s(self, block: Block) -> float:
+    def _dwell_s(self, block: ProgramBlock) -> float:
         word = block.words.pop("P", None)
         if word is None or word.value < 0.0:
-            column = block.codes[Group.ONCE].column
+            column = block.codes[ModalGroup.ONCE].column
             raise block.place.fault(column, "G4 needs the seconds to wait", "write G4 P0.5 for half a second")
         return word.value
 
-    def _modes(self, block: Block) -> None:
+    def _modes(self, block: ProgramBlock) -> None:
         if not block.codes:
             return
-        distance, centres = block.code(Group.DISTANCE), block.code(Group.ARC_DISTANCE)
+        distance, centres = block.code(ModalGroup.DISTANCE), block.code(ModalGroup.ARC_DISTANCE)
         if distance is not None:
             self._absolute = distance == 90.0  # noqa: PLR2004
             self.path.increments = not self._absolute
         if centres is not None:
             self._absolute_centres = centres == 90.1  # noqa: PLR2004
-        if Group.CYCLE in block.codes:
+        if ModalGroup.CYCLE in block.codes:
             self._motion = None
-        if Group.OFFSET in block.codes:
-            system = name("G", block.codes[Group.OFFSET].value)
+        if ModalGroup.OFFSET in block.codes:
+            system = name("G", block.codes[ModalGroup.OFFSET].value)
             self.path.system = SYSTEMS.index(system) + 1
-            self.path.say(Step.SYSTEM, system, line=block.place.line)
-        if Group.PATH in block.codes:
+            self.path.say(RowKind.SYSTEM, system, line=block.place.line)
+        if ModalGroup.PATH in block.codes:
             self._path_control(block)
 
-    def _path_control(self, block: Block) -> None:
-        word = block.codes[Group.PATH]
+    def _path_control(self, block: ProgramBlock) -> None:
+        word = block.codes[ModalGroup.PATH]
         corner = 0.0
         if word.value == 64.0:  # noqa: PLR2004
             allowed, _ = block.words.pop("P", None), block.words.pop("Q", None)
@@ -211,14 +211,14 @@ class _Interpreter:
             corner = allowed.value * self._unit_mm if allowed is not None and allowed.value > 0.0 else math.inf
         self.path.corner_mm = corner
 
-    def _move(self, block: Block) -> None:
-        motion = block.code(Group.MOTION)
+    def _move(self, block: ProgramBlock) -> None:
+        motion = block.code(ModalGroup.MOTION)
         if motion is not None:
             self._motion = motion
         named = [letter for letter in AXES if letter in block.words]
         is_arc = self._motion in {CLOCKWISE, COUNTER_CLOCKWISE}
         is_turn = is_arc and (motion is not None or "I" in block.words or "J" in block.words)
-        machine = block.codes[Group.ONCE] if block.code(Group.ONCE) == MACHINE else None
+        machine = block.codes[ModalGroup.ONCE] if block.code(ModalGroup.ONCE) == MACHINE else None
         if machine is not None:
             self._check_machine(machine, block, named)
         # LinuxCNC makes a move to where it stands of a motion code alone.
@@ -247,7 +247,7 @@ class _Interpreter:
             del block.words[letter]
         self._pose = target
 
-    def _check_machine(self, machine: Word, block: Block, named: list[str]) -> None:
+    def _check_machine(self, machine: Word, block: ProgramBlock, named: list[str]) -> None:
         if self._motion not in {RAPID, LINEAR} or not named:
             raise block.place.fault(machine.column, "G53 goes with G0 and G1 only, and with axes", "remove it")
         if not self._absolute:
@@ -255,13 +255,13 @@ class _Interpreter:
                 machine.column, "G53 goes with absolute distances (G90) only", "write G90 before it"
             )
 
-    def _check_feed(self, block: Block, column: int) -> None:
+    def _check_feed(self, block: ProgramBlock, column: int) -> None:
         if self._speed.mm_min <= 0.0:
             raise block.place.fault(
                 column, f"{name('G', self._motion or 0.0)} without a feed", "give F before or in it"
             )
 
-    def _target(self, block: Block) -> NDArray[np.float64]:
+    def _target(self, block: ProgramBlock) -> NDArray[np.float64]:
         """Pose that a block leads to, shape (6,)."""
         target: list[float] = self._pose.tolist()  # six numbers are sooner done without arrays
         for axis, letter in enumerate(AXES):
@@ -279,13 +279,13 @@ class _Interpreter:
             raise block.place.fault(_first_column(block), what, "check its numbers, and G91 and G20 before it")
         return np.array(target)
 
-    def _chords(self, block: Block, target: NDArray[np.float64]) -> Arc:
+    def _chords(self, block: ProgramBlock, target: NDArray[np.float64]) -> Arc:
         arc = self._arc(block, target)
         if len(self.path) + arc.chords > MOST_ROWS:
             raise _too_long(block)
         return arc
 
-    def _arc(self, block: Block, target: NDArray[np.float64]) -> Arc:
+    def _arc(self, block: ProgramBlock, target: NDArray[np.float64]) -> Arc:
         clockwise = self._motion == CLOCKWISE
         column = _first_column(block)
         radius = block.words.pop("R", None)
@@ -313,7 +313,7 @@ class _Interpreter:
             raise block.place.fault(column, what, "check end point and centre")
         return arc
 
-    def _turns(self, block: Block) -> int:
+    def _turns(self, block: ProgramBlock) -> int:
         word = block.words.pop("P", None)
         if word is None:
             return 1
@@ -321,22 +321,24 @@ class _Interpreter:
             raise block.place.fault(word.column, f"P{word.value:g} is no number of turns", "give a whole number from 1")
         return int(word.value)
 
-    def _stop(self, block: Block) -> None:
-        stop = block.code(Group.STOP)
+    def _stop(self, block: ProgramBlock) -> None:
+        stop = block.code(ModalGroup.STOP)
         if stop == PAUSE:
-            self.path.say(Step.PAUSE, self._said_before(), line=block.place.line)
+            self.path.say(RowKind.PAUSE, self._said_before(), line=block.place.line)
         elif stop == OPTIONAL_STOP:
-            self.path.say(Step.OPTIONAL_STOP, "", line=block.place.line)
+            self.path.say(RowKind.OPTIONAL_STOP, "", line=block.place.line)
         elif stop is not None:
             self.path.ending = Ending(name("M", stop))
 
     def _said_before(self) -> str:
         """The message of a stop: the one before it, where it is written as a dialect would write it for the stop."""
         text = self.path.last_text.removeprefix(MESSAGE)
-        is_own = self.path.last_kind == Step.MESSAGE and self.path.last_text == MESSAGE + text and text == plain(text)
+        is_own = (
+            self.path.last_kind == RowKind.MESSAGE and self.path.last_text == MESSAGE + text and text == plain(text)
+        )
         return self.path.taken_back().removeprefix(MESSAGE) if is_own else ""
 
-    def _nothing_left(self, block: Block) -> None:
+    def _nothing_left(self, block: ProgramBlock) -> None:
         """Refuse words that nothing in the block has used: a control would stop there, or do something else."""
         for letter, word in block.words.items():
             if letter != "N":
@@ -344,12 +346,12 @@ class _Interpreter:
                 raise block.place.fault(word.column, what, "remove it, or give the code that it belongs to")
 
 
-def _first_column(block: Block) -> int:
+def _first_column(block: ProgramBlock) -> int:
     """Column of the first word that is neither a code nor a line number; of the motion code where there is none."""
     words = [word.column for letter, word in block.words.items() if letter != "N"]
-    return min(words) if words else block.codes[Group.MOTION].column
+    return min(words) if words else block.codes[ModalGroup.MOTION].column
 
 
-def _too_long(block: Block) -> BadLine:
+def _too_long(block: ProgramBlock) -> BadLine:
     what = f"up to here the program has more than {MOST_ROWS} moves, arcs as chords"
     return block.place.fault(0, what, "check the turns (P) of its arcs, or compensate it in parts")

@@ -59,7 +59,7 @@ class BarCyclic(ErrorSource):
                 "µm",
                 20.0,
                 "signal period of the bar's encoder",
-                shape=SIGNAL_PERIODS_UM,
+                grid=SIGNAL_PERIODS_UM,
                 listed=True,
             ),
         )

@@ -54,7 +54,7 @@ class JigBump(ErrorSource):
                 "runs",
                 1.0,
                 "runs of the session before the bump",
-                shape=tuple(float(k) for k in range(1, MOST_RUNS)),
+                grid=tuple(float(k) for k in range(1, MOST_RUNS)),
                 listed=True,
             ),
         )

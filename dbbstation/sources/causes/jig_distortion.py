@@ -56,7 +56,7 @@ class JigDistortion(ErrorSource):
                 "mm",
                 50.0,
                 "depth of the plate's middle surface under the origin of the jig",
-                shape=(0.0, 25.0, 50.0, 100.0, 200.0),
+                grid=(0.0, 25.0, 50.0, 100.0, 200.0),
             ),
         )
 

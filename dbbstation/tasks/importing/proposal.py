@@ -18,7 +18,7 @@ from dbbstation.files.formats.mapping import (
     UNITS,
 )
 from dbbstation.trace import columns
-from dbbstation.trace.columns import Kind
+from dbbstation.trace.columns import ColumnKind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -48,9 +48,9 @@ _UNIT_WORDS = {
 
 _OWN = {columns.TIME: (TIME, "s"), columns.LENGTH: (LENGTH, "mm"), columns.THETA: (ANGLE, "deg")}
 _OWN |= {
-    name: (name, "degC" if column.kind is Kind.TEMPERATURE else "A")
+    name: (name, "degC" if column.kind is ColumnKind.TEMPERATURE else "A")
     for name, column in columns.COLUMNS.items()
-    if column.kind in {Kind.TEMPERATURE, Kind.CURRENT}
+    if column.kind in {ColumnKind.TEMPERATURE, ColumnKind.CURRENT}
 }
 
 EXPORTED = frozenset({"test", "direction", "repeat", columns.TIME, columns.THETA, columns.LENGTH})

@@ -191,7 +191,7 @@ def test_a_tolerance_of_the_machine_file_stands_in_for_what_is_lost_and_is_said_
 def test_predicted_is_what_the_virtual_machine_reads_whatever_its_errors(machine, name):
     """The virtual machine drives to the place, stands still, and puts the ball at its own tip."""
     source = known_sources()[name]
-    values = np.array([p.shape[len(p.shape) // 2] if p.shape else p.plausible for p in source.parameters(machine)])
+    values = np.array([p.grid[len(p.grid) // 2] if p.grid else p.plausible for p in source.parameters(machine)])
     truth = MachineModel(machine, (*random_kinematics(machine, 3), Fitted(source, values)))
     runs = draw_session(truth, plan("conventional"), np.random.default_rng(4), 0.0, 72, micrometer_mm=0.0)
     first = [run for run in runs if run.raw.circle.direction == "ccw"]  # the ball is put up just before these

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.calibration.fit import nodes
 from dbbstation.calibration.fit.calibrate import calibrate, linearise, looked_at, residuals
-from dbbstation.calibration.fit.nodes import Nodes, nodes_of, smooth
+from dbbstation.calibration.fit.nodes import RunNodes, nodes_of, smooth
 from dbbstation.calibration.layout import lay_out
 from dbbstation.sources.contract import Effect, LinearSource, Need, Owner, Parameter
 from dbbstation.sources.registry import sources_named
@@ -56,7 +56,9 @@ def test_a_fit_through_nodes_is_that_of_all_samples(long_runs, monkeypatch, more
 
 
 def test_every_long_run_is_looked_at_through_nodes(long_runs):
-    assert all(isinstance(run, Nodes) for run in looked_at(long_runs.observations, frozenset({Need.POSE, Need.TIME})))
+    assert all(
+        isinstance(run, RunNodes) for run in looked_at(long_runs.observations, frozenset({Need.POSE, Need.TIME}))
+    )
 
 
 @pytest.mark.parametrize("need", [Need.PATH, Need.TEMPERATURE, Need.CURRENT])

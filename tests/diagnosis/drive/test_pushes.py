@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.drive.findings import Part
+from dbbstation.diagnosis.drive.findings import DrivePart
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, equal_pushes, pooled
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
@@ -16,7 +16,7 @@ from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 
 def pushes(sizes, sigma=0.2):
-    return [Part("", {"force_n": Value(size, sigma, "N")}, (k + 0.2, k + 0.7)) for k, size in enumerate(sizes)]
+    return [DrivePart("", {"force_n": Value(size, sigma, "N")}, (k + 0.2, k + 0.7)) for k, size in enumerate(sizes)]
 
 
 def test_pushes_of_one_size_count_once():

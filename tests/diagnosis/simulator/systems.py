@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.diagnosis.simulator.answer import find
 from dbbstation.diagnosis.simulator.contract import Simulator
-from dbbstation.diagnosis.simulator.model import Model, Output, Parameter, Port, Recorded
+from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
 from dbbstation.diagnosis.simulator.ports import simulated
 
 SUBSTEPS = 2
@@ -88,9 +88,9 @@ def model_of(system, seed, *, clean=False):
     true = {name: one[0] for name, one in system.parameters.items()} | system.states
     out = system.make(10 * SUBSTEPS).simulate(inputs, true, _Truth(nothing | truth))["out"]
     measured = out + system.noise * rng.standard_normal(len(out))
-    parameters = [Parameter(name, name, begin, low=1e-6) for name, (_, begin) in system.parameters.items()]
-    parameters += [Parameter(name, name, value) for name, value in system.states.items()]
-    recorded = Recorded("run 1", inputs, {"out": measured})
+    parameters = [SimulatorParameter(name, name, begin, low=1e-6) for name, (_, begin) in system.parameters.items()]
+    parameters += [SimulatorParameter(name, name, value) for name, value in system.states.items()]
+    recorded = SimulatorRecording("run 1", inputs, {"out": measured})
     return Model("test", tuple(parameters), system.ports, (Output("out", system.unit),), (recorded,))
 
 
@@ -120,7 +120,7 @@ def verdict_of(system, answer):
 
 def _mass(noise, truth, right, values=None):
     """A mass on a spring and a damper, pushed."""
-    ports = (Port("force", "N", {"place": "m", "speed": "m/s"}),)
+    ports = (SimulatorPort("force", "N", {"place": "m", "speed": "m/s"}),)
 
     def rate(t, x, u, p, ports):
         push = ports.force(t, {"place": x[0], "speed": x[1]})
@@ -142,8 +142,8 @@ def _mass(noise, truth, right, values=None):
 def _tank(truth, right, port="flow", values=None):
     """A tank that empties by itself in proportion to its level, filled by a pump."""
     ports = (
-        Port("flow", "m/s", {"level": "m"}),
-        Port("pump", "m/s", {"rate": "m/s"}),
+        SimulatorPort("flow", "m/s", {"level": "m"}),
+        SimulatorPort("pump", "m/s", {"rate": "m/s"}),
     )
 
     def rate(t, x, u, p, ports):

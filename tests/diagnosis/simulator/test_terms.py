@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, make_lsq_spline
 
-from dbbstation.diagnosis.simulator.terms import Form, Term, bends, evaluator
+from dbbstation.diagnosis.simulator.terms import Term, TermForm, bends, evaluator
 
 T = np.linspace(0.0, 4.0, 4001)
 X = np.sin(3.0 * T)
@@ -22,13 +22,13 @@ def term(form, amplitudes=(2.0,), shape=(), fixed=()):
 @pytest.mark.parametrize(
     ("form", "shape", "fixed", "expected"),
     [
-        (Form.LINEAR, (), (), 2.0 * X),
-        (Form.SQUARE, (), (), 2.0 * X**2),
-        (Form.DRAG, (), (), 2.0 * X * np.abs(X)),
-        (Form.CUBIC, (), (), 2.0 * X**3),
-        (Form.SIGN, (0.1,), (), 2.0 * X / np.hypot(X, 0.1)),
-        (Form.HINGE, (0.3,), (), 2.0 * np.maximum(X - 0.3, 0.0)),
-        (Form.LIMIT, (0.3,), (), 2.0 * np.clip(X, -0.3, 0.3)),
+        (TermForm.LINEAR, (), (), 2.0 * X),
+        (TermForm.SQUARE, (), (), 2.0 * X**2),
+        (TermForm.DRAG, (), (), 2.0 * X * np.abs(X)),
+        (TermForm.CUBIC, (), (), 2.0 * X**3),
+        (TermForm.SIGN, (0.1,), (), 2.0 * X / np.hypot(X, 0.1)),
+        (TermForm.HINGE, (0.3,), (), 2.0 * np.maximum(X - 0.3, 0.0)),
+        (TermForm.LIMIT, (0.3,), (), 2.0 * np.clip(X, -0.3, 0.3)),
     ],
 )
 def test_a_form_is_its_formula(form, shape, fixed, expected):
@@ -36,7 +36,7 @@ def test_a_form_is_its_formula(form, shape, fixed, expected):
 
 
 def test_a_turn_is_a_cosine_and_a_sine():
-    found = over(term(Form.PERIODIC, (2.0, 3.0), fixed=(2.0 * np.pi, 2.0)))
+    found = over(term(TermForm.PERIODIC, (2.0, 3.0), fixed=(2.0 * np.pi, 2.0)))
     np.testing.assert_allclose(found, 2.0 * np.cos(2.0 * X) + 3.0 * np.sin(2.0 * X), atol=1e-12)
 
 
@@ -45,12 +45,12 @@ def test_a_lag_follows_a_sine_as_its_transfer_function_says():
     gain, phase = 1.0 / np.hypot(1.0, w * tau), np.arctan(w * tau)
     steady = 10.0 * tau < T
     expected = gain * np.sin(w * T - phase)
-    np.testing.assert_allclose((X + over(term(Form.LAG, (tau,))))[steady], expected[steady], atol=1e-4)
-    np.testing.assert_allclose(over(term(Form.MEMORY, (5.0,), (tau,)))[steady], 5.0 * expected[steady], atol=5e-4)
+    np.testing.assert_allclose((X + over(term(TermForm.LAG, (tau,))))[steady], expected[steady], atol=1e-4)
+    np.testing.assert_allclose(over(term(TermForm.MEMORY, (5.0,), (tau,)))[steady], 5.0 * expected[steady], atol=5e-4)
 
 
 def test_a_dead_time_is_the_signal_a_while_ago():
-    found = X + over(term(Form.DELAY, (0.25,)))
+    found = X + over(term(TermForm.DELAY, (0.25,)))
     late = T >= 0.25
     np.testing.assert_allclose(found[late], np.sin(3.0 * (T[late] - 0.25)), atol=2e-6)
     np.testing.assert_allclose(found[~late], X[0])
@@ -58,7 +58,7 @@ def test_a_dead_time_is_the_signal_a_while_ago():
 
 def test_a_play_takes_its_half_width_off_at_each_reversal():
     half = 0.2
-    found = X + over(term(Form.PLAY, (half,)))
+    found = X + over(term(TermForm.PLAY, (half,)))
     turns = np.flatnonzero(np.diff(np.sign(np.diff(X)))) + 1
     for k in turns:
         assert found[k] == pytest.approx(X[k] - half * np.sign(X[k]), abs=1e-6)
@@ -66,7 +66,7 @@ def test_a_play_takes_its_half_width_off_at_each_reversal():
 
 
 def test_stick_slip_is_a_spring_until_it_slides():
-    found = over(term(Form.SLIP, (3.0,), (0.1,)))
+    found = over(term(TermForm.SLIP, (3.0,), (0.1,)))
     rising = T < 0.02
     np.testing.assert_allclose(found[rising], 3.0 * X[rising] / 0.1, atol=1e-9)
     assert found.max() == pytest.approx(3.0)
@@ -76,7 +76,7 @@ def test_stick_slip_is_a_spring_until_it_slides():
 def test_a_curve_is_the_spline_of_its_knots():
     knots = np.array([-1.1] * 4 + [-0.3, 0.4] + [1.1] * 4)
     values = np.array([0.1, -0.5, 0.3, 0.7])
-    found = over(term(Form.CURVE, tuple(values), fixed=tuple(knots)))
+    found = over(term(TermForm.CURVE, tuple(values), fixed=tuple(knots)))
     np.testing.assert_allclose(found, BSpline(knots, bends(knots) @ values, 3)(X), atol=1e-5)
 
 
@@ -90,9 +90,9 @@ def test_a_curve_has_no_straight_line_in_it_but_any_parabola():
     np.testing.assert_allclose(left, 0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("form", [Form.LAG, Form.MEMORY, Form.PLAY, Form.SLIP, Form.DELAY])
+@pytest.mark.parametrize("form", [TermForm.LAG, TermForm.MEMORY, TermForm.PLAY, TermForm.SLIP, TermForm.DELAY])
 def test_steps_that_a_solver_takes_back_change_nothing(form):
-    shape = (0.2,) if form in {Form.MEMORY, Form.SLIP} else ()
+    shape = (0.2,) if form in {TermForm.MEMORY, TermForm.SLIP} else ()
     once = over(term(form, (0.2,), shape))
     value, found = evaluator(term(form, (0.2,), shape)), []
     for k, (at, signal) in enumerate(zip(T.tolist(), X.tolist(), strict=True)):
@@ -105,5 +105,5 @@ def test_steps_that_a_solver_takes_back_change_nothing(form):
 
 
 def test_a_term_that_puts_something_in_place_of_a_signal_does_nothing_at_zero():
-    for form in (Form.LAG, Form.DELAY, Form.PLAY):
+    for form in (TermForm.LAG, TermForm.DELAY, TermForm.PLAY):
         assert not over(term(form, (0.0,))).any()

@@ -30,7 +30,7 @@ from dbbstation.inference.verdict import Verdict
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.inference.read_off import Finding
+    from dbbstation.inference.read_off import CauseFinding
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +205,9 @@ def table_of(axis: Moving, measured: NDArray[np.float64], simulated: NDArray[np.
     )
 
 
-def named_in(kind: str, seed: int, effect: str = "", size: float = 0.0, *, hold_out: bool = True) -> dict[str, Finding]:
+def named_in(
+    kind: str, seed: int, effect: str = "", size: float = 0.0, *, hold_out: bool = True
+) -> dict[str, CauseFinding]:
     """What these rows surely show of a table, by name; parts are held out only where that decides a verdict."""
     table = null_table(kind, seed, effect, size)
     found = find_mismatch(table, hold_out=False)

@@ -11,7 +11,6 @@ import pytest
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import Mismatch, choose_without, find_mismatch
 from dbbstation.diagnosis.table.next_measurement import next_measurements
-from dbbstation.diagnosis.table.summary import mismatch_summary
 from dbbstation.inference import looks
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel
@@ -22,13 +21,14 @@ from dbbstation.inference.seen import seen
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import Verdict
-from dbbstation.tasks.tables import Asked, load_tables
+from dbbstation.results.of_mismatch import mismatch_result
+from dbbstation.tasks.tables import TableOptions, load_tables
 from tests.diagnosis.table.plant import PULSE_S, Truth, record
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-ASKED = Asked("measured_mm", "simulated_mm")
+ASKED = TableOptions("measured_mm", "simulated_mm")
 
 FOUND = {
     "play": (Truth(play_um=8.0), {"hysteresis of place_mm", "hysteresis of simulated_mm"}, ("half width", 4e-3)),
@@ -44,7 +44,7 @@ FOUND = {
 }
 
 
-def found_in(tmp_path: Path, *truths: Truth, asked: Asked = ASKED, derivative: bool = False) -> Mismatch:
+def found_in(tmp_path: Path, *truths: Truth, asked: TableOptions = ASKED, derivative: bool = False) -> Mismatch:
     paths = [
         record(truth, seed, derivative=derivative).write(tmp_path / f"run{seed}.csv")
         for seed, truth in enumerate(truths, start=3)
@@ -75,7 +75,7 @@ def test_a_form_is_found_by_its_name_with_its_size(tmp_path, name):
     assert finding.name in names
     # No other rows can test what follows the time alone.
     assert finding.verdict is (Verdict.HAPPENED if name == "drift" else Verdict.IDENTIFIED)
-    text = next(f["text"] for f in mismatch_summary(found)["findings"] if f["name"] == finding.name)
+    text = next(f.text for f in mismatch_result(found).findings if f.name == finding.name)
     assert ("no other rows can test it" in text) == (name == "drift")
     assert found.left.is_noise
     if value is not None and value[0] in finding.values:
@@ -124,7 +124,7 @@ def test_two_files_are_two_blocks_and_an_effect_of_one_is_placed_there(tmp_path)
     found = found_in(tmp_path, Truth(), Truth(pulse_um=15.0))
     (finding,) = found.there
     assert finding.blocks[1] > 5.0 * finding.blocks[0]
-    text = next(f["text"] for f in mismatch_summary(found)["findings"] if f["name"] == finding.name)
+    text = next(f.text for f in mismatch_result(found).findings if f.name == finding.name)
     assert "of run4.csv" in text
 
 
@@ -152,7 +152,7 @@ def test_without_order_noise_is_said_to_be_fitted_jointly(tmp_path):
     del recorded.columns["t_s"]  # type: ignore[attr-defined]
     path = recorded.write(tmp_path / "x.csv")
     found = find_mismatch(load_tables([path], ASKED).table, hold_out=False)
-    assert not mismatch_summary(found)["noise"]["measured_in_order"]
+    assert not mismatch_result(found).noise.measured_in_order
     assert any("--time rows" in step.text for step in next_measurements(found))
 
 
@@ -201,7 +201,7 @@ def test_a_robot_measured_by_a_laser_tracker(recordings, tmp_path):
     names, *lines = path.read_text(encoding="utf-8").splitlines()
     fewer = tmp_path / "ur10.csv"
     fewer.write_text("\n".join([names, *lines[::4]]) + "\n", encoding="utf-8")
-    asked = Asked("measured_mm", "model_mm", {"q1": None, "q2": None, "q3": None})
+    asked = TableOptions("measured_mm", "model_mm", {"q1": None, "q2": None, "q3": None})
     found = find_mismatch(load_tables([fewer], asked).table)
     q1 = np.radians(found.table.columns["q1"])
     known = [np.ones(len(q1)), np.cos(q1), np.sin(q1), np.cos(2.0 * q1), np.sin(2.0 * q1)]
@@ -245,7 +245,7 @@ def test_effects_that_cancel_each_other_are_said():
     found = find_mismatch(table, hold_out=False)
     assert found.cancelling.rms == pytest.approx({"a": 10.0 * np.std(one), "b": 9.9 * np.std(other)}, rel=0.01)
     assert found.cancelling.rms_of_sum == pytest.approx(np.std(10.0 * one - 9.9 * other), rel=0.01)
-    assert mismatch_summary(found)["cancelling"]["rms_of_sum"] == found.cancelling.rms_of_sum
+    assert mismatch_result(found).cancelling.rms_of_sum == found.cancelling.rms_of_sum
 
 
 def test_uncertainties_are_not_less_than_those_of_parts_that_differ():

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.table.mismatch import Fitted, find_mismatch
-from dbbstation.diagnosis.table.summary import mismatch_summary
+from dbbstation.diagnosis.table.mismatch import RefittedParameter, find_mismatch
 from dbbstation.errors import InputError
 from dbbstation.inference.verdict import Value, Verdict
-from dbbstation.tasks.tables import Asked, load_tables, stated_uncertainties
+from dbbstation.results.of_mismatch import mismatch_result
+from dbbstation.tasks.tables import TableOptions, load_tables, stated_uncertainties
 
 ROWS, NOISE_MM, LINE_MM, STIFFNESS_OFF = 400, 0.01, 0.06, 0.02
 
@@ -32,7 +32,7 @@ def path(tmp_path: Path, rng: np.random.Generator) -> Path:
 
 
 def told(path: Path, **asked):
-    question = Asked("measured_mm", "simulated_mm", {"load_n": None, "t_s": None}, **asked)
+    question = TableOptions("measured_mm", "simulated_mm", {"load_n": None, "t_s": None}, **asked)
     return find_mismatch(load_tables([path], question).table, hold_out=False)
 
 
@@ -65,31 +65,31 @@ def test_what_was_known_keeps_a_parameter_from_taking_up_an_effect(path):
 )
 def test_what_moves_far_is_said_to(value, known, stated, far):
     none = Value(0.0, 1.0, "")
-    assert Fitted("mass", none, Value(value, 0.01, ""), 0.0, known, stated).is_far == far
+    assert RefittedParameter("mass", none, Value(value, 0.01, ""), 0.0, known, stated).is_far == far
 
 
 def test_by_default_refitting_moves_the_simulation_by_about_what_it_was_off(path):
-    table = load_tables([path], Asked("measured_mm", "simulated_mm")).table
+    table = load_tables([path], TableOptions("measured_mm", "simulated_mm")).table
     moves = table.spread_of("stiffness") * np.sqrt(np.mean(np.square(table.derivatives["stiffness"])))
     assert moves == pytest.approx(2.0 * np.std(table.measured - table.simulated))
 
 
 def test_the_constant_may_be_left_out(path):
     without = told(path, has_offset=False)
-    summary = mismatch_summary(without)
-    assert summary["offset"] is None
-    assert [one["name"] for one in summary["parameters"]] == ["stiffness"]
+    result = mismatch_result(without)
+    assert result.offset is None
+    assert [one.name for one in result.parameters] == ["stiffness"]
     # Half a millimetre that nothing may take up is a mismatch.
-    assert summary["mismatch"]
-    assert mismatch_summary(told(path))["offset"]["value"] == pytest.approx(0.5, abs=0.01)
+    assert result.mismatch
+    assert mismatch_result(told(path)).offset.value == pytest.approx(0.5, abs=0.01)
 
 
 def test_statements_that_fit_nothing_are_refused(path):
     for asked in ({"known": {"mass": 1.0}}, {"free": ("mass",)}):
         with pytest.raises(InputError, match="`mass` is no parameter of this table"):
-            load_tables([path], Asked("measured_mm", "simulated_mm", **asked))
+            load_tables([path], TableOptions("measured_mm", "simulated_mm", **asked))
     with pytest.raises(InputError, match="stated with --known, too"):
-        load_tables([path], Asked("measured_mm", "simulated_mm", known={"stiffness": 1.0}, free=("stiffness",)))
+        load_tables([path], TableOptions("measured_mm", "simulated_mm", known={"stiffness": 1.0}, free=("stiffness",)))
 
 
 @pytest.mark.parametrize("text", ["stiffness", "stiffness=0", "stiffness=-1", "stiffness=inf", "=1", "stiffness=a"])

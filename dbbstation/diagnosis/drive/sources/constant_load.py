@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
 
 
 class ConstantLoad(DriveSource):
@@ -24,7 +24,7 @@ class ConstantLoad(DriveSource):
         origin="statics; offset of the drive in Janot, Vandanjon and Gautier, IEEE TCST 22 (2014)",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """One amplitude."""
-        size = Parameter("load_n", "N", 0.3 * scale.force_n, "force that the drive must add at every position")
-        return (Form((size,), lambda s, _: np.ones((len(s.t_s), 1))),)
+        size = DriveParameter("load_n", "N", 0.3 * scale.force_n, "force that the drive must add at every position")
+        return (DriveForm((size,), lambda s, _: np.ones((len(s.t_s), 1))),)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
 
 COULOMB_SHARE = 0.5
 """Usual size, one standard deviation, of the force's root mean square."""
@@ -27,9 +27,9 @@ class CoulombFriction(DriveSource):
         origin="Coulomb 1785; Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, sec. 2",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """One amplitude."""
-        size = Parameter(
+        size = DriveParameter(
             "coulomb_n", "N", COULOMB_SHARE * scale.force_n, "force against the direction of travel", positive=True
         )
-        return (Form((size,), lambda s, _: s.direction[:, None]),)
+        return (DriveForm((size,), lambda s, _: s.direction[:, None]),)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -36,20 +36,20 @@ class FrictionAsymmetry(DriveSource):
         "friction in Janot, Gautier and Brunot, EMPS benchmark (2019)",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """Coulomb part and viscous part; a drive may have both."""
         if not scale.both_ways:
             return ()
-        dry = Parameter("coulomb_asymmetry_n", "N", 0.2 * scale.force_n, "half of forwards minus backwards")
-        wet = Parameter(
+        dry = DriveParameter("coulomb_asymmetry_n", "N", 0.2 * scale.force_n, "half of forwards minus backwards")
+        wet = DriveParameter(
             "viscous_asymmetry_n_s_m",
             "N·s/m",
             0.2 * scale.force_n / scale.speed_m_s,
             "half of forwards minus backwards",
         )
         return (
-            Form((dry,), lambda s, _: np.abs(s.direction)[:, None], label="Coulomb"),
-            Form((wet,), lambda s, _: np.abs(s.speed_m_s)[:, None], label="viscous"),
+            DriveForm((dry,), lambda s, _: np.abs(s.direction)[:, None], label="Coulomb"),
+            DriveForm((wet,), lambda s, _: np.abs(s.speed_m_s)[:, None], label="viscous"),
         )
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -46,15 +46,17 @@ class LostMotion(DriveSource):
         origin="Nordin and Gutman, Controlling mechanical systems with backlash, Automatica 38 (2002) 1633, sec. 2",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """One amplitude, the play, and the way over which the load comes back."""
         if not (scale.reverses and scale.both_ways):
             return ()
-        size = Parameter("lost_n", "N", 0.5 * scale.force_n, "force that is missing within the play", positive=True)
-        gap = Parameter("gap_mm", "mm", 1e3 * 0.03 * scale.travel_m, "play")
-        rise = Parameter("rise_per_gap", "1", 1.0, "way over which the load comes back, over the play")
+        size = DriveParameter(
+            "lost_n", "N", 0.5 * scale.force_n, "force that is missing within the play", positive=True
+        )
+        gap = DriveParameter("gap_mm", "mm", 1e3 * 0.03 * scale.travel_m, "play")
+        rise = DriveParameter("rise_per_gap", "1", 1.0, "way over which the load comes back, over the play")
         gaps = tuple(1e3 * share * scale.travel_m for share in GAPS)
-        return (Form((size,), _columns, (gap, rise), (gaps, RISES)),)
+        return (DriveForm((size,), _columns, (gap, rise), (gaps, RISES)),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
         """Within the play the force falls to zero and not below: what is missing there is the Coulomb friction."""

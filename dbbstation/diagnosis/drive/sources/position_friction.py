@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,17 +30,17 @@ class PositionFriction(DriveSource):
         origin="Armstrong-Hélouvry, Control of Machines with Friction (1991), ch. 4: position-dependent friction",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """Slope and bow."""
         size = 0.2 * scale.force_n
-        slope = Parameter("slope_n", "N", size, "friction at the upper end of the travel less that in the middle")
-        bow = Parameter("bow_n", "N", size, "friction at both ends of the travel less that in the middle")
+        slope = DriveParameter("slope_n", "N", size, "friction at the upper end of the travel less that in the middle")
+        bow = DriveParameter("bow_n", "N", size, "friction at both ends of the travel less that in the middle")
         middle, half = 0.5 * (scale.low_m + scale.high_m), 0.5 * scale.travel_m
 
         def place(signals: Signals) -> NDArray[np.float64]:
             return (signals.position_m - middle) / half
 
         return (
-            Form((slope,), lambda s, _: (s.direction * place(s))[:, None], label="slope"),
-            Form((bow,), lambda s, _: (s.direction * place(s) ** 2)[:, None], label="bow"),
+            DriveForm((slope,), lambda s, _: (s.direction * place(s))[:, None], label="slope"),
+            DriveForm((bow,), lambda s, _: (s.direction * place(s) ** 2)[:, None], label="bow"),
         )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,15 +34,15 @@ class PowerLawFriction(DriveSource):
         "European Journal of Control 4 (1998) 176, sec. 2",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """One amplitude at several powers."""
-        size = Parameter(
+        size = DriveParameter(
             "at_greatest_speed_n", "N", 0.2 * scale.force_n, "friction at the greatest speed", positive=True
         )
-        power = Parameter("power", "1", 1.0, "exponent of the speed")
+        power = DriveParameter("power", "1", 1.0, "exponent of the speed")
         top = scale.speed_m_s
 
         def columns(one: Signals, exponent: tuple[float, ...]) -> NDArray[np.float64]:
             return (one.direction * (np.abs(one.speed_m_s) / top) ** exponent[0])[:, None]
 
-        return (Form((size,), columns, (power,), (POWERS,)),)
+        return (DriveForm((size,), columns, (power,), (POWERS,)),)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,15 +45,17 @@ class Presliding(DriveSource):
         "Canudas de Wit, Automatica 30 (1994) 1083",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """One amplitude at several lengths."""
         if not scale.reverses:
             return ()
-        size = Parameter(
+        size = DriveParameter(
             "presliding_n", "N", 0.2 * scale.force_n, "friction still to turn round at reversal", positive=True
         )
-        length = Parameter("length_mm", "mm", 1e3 * 0.01 * scale.travel_m, "travel after which 37 % are left of it")
-        return (Form((size,), _columns, (length,), (tuple(1e3 * share * scale.travel_m for share in SHARES),)),)
+        length = DriveParameter(
+            "length_mm", "mm", 1e3 * 0.01 * scale.travel_m, "travel after which 37 % are left of it"
+        )
+        return (DriveForm((size,), _columns, (length,), (tuple(1e3 * share * scale.travel_m for share in SHARES),)),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
         """What turns round after a reversal is the Coulomb friction, as closely as either is known."""

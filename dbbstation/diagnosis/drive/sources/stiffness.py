@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
 
 
 class Stiffness(DriveSource):
@@ -21,13 +21,13 @@ class Stiffness(DriveSource):
         origin="Hooke; stiffness of inverse dynamic models in Gautier and Khalil, IEEE TRA 6 (1990) 368",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """One amplitude."""
-        size = Parameter(
+        size = DriveParameter(
             "stiffness_n_mm",
             "N/mm",
             1e-3 * 0.6 * scale.force_n / scale.travel_m,
             "force per travel, positive: a spring",
         )
         middle = scale.mean_m
-        return (Form((size,), lambda s, _: 1e3 * (s.position_m - middle)[:, None]),)
+        return (DriveForm((size,), lambda s, _: 1e3 * (s.position_m - middle)[:, None]),)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,11 +34,13 @@ class StribeckFriction(DriveSource):
         "Wit, Automatica 30 (1994) 1083, sec. 2",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """One amplitude at several Stribeck speeds."""
-        size = Parameter("static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction", positive=True)
-        speed = Parameter("stribeck_speed_m_s", "m/s", 0.1 * scale.speed_m_s, "at which 37 % of it are left")
-        return (Form((size,), _columns, (speed,), (tuple(share * scale.speed_m_s for share in SHARES),)),)
+        size = DriveParameter(
+            "static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction", positive=True
+        )
+        speed = DriveParameter("stribeck_speed_m_s", "m/s", 0.1 * scale.speed_m_s, "at which 37 % of it are left")
+        return (DriveForm((size,), _columns, (speed,), (tuple(share * scale.speed_m_s for share in SHARES),)),)
 
 
 def _columns(signals: Signals, speed_m_s: tuple[float, ...]) -> NDArray[np.float64]:

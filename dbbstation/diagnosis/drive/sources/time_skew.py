@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,7 +19,7 @@ MOST_SAMPLES = 5.0
 """Samples that channels of one logger, with their filters, may be apart."""
 
 
-class TimeSkew(DriveSource):
+class ForceTimeSkew(DriveSource):
     """A force channel that is late by d: F(t) = F_true(t - d), to first order F_true - d dF/dt."""
 
     name = "time-skew"
@@ -36,10 +36,10 @@ class TimeSkew(DriveSource):
         origin="Taylor's series to first order; delays in identification: Ljung, System Identification (1999), sec. 14",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         """One amplitude."""
-        size = Parameter("delay_ms", "ms", 1e3 * scale.sample_s, "of the force; negative: it is early")
-        return (Form((size,), _columns),)
+        size = DriveParameter("delay_ms", "ms", 1e3 * scale.sample_s, "of the force; negative: it is early")
+        return (DriveForm((size,), _columns),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:
         """Channels of one logger are apart by a few of its samples; a longer delay is something else."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Scale, Texts
 
 
 class TransientForce(DriveSource):
@@ -26,6 +26,6 @@ class TransientForce(DriveSource):
         "look-elsewhere odds: Gross and Vitells, Eur. Phys. J. C 70 (2010) 525",
     )
 
-    def forms(self, scale: Scale) -> tuple[Form, ...]:  # noqa: ARG002
+    def forms(self, scale: Scale) -> tuple[DriveForm, ...]:  # noqa: ARG002
         """None: stretches of time are looked for by the engine."""
         return ()

@@ -1,0 +1,56 @@
+"""How commands print what was found: values with their uncertainty, names in a row, and which verdicts are shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.results.inference import HeldOutGains, ResidualResult
+    from dbbstation.results.serialise import Quantified
+
+SURELY_FOUND = ("identified", "happened", "does-not-predict")
+"""Verdicts of effects that the recording shows for sure."""
+
+LIKELY = 0.5
+"""Probability from which on an effect that is not certain is printed; all of them are in the JSON."""
+
+MOST_NAMES = 6
+"""Names that are printed in a row."""
+
+
+def with_uncertainty(number: Quantified) -> str:
+    """Return a value with its standard uncertainty and unit, as people read it."""
+    u = number.uncertainty
+    known = f"{number.value:.4g} ± {u:.2g}" if u is not None else f"{number.value:.4g}"
+    return f"{known} {number.unit}".rstrip()
+
+
+def first_names(names: Sequence[str]) -> str:
+    """Return the first names of a list, and how many more there are."""
+    shown = ", ".join(names[:MOST_NAMES])
+    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
+
+
+def parts_with_gain(gains: HeldOutGains | None, *, acts: str = "always") -> str:
+    """Return in how many held-out parts of how many an effect gains; nothing where other parts cannot show it.
+
+    Args:
+        gains: None: held-out parts were not asked for.
+        acts: `always` or `once`.
+    """
+    return gains.counted if gains is not None and acts == "always" else ""
+
+
+def residual_text(left: ResidualResult, unit: str) -> str:
+    """Return whether something is left beyond noise, and what, as a sentence.
+
+    Args:
+        left: tests of what is left.
+        unit: of the residual.
+    """
+    if left.is_noise:
+        return "Nothing is left beyond noise."
+    where = f", {left.worst.where}" if left.worst.where else ""
+    return f"Something is left beyond noise: {left.worst.name}{where}, {left.worst.rms:.2g} {unit}."

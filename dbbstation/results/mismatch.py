@@ -1,0 +1,325 @@
+"""Where a simulation and a recording differ, and what was left out: the result of `mismatch`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+from dbbstation.results.frame import Framed
+from dbbstation.results.inference import EffectSpan, HeldOutGains, ResidualResult
+from dbbstation.results.serialise import Absent, AsItIs, Kept, Quantified
+
+
+@dataclass(frozen=True)
+class VariableResult:
+    """A column that the difference may follow.
+
+    Attributes:
+        name: of the column.
+        kind: such as `angle` or `time`.
+        unit: of its values; empty where it has none.
+        period: after which it is the same again, in that unit; None where it has none.
+        low: least value.
+        high: greatest value.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    period: float | None
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class OffsetResult(Quantified):
+    """Measured less simulated value on average.
+
+    Attributes:
+        significant: whether it is there beyond its uncertainty.
+    """
+
+    significant: bool
+
+
+@dataclass(frozen=True)
+class SearchBeginning:
+    """What a search that began in one way ended at.
+
+    Attributes:
+        beside: what it began beside.
+        log_odds: of what it ended at, over what is reported.
+        effects: that it ended at.
+    """
+
+    beside: str
+    log_odds: float
+    effects: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class NoiseResult:
+    """Noise of one row.
+
+    Attributes:
+        sigma: standard deviation, in the unit of the table.
+        rows_as_one: neighbours that count as one row, since their noise is alike.
+        measured_in_order: whether the order of the rows is known.
+        order: of the autoregression that describes neighbours.
+        degrees_of_freedom: of Student's t; None where it is normal.
+        grows_with: variable that its variance grows with; None where it is the same everywhere.
+        beginnings: what searches with other beginnings ended at.
+    """
+
+    sigma: float
+    rows_as_one: float
+    measured_in_order: bool
+    order: int
+    degrees_of_freedom: float | None
+    grows_with: str | None
+    beginnings: tuple[SearchBeginning, ...]
+
+
+@dataclass(frozen=True)
+class ResidualRms:
+    """Root mean square of measured less simulated values, in the unit of the table.
+
+    Attributes:
+        before: with parameters refitted and nothing found.
+        after: with what was found.
+    """
+
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class HeldOutPart:
+    """Errors of one part that took no part in anything, in the unit of the table.
+
+    Attributes:
+        name: of the part.
+        rows: in it.
+        as_simulated: rms of measured less simulated value.
+        before: with parameters refitted.
+        after: corrected.
+    """
+
+    name: str
+    rows: int
+    as_simulated: float
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class HeldOutRms:
+    """Errors of all held-out parts, in the unit of the table.
+
+    Attributes:
+        as_simulated: rms of measured less simulated value.
+        before: with parameters refitted.
+        after: corrected.
+        worse: whether corrected values predict worse than those as simulated.
+        folds: part by part.
+    """
+
+    as_simulated: float
+    before: float
+    after: float
+    worse: bool
+    folds: tuple[HeldOutPart, ...]
+
+
+@dataclass(frozen=True)
+class CancellingResult:
+    """Effects that are each larger than all together.
+
+    Attributes:
+        rms: of each about its mean, by name, in the unit of the table.
+        rms_of_sum: of all together.
+    """
+
+    rms: Mapping[str, float]
+    rms_of_sum: float
+
+
+@dataclass(frozen=True)
+class VariableShare:
+    """What of the mismatch follows one variable.
+
+    Attributes:
+        variable: its name.
+        rms: of all effects over it, in the unit of the table.
+        share: of all that is explained, what these bring alone.
+        lost: what is lost of it without them.
+        terms: how many effects.
+    """
+
+    variable: str
+    rms: float
+    share: float
+    lost: float
+    terms: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class EffectResult:
+    """What was found of one effect.
+
+    Attributes:
+        name: of the effect.
+        verdict: one of the six words of docs/verdicts.md.
+        acts: `always` or `once`.
+        persists: it happened once, and other parts tell of it, too.
+        recurs: it happened more than once.
+        gains: in parts that did not choose it; None where these were not asked for.
+        form: family of forms; None for physics of one's own.
+        variables: that it follows.
+        probability: that it is there.
+        log_bayes_factor: of it, given all else that was found.
+        rms: of it, in the unit of the table.
+        sigmas: norm of it over its standard deviation.
+        confounded: R² of it on the parameters.
+        values: its numbers with their uncertainties.
+        spans: where it is large.
+        rows_there: rows that show it.
+        rows: first and last row of what happened once.
+        blocks: size in each run, by name.
+        equivalent: effects that these rows cannot tell from it.
+        ambiguous_with: effects that would do about as well.
+        resembles: R² of it on named forms.
+        text: in words.
+    """
+
+    name: str
+    verdict: str
+    acts: str
+    persists: bool
+    recurs: bool
+    gains: HeldOutGains | None
+    form: str | None
+    variables: tuple[str, ...]
+    probability: float
+    log_bayes_factor: float
+    rms: float
+    sigmas: float
+    confounded: float
+    values: Mapping[str, Quantified]
+    spans: tuple[EffectSpan, ...]
+    rows_there: float
+    rows: tuple[tuple[int, ...], ...]
+    blocks: Mapping[str, float]
+    equivalent: tuple[str, ...]
+    ambiguous_with: tuple[str, ...]
+    resembles: Mapping[str, float]
+    text: str
+
+
+@dataclass(frozen=True)
+class RefittedResult:
+    """A parameter of the simulation, fitted anew.
+
+    Attributes:
+        name: `offset`, or of the parameter.
+        before: change alone, by ordinary least squares.
+        after: change beside what was found.
+        shift: from the one to the other.
+        confounded: R² of the parameter on what was found.
+        known: standard uncertainty to which it was known before; None where it was free.
+        stated: whether the user gave that.
+        far: whether it moved so far that its derivative, or what was known of it, must be asked again.
+    """
+
+    name: str
+    before: Quantified
+    after: Quantified
+    shift: float
+    confounded: float
+    known: float | None
+    stated: bool
+    far: bool
+
+
+@dataclass(frozen=True)
+class NextMeasurement:
+    """What to measure next.
+
+    Attributes:
+        text: in words.
+        variables: that it varies.
+    """
+
+    text: str
+    variables: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MismatchResult(Framed):
+    """What is found of a table of measured and simulated values.
+
+    Attributes:
+        unit: of measured and simulated values; empty where it has none.
+        row_count: rows that were compared; `rows` in JSON.
+        blocks: names of the runs.
+        variables: that the difference may follow.
+        mismatch: whether there is more than noise.
+        offset: measured less simulated on average; None where none was allowed.
+        noise: of one row.
+        residual_rms: before and after.
+        held_out: `tested` or `not-tested`.
+        held_out_rms: errors of held-out parts; None where not tested.
+        cancelling: effects that cancel each other; None where none do.
+        led_by: what of it follows which variable, largest first.
+        findings: effects, those that are there first.
+        parameters: of the simulation, fitted anew.
+        left: whether something is left beyond noise.
+        second_start_agrees: whether a search that begins with nothing ends at the same effects.
+        second_start_log_odds: of what that ends at, over what was found.
+        next: what to measure next.
+        not_asked: physics of one's own that could not be asked, and why, by name.
+        out: file of the corrected table; absent where none was written.
+        figure: file of the figure; absent where none was written.
+        table: columns of the files by name, with the corrected simulation and what it leaves as further ones.
+    """
+
+    unit: str
+    row_count: Annotated[int, Field(serialization_alias="rows")]
+    blocks: tuple[str, ...]
+    variables: tuple[VariableResult, ...]
+    mismatch: bool
+    offset: OffsetResult | None
+    noise: NoiseResult
+    residual_rms: ResidualRms
+    held_out: str
+    held_out_rms: HeldOutRms | None
+    cancelling: CancellingResult | None
+    led_by: tuple[VariableShare, ...]
+    findings: tuple[EffectResult, ...]
+    parameters: tuple[RefittedResult, ...]
+    left: ResidualResult
+    second_start_agrees: bool
+    second_start_log_odds: float
+    next: tuple[NextMeasurement, ...]
+    not_asked: Mapping[str, str]
+    out: Annotated[str | None, Absent] = None
+    figure: Annotated[str | None, Absent] = None
+    table: Annotated[Mapping[str, tuple[str | float, ...]], AsItIs, Kept]
+
+    def rows(self) -> list[dict[str, object]]:
+        """One dictionary for each effect."""
+        return [
+            {
+                "name": one.name,
+                "verdict": one.verdict,
+                "probability": one.probability,
+                "log_bayes_factor": one.log_bayes_factor,
+                "rms": one.rms,
+                "confounded": one.confounded,
+                "text": one.text,
+            }
+            for one in self.findings
+        ]

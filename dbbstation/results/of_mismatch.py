@@ -1,0 +1,151 @@
+"""From the comparison of a table to its result."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dbbstation.diagnosis.table.next_measurement import next_measurements
+from dbbstation.diagnosis.table.words import sentence_of
+from dbbstation.results.inference import all_quantified, gains_result, quantified, residual_result, span_result
+from dbbstation.results.mismatch import (
+    CancellingResult,
+    EffectResult,
+    HeldOutPart,
+    HeldOutRms,
+    MismatchResult,
+    NextMeasurement,
+    NoiseResult,
+    OffsetResult,
+    RefittedResult,
+    ResidualRms,
+    SearchBeginning,
+    VariableResult,
+    VariableShare,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from dbbstation.diagnosis.table.mismatch import Mismatch, RefittedParameter
+    from dbbstation.inference.read_off import CauseFinding
+
+
+def mismatch_result(
+    found: Mismatch,
+    *,
+    table: Mapping[str, tuple[str | float, ...]] | None = None,
+    drawing: Callable[[object], bytes] | None = None,
+    notes: tuple[str, ...] = (),
+) -> MismatchResult:
+    """Return everything that is reported of a table.
+
+    Args:
+        found: the comparison.
+        table: columns of the files, with the corrected simulation; None: none.
+        drawing: draws it.
+        notes: what was noticed in the files.
+    """
+    compared = found.table
+    return MismatchResult(
+        unit=compared.unit,
+        row_count=len(compared),
+        blocks=compared.names,
+        variables=tuple(
+            VariableResult(v.name, str(v.kind), v.unit, v.period, float(v.low), float(v.high))
+            for v in compared.variables
+        ),
+        mismatch=found.is_there,
+        offset=_offset(found),
+        noise=_noise(found),
+        residual_rms=ResidualRms(found.rms_before, found.rms_after),
+        held_out="not-tested" if found.held_out is None else "tested",
+        held_out_rms=_held_out(found),
+        cancelling=None
+        if found.cancelling is None
+        else CancellingResult(found.cancelling.rms, found.cancelling.rms_of_sum),
+        led_by=tuple(VariableShare(s.variable, s.rms, s.share, s.lost, s.terms) for s in found.shares),
+        findings=tuple(_effect(found, finding) for finding in found.findings),
+        parameters=tuple(_parameter(one) for one in found.fitted),
+        left=residual_result(found.left),
+        second_start_agrees=found.second_start == 0.0,
+        second_start_log_odds=found.second_start,
+        next=tuple(NextMeasurement(step.text, tuple(step.variables)) for step in next_measurements(found)),
+        not_asked=found.lacking,
+        table={} if table is None else table,
+        drawing=drawing,
+        notes=notes,
+    )
+
+
+def _offset(found: Mismatch) -> OffsetResult | None:
+    if found.offset is None:
+        return None
+    known = quantified(found.offset)
+    return OffsetResult(known.value, known.uncertainty, known.unit, found.offset_is_there)
+
+
+def _noise(found: Mismatch) -> NoiseResult:
+    settled, noise = found.settled, found.settled.noise
+    return NoiseResult(
+        sigma=noise.sigma,
+        rows_as_one=noise.correlation_samples,
+        measured_in_order=settled.channel.time is not None,
+        order=noise.order,
+        degrees_of_freedom=None if math.isinf(settled.bank.tails) else settled.bank.tails,
+        grows_with=settled.bank.grows_with or None,
+        beginnings=tuple(
+            SearchBeginning(
+                one.beginning.value, one.log_probability - settled.log_probability, tuple(sorted(one.best.names))
+            )
+            for one in (settled, *settled.others)
+        ),
+    )
+
+
+def _held_out(found: Mismatch) -> HeldOutRms | None:
+    held_out = found.held_out
+    if held_out is None:
+        return None
+    parts = (HeldOutPart(one.name, one.rows, one.as_simulated, one.before, one.after) for one in held_out.folds)
+    return HeldOutRms(held_out.as_simulated, held_out.before, held_out.after, found.is_worse, tuple(parts))
+
+
+def _effect(found: Mismatch, finding: CauseFinding) -> EffectResult:
+    return EffectResult(
+        name=finding.name,
+        verdict=str(finding.verdict),
+        acts=finding.acts.name.lower(),
+        persists=finding.persists,
+        recurs=finding.recurs,
+        gains=gains_result(finding.gains),
+        form=None if finding.family is None else str(finding.family),
+        variables=tuple(finding.variables),
+        probability=finding.probability,
+        log_bayes_factor=finding.log_factor,
+        rms=finding.rms,
+        sigmas=finding.sigmas,
+        confounded=finding.confounded,
+        values=all_quantified(finding.values),
+        spans=tuple(span_result(one) for one in finding.spans),
+        rows_there=finding.rows_there,
+        rows=tuple(tuple(rows) for rows in finding.rows),
+        blocks=dict(zip(found.table.names, finding.blocks, strict=True)) if finding.blocks else {},
+        equivalent=tuple(finding.equivalent),
+        ambiguous_with=tuple(finding.ambiguous_with),
+        resembles=found.resembles.get(finding.name, {}),
+        text=sentence_of(found, finding),
+    )
+
+
+def _parameter(one: RefittedParameter) -> RefittedResult:
+    return RefittedResult(
+        name=one.name,
+        before=quantified(one.before),
+        after=quantified(one.after),
+        shift=one.after.value - one.before.value,
+        confounded=one.confounded,
+        known=one.known,
+        stated=one.stated,
+        far=one.is_far,
+    )

@@ -1,0 +1,45 @@
+"""What is to be done with a session once it is measured, in a form that another process can be told."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict
+
+
+class SessionTask(StrEnum):
+    """What can be done, in the order in which it is usual."""
+
+    CALIBRATE = "calibrate"
+    DIAGNOSE = "diagnose"
+    PROGRAMS = "programs"
+    REPORT = "report"
+    ACCEPTANCE = "acceptance"
+
+
+class SessionJob(BaseModel):
+    """One task on one session."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    task: SessionTask
+    """What is to be done."""
+    beside: Path
+    """Folder in which the shop's settings are looked for."""
+    out: str
+    """Name of what is written, in the folder of results."""
+    session: Path | None = None
+    """Folder of the session; programs need none."""
+    before: Path | None = None
+    """Session that an acceptance holds it against."""
+    model: Path | None = None
+    """Model to compensate with, or to put beside; None: nominal programs, or no model."""
+    plan: Path | None = None
+    """Plan of the programs."""
+    machine: Path | None = None
+    """Machine of the programs."""
+    settings: Path | None = None
+    """File of the shop's settings where one was named."""
+    force: bool = True
+    """Whether what is there already is written over: the folder of results is the program's own."""

@@ -1,0 +1,187 @@
+"""The process that does a task for the station: `python -m dbbstation.service.worker`, which can be ended at any time.
+
+It is told its job as one line of JSON on standard input, tells stages and what it notices on standard error, and prints the result as
+JSON on standard output. What it writes is written whole or not at all. It runs the tasks that commands run, and is the one part of the
+service that knows what is computed: the station itself never loads this module.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dbbstation import __version__
+from dbbstation.errors import StationError
+from dbbstation.files.formats.settings import read_settings, settings_files
+from dbbstation.files.inputs import input_book, inputs_so_far
+from dbbstation.files.places import name_of
+from dbbstation.files.provenance import Provenance
+from dbbstation.files.refused import in_a_sentence
+from dbbstation.service.job import SessionJob, SessionTask
+from dbbstation.service.work import LOG_MARK, STAGE_MARK
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.files.formats.settings import Settings
+
+FAILED, INTERRUPTED = 1, 130
+"""Codes that it leaves with: the work failed, with the reason on standard error; it was asked to end."""
+
+_LOG = logging.getLogger(__name__)
+
+
+class _Marked(logging.Formatter):
+    """Begins every line of a record with the mark of the log."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return a record's lines."""
+        return "\n".join(LOG_MARK + line for line in super().format(record).splitlines())
+
+
+def main() -> None:
+    """Do the job that standard input says, and leave with a code."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(_Marked())
+    logging.basicConfig(level=logging.INFO, handlers=[handler])
+    logging.captureWarnings(capture=True)
+    try:
+        with input_book():
+            answer = done(SessionJob.model_validate_json(sys.stdin.readline()))
+        sys.stdout.write(json.dumps(answer, allow_nan=False))
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+    except StationError as problem:
+        _fail(str(problem))
+    except OSError as problem:
+        _fail(in_a_sentence(problem))
+    except Exception as problem:  # noqa: BLE001 - said in words; the log has where it happened
+        _LOG.exception("the work crashed")
+        _fail(
+            f"{type(problem).__name__}: {problem}\nthis is a fault of dbbstation itself; the log shows what to report"
+        )
+
+
+def done(job: SessionJob) -> Mapping[str, Any]:
+    """Do a job in the working folder; return its result as JSON has it.
+
+    Args:
+        job: what is to be done.
+
+    Raises:
+        StationError: whatever the task raises.
+        ValueError: the job lacks a file that its task needs.
+    """
+    from dbbstation.results.serialise import plain  # noqa: PLC0415 - the job is read before half a second of imports
+
+    settings = read_settings(settings_files(job.beside) if job.settings is None else [job.settings])
+    match job.task:
+        case SessionTask.CALIBRATE | SessionTask.DIAGNOSE:
+            return plain(_fitted(job))
+        case SessionTask.PROGRAMS:
+            return plain(_programs(job, settings))
+        case SessionTask.REPORT | SessionTask.ACCEPTANCE:
+            return _reported(job, settings)
+
+
+def _fitted(job: SessionJob) -> object:
+    """Calibrate or diagnose, and write the model."""
+    from dbbstation.files.formats.model import write_model  # noqa: PLC0415 - the same
+    from dbbstation.tasks.calibrate import calibrate  # noqa: PLC0415 - the same
+    from dbbstation.tasks.diagnose import diagnose  # noqa: PLC0415 - the same
+
+    session = _needed(job.session, "session")
+    fit = calibrate if job.task is SessionTask.CALIBRATE else diagnose
+    result = fit(session, progress=_stage, say=_note)
+    write_model(Path(job.out), result.model, provenance=_provenance(job.task.value, session), force=job.force)
+    return result
+
+
+def _programs(job: SessionJob, settings: Settings) -> object:
+    """Write the NC programs of all circles, in the shop's dialect."""
+    from dbbstation.tasks.circle_programs import write_circle_programs  # noqa: PLC0415 - the same
+
+    plan, machine = _needed(job.plan, "plan"), _needed(job.machine, "machine")
+    chosen = {
+        option: settings.values[key].value
+        for option, key in (
+            ("dialect", "program.dialect"),
+            ("step_deg", "program.step_deg"),
+            ("clearance_mm", "program.clearance_mm"),
+            ("largest_correction_mm", "limits.largest_correction_mm"),
+        )
+        if key in settings.values
+    }
+    words: list[str] = [
+        word for option, value in chosen.items() for word in (f"--{option.replace('_', '-')}", str(value))
+    ]
+    of_model: list[str | Path] = [] if job.model is None else ["--model", job.model]
+    return write_circle_programs(
+        plan,
+        machine,
+        job.out,
+        model=job.model,
+        **chosen,
+        force=job.force,
+        provenance=lambda: _provenance("program", "--plan", plan, "--machine", machine, *of_model, *words),
+        progress=_stage,
+        say=_note,
+    )
+
+
+def _reported(job: SessionJob, settings: Settings) -> Mapping[str, Any]:
+    """Write the report of a session, or of two."""
+    from dbbstation.tasks.report import report  # noqa: PLC0415 - the same
+
+    session = _needed(job.session, "session")
+    given = [word for name in ("model", "before") if (path := getattr(job, name)) for word in (f"--{name}", path)]
+    written = report(
+        session,
+        job.out,
+        settings=settings,
+        before=job.before,
+        model=job.model,
+        force=job.force,
+        provenance=lambda: _provenance("report", session, *given),
+        progress=_stage,
+    )
+    return {"report": job.out, **written.numbers}
+
+
+def _needed(path: Path | None, what: str) -> Path:
+    if path is None:
+        raise ValueError(f"the job has no {what}")
+    return path
+
+
+def _provenance(*words: str | Path) -> Provenance:
+    """Return where an output comes from: the command that does the same, files without folders, and the inputs so far."""
+    command = shlex.join(["dbbstation", *(name_of(word) if isinstance(word, Path) else word for word in words)])
+    return Provenance(f"dbbstation {__version__}", command, inputs_so_far())
+
+
+def _stage(text: str, done: int = 0, of: int = 0) -> None:  # noqa: ARG001 - as `Progress` has it; the station shows no counts
+    _tell(STAGE_MARK + text)
+
+
+def _note(text: str) -> None:
+    _tell(f"note: {text}")
+
+
+def _tell(text: str) -> None:
+    sys.stderr.write(text + "\n")
+    sys.stderr.flush()
+
+
+def _fail(text: str) -> None:
+    _tell(text)
+    sys.exit(FAILED)
+
+
+if __name__ == "__main__":
+    main()

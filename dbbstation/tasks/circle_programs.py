@@ -1,0 +1,123 @@
+"""Circle programs: from a plan to one NC program for each test and direction, nominal or compensated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dbbstation.files.atomic import write_folder
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.own_dialects import dialect_given
+from dbbstation.nc.circle_program import Approach
+from dbbstation.nc.export import circle_programs
+from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
+from dbbstation.results.prediction import unknown_cause_notes
+from dbbstation.results.programs import programs_result
+from dbbstation.tasks.chosen import chosen_of
+from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
+from dbbstation.tasks.provenance import from_python
+from dbbstation.tasks.telling import Telling, never, silent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from os import PathLike
+
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.results.programs import ProgramsResult
+    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.tasks.telling import Progress
+
+STEP_DEG = 0.1
+"""Angle between points where nobody says another [deg]."""
+
+CLEARANCE_MM = 20.0
+"""Height of rapid moves above the first point where nobody says another [mm]."""
+
+
+def write_circle_programs(
+    plan_file: Path,
+    machine_file: Path,
+    out: str | PathLike[str],
+    *,
+    dialect: str = "linuxcnc",
+    model: Path | None = None,
+    tests: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    step_deg: float = STEP_DEG,
+    clearance_mm: float | None = CLEARANCE_MM,
+    chord_um: float = 1e3 * CIRCLE_CHORD_MM,
+    prefer: str | None = None,
+    accept_chord_um: float | None = None,
+    time_s: float | None = None,
+    largest_correction_mm: float = LARGEST_CORRECTION_MM,
+    force: bool = False,
+    known: Mapping[str, ErrorSource] | None = None,
+    provenance: Callable[[], Provenance] = from_python,
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
+) -> ProgramsResult:
+    """Write the programs of a plan's circles, all or none; each is checked against the machine's travel first.
+
+    Args:
+        plan_file: test plan.
+        machine_file: machine.
+        out: folder to write to.
+        dialect: language of the control: a name, or the path of a Python file.
+        model: file of the model to compensate with; None: nominal programs.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        step_deg: angle between points [deg].
+        clearance_mm: height of rapid moves above the first point [mm]; None: the bar stays on, without rapids and stops.
+        chord_um: greatest distance between a straight move and the circle, of compensated programs [µm].
+        prefer: what to keep where chord error and feed cannot both be kept.
+        accept_chord_um: chord error that is accepted where the one asked for is missed [µm].
+        time_s: start of the programs after the session's start [s], for models that depend on time.
+        largest_correction_mm: a model that shifts any point by more is refused [mm].
+        force: overwrite programs.
+        known: every error source by name, for the file of the model.
+        provenance: asked, when all is read, where the programs come from.
+        progress: told how many programs are done.
+        stop: asked after each program whether to stop.
+        say: told of causes in the model that nobody knows.
+
+    Raises:
+        InputError: every fault of the files.
+        TravelError: a program leaves the machine's travel.
+        ModelError: the model is of another machine, or has a source that needs what a program lacks.
+        StationError: a circle whose chord and feed cannot both be kept.
+        OutputError: a program exists and `force` is not given.
+        StoppedError: `stop` returned True; nothing was written.
+    """
+    telling = Telling(progress, stop, say)
+    written_in = dialect_given(dialect)
+    plan, machine = read_plan(plan_file), read_machine(machine_file)
+    inverse = None
+    if model is not None:
+        inverse = inverse_of(
+            model,
+            known,
+            time_s=time_s,
+            largest_mm=largest_correction_mm,
+            prefer=prefer,
+            accept_chord_um=accept_chord_um,
+        )
+        telling.note(*unknown_cause_notes(inverse.model))
+    programs = circle_programs(
+        plan,
+        machine,
+        written_in,
+        inverse=inverse,
+        origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse, provenance()),
+        tests=chosen_of(plan.name, plan.tests, tests, exclude),
+        step_deg=step_deg,
+        chord_mm=chord_um / 1e3,
+        approach=None if clearance_mm is None else Approach(clearance_mm),
+        progress=telling.counted("programs"),
+    )
+    folder = Path(out)
+    write_folder(folder, {each.name: each.text for each in programs}, force=force)
+    written = [(str(folder / each.name), each) for each in programs]
+    digest = None if model is None else sha256_of(model)
+    return programs_result(written, written_in, None if inverse is None else machine, digest, tuple(telling.notes))

@@ -1,0 +1,138 @@
+"""Mismatch: from a table of measured and simulated values to where they differ, and what was left out of the simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dbbstation.diagnosis.table.mismatch import find_mismatch
+from dbbstation.results.of_mismatch import mismatch_result
+from dbbstation.tasks.load import paths_of
+from dbbstation.tasks.tables import TableOptions, load_sources, load_tables, stated_variables
+from dbbstation.tasks.telling import Telling, never, silent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from os import PathLike
+
+    from dbbstation.diagnosis.table.mismatch import Mismatch
+    from dbbstation.diagnosis.table.units import Meaning
+    from dbbstation.files.formats.number_language import NumberLanguage
+    from dbbstation.results.mismatch import MismatchResult
+    from dbbstation.tasks.load import Sessions
+    from dbbstation.tasks.tables import Tabulated
+    from dbbstation.tasks.telling import Progress
+
+STAGES = {"look": 0, "sets of causes": 8, "held-out part": 15}
+STAGES_WHOLE = {"look": 0, "sets of causes": 50}
+"""Stages of a comparison with the held-out test and without it, and the share of its time that has passed by then [%]."""
+
+CORRECTED, LEFT = "corrected", "left"
+"""Columns that are added to the table."""
+
+
+def mismatch(
+    data: Sessions,
+    measured: str,
+    simulated: str,
+    *,
+    variables: Mapping[str, Meaning | str | None] | Sequence[str] | None = None,
+    run: str | None = None,
+    time: str | None = None,
+    source_files: Sequence[str | PathLike[str]] = (),
+    known_u: Mapping[str, float] | None = None,
+    free: Sequence[str] = (),
+    has_offset: bool = True,
+    hold_out: bool = True,
+    numbers: NumberLanguage | None = None,
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
+) -> MismatchResult:
+    """Find where a simulation and a recording differ, in what form, and what was left out of the simulation.
+
+    A row of the table is one measured value beside the simulated one, with everything that was known then. Columns `d_NAME` are
+    derivatives of the simulated value by a parameter NAME, which is then fitted anew.
+
+    Args:
+        data: CSV files.
+        measured: column of the measured values.
+        simulated: column of the simulated values, in the same unit.
+        variables: columns that the difference may follow, each with its unit or kind where its name does not say it; None: all.
+        run: column that tells runs apart; several files are several runs anyway.
+        time: column that says when; `rows`: the rows are in the order of measuring; None: it is guessed.
+        source_files: Python files with physics of your own, which are executed.
+        known_u: standard uncertainty to which parameters were known before, by name, in their own units.
+        free: parameters of which nothing is known, such as initial states.
+        has_offset: whether a constant of no interest may lie between measured and simulated values.
+        hold_out: repeat everything for each held-out part, which takes most of the time.
+        numbers: how numbers are written; None: with a dot, and the separator that the header has most of.
+        progress: told each stage.
+        stop: asked at each stage whether to stop.
+        say: told what is noticed in the files.
+
+    Returns:
+        What was found; `drawing` draws it, and `table` has the corrected simulation.
+
+    Raises:
+        InputError: every fault of every file; too few rows.
+        CalibrationError: the difference is so much larger than its noise that rounding hides what it follows.
+        StoppedError: `stop` returned True.
+    """
+    telling = Telling(progress, stop, say)
+    asked = TableOptions(
+        measured,
+        simulated,
+        _meanings(variables),
+        run,
+        time,
+        numbers,
+        known=known_u or {},
+        free=tuple(free),
+        has_offset=has_offset,
+    )
+    tabulated = load_tables(paths_of(data), asked)
+    telling.note(*tabulated.notes)
+    sources, lacking = load_sources([Path(file) for file in source_files], tabulated.table)
+    telling.note(*(f"{name} cannot be asked: {why}" for name, why in lacking.items()))
+    found = find_mismatch(tabulated.table, sources, hold_out=hold_out, lacking=lacking, progress=telling.stage)
+    return mismatch_result(
+        found, table=_corrected(tabulated, found), drawing=partial(_drawn, found), notes=tuple(telling.notes)
+    )
+
+
+def _meanings(
+    variables: Mapping[str, Meaning | str | None] | Sequence[str] | None,
+) -> dict[str, Meaning | None] | None:
+    """Return what columns are, by name; None where it is to be guessed."""
+    if variables is None:
+        return None
+    given = dict(variables) if isinstance(variables, Mapping) else dict.fromkeys(variables)
+    return {
+        name: stated_variables(f"{name}={meaning}")[name] if isinstance(meaning, str) else meaning
+        for name, meaning in given.items()
+    }
+
+
+def _corrected(tabulated: Tabulated, found: Mismatch) -> dict[str, tuple[str | float, ...]]:
+    """Return the columns of the files with the corrected simulation and what it leaves."""
+    corrected = found.table.simulated + found.explained
+    columns: dict[str, tuple[str | float, ...]] = {name: tabulated.columns[name] for name in tabulated.names}
+    unit = f"_{found.table.unit.replace('µ', 'u')}" if found.table.unit else ""
+    for name, values in ((CORRECTED, corrected), (LEFT, found.table.measured - corrected)):
+        columns[_unused(f"{name}{unit}", columns)] = tuple(values.tolist())
+    return columns
+
+
+def _unused(name: str, taken: Mapping[str, object]) -> str:
+    """Return a name, or the first of its names with a number that no column has."""
+    return next(one for one in (name, *(f"{name}_{k}" for k in range(2, len(taken) + 3))) if one not in taken)
+
+
+def _drawn(found: Mismatch, wanted: object) -> bytes:
+    from dbbstation.report.figure_format import figure_format  # noqa: PLC0415 - half a second for who draws nothing
+    from dbbstation.report.mismatch_figure import mismatch_figure  # noqa: PLC0415
+
+    return mismatch_figure(found, figure_format(wanted))

@@ -1,0 +1,88 @@
+"""A name has one class, and results have fields: counted in the source, so that neither gets worse unnoticed."""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+import dbbstation
+
+PACKAGE = Path(dbbstation.__file__).parent
+
+MOST_LOOSE_FILES = 12
+"""Files that stand in no folder of the package."""
+
+MOST_ANONYMOUS_DICTIONARIES = 141
+"""How often `dict[str, Any]` is written: dictionaries of which nobody says what is in them."""
+
+MOST_SUBSCRIPTS = 503
+"""How often the command line takes a value by a key that is written out, where a typed result would have a field."""
+
+
+@pytest.fixture(scope="module")
+def trees():
+    """Every file of the package, parsed, by its path."""
+    return {path.relative_to(PACKAGE): ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def public_classes(trees):
+    found = defaultdict(list)
+    for path, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found[node.name].append(str(path))
+    return found
+
+
+def is_anonymous_dictionary(node):
+    return isinstance(node, ast.Subscript) and ast.unparse(node) == "dict[str, Any]"
+
+
+def is_key(node):
+    return (
+        isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant) and isinstance(node.slice.value, str)
+    )
+
+
+def count(trees, is_one, folder=""):
+    chosen = [tree for path, tree in trees.items() if path.parts[0].startswith(folder)]
+    return sum(is_one(node) for tree in chosen for node in ast.walk(tree))
+
+
+def test_no_two_public_classes_have_one_name(trees):
+    assert {name: files for name, files in public_classes(trees).items() if len(files) > 1} == {}
+
+
+def test_loose_files_do_not_become_more(trees):
+    assert sum(len(path.parts) == 1 for path in trees) <= MOST_LOOSE_FILES
+
+
+def test_dictionaries_of_anything_do_not_become_more(trees):
+    assert count(trees, is_anonymous_dictionary) <= MOST_ANONYMOUS_DICTIONARIES
+
+
+def test_keys_in_the_command_line_do_not_become_more(trees):
+    assert count(trees, is_key, "cli") <= MOST_SUBSCRIPTS
+
+
+def test_counts_find_what_they_look_for():
+    tree = {Path("cli/a.py"): ast.parse("class A: ...\nclass A: ...\nx: dict[str, Any] = y['key']\n")}
+    assert public_classes(tree)["A"] == ["cli/a.py", "cli/a.py"]
+    assert (count(tree, is_anonymous_dictionary), count(tree, is_key, "cli"), count(tree, is_key, "nc")) == (1, 1, 0)
+
+
+def starts_the_command_line(tree):
+    """Whether a list of words begins a process of the command line: `python -m dbbstation`."""
+    words = [
+        [one.value for one in node.elts if isinstance(one, ast.Constant)]
+        for node in ast.walk(tree)
+        if isinstance(node, ast.List | ast.Tuple)
+    ]
+    return any("-m" in one and "dbbstation" in one for one in words)
+
+
+def test_nobody_but_the_demonstration_starts_the_command_line(trees):
+    assert [str(path) for path, tree in trees.items() if starts_the_command_line(tree)] == ["demo.py"]

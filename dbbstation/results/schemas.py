@@ -8,6 +8,7 @@ from dbbstation.results.calibration import CalibrationResult
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.diagnosis import DiagnosisResult
 from dbbstation.results.evaluation import EvaluationResult
+from dbbstation.results.fleet import FleetResult
 from dbbstation.results.prediction import PredictionResult
 from dbbstation.results.programs import ProgramsResult
 from dbbstation.results.serialise import schema_of
@@ -18,6 +19,7 @@ RESULTS: dict[str, type] = {
     "compensate": ProgramsResult,
     "diagnose": DiagnosisResult,
     "evaluate": EvaluationResult,
+    "fleet": FleetResult,
     "predict": PredictionResult,
     "program": ProgramsResult,
 }

@@ -8,6 +8,7 @@ from dbbstation.results.calibration import CalibrationResult
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.diagnosis import DiagnosisResult
 from dbbstation.results.evaluation import EvaluationResult
+from dbbstation.results.fleet import FleetResult
 from dbbstation.results.mismatch import MismatchResult
 from dbbstation.results.prediction import PredictionResult
 from dbbstation.results.programs import ProgramsResult
@@ -20,6 +21,7 @@ RESULTS: dict[str, type] = {
     "diagnose": DiagnosisResult,
     "evaluate": EvaluationResult,
     "mismatch": MismatchResult,
+    "fleet": FleetResult,
     "predict": PredictionResult,
     "program": ProgramsResult,
 }

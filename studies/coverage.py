@@ -15,7 +15,7 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.virtual.truth import random_kinematics
-from studies.fleet import over_machines
+from studies.random_machines import over_machines
 from studies.virtual_session import draw_session
 
 if TYPE_CHECKING:

@@ -20,8 +20,8 @@ from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import sources_named
 from dbbstation.trace.analysis import best_circle, figures
 from dbbstation.virtual.truth import random_kinematics
-from studies.fleet import over_machines
 from studies.gravity_sequential import Compliance, compliance_from_profiles, with_gravity
+from studies.random_machines import over_machines
 from studies.virtual_session import draw_session
 
 if TYPE_CHECKING:

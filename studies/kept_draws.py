@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import StationError
-from studies.fleet import over_machines
+from studies.random_machines import over_machines
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -23,7 +23,7 @@ from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from dbbstation.trace.analysis import figures
 from dbbstation.virtual.truth import random_kinematics
-from studies.fleet import over_machines
+from studies.random_machines import over_machines
 from studies.virtual_session import draw_session
 
 if TYPE_CHECKING:

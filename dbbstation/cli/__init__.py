@@ -40,6 +40,7 @@ COMMANDS = {
     "emulate": "A virtual machine with a ball bar, on a line of its own.",
     "evaluate": "Circle by circle: what a model leaves of recordings.",
     "export": "Sessions as one tidy table, CSV or Parquet.",
+    "fleet": "One task on many sessions; which machines are unlike.",
     "history": "A folder of sessions as trends, and what changed.",
     "import": "Take recordings that another program made into a session.",
     "instruments": "List the known instruments.",

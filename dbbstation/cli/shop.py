@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 SETTINGS_OPTION = "settings"
 """Name of the program's option `--settings FILE`, which replaces both files that are looked for."""
 
-_SESSIONS = ("sessions", "folder", "a")
+_SESSIONS = ("sessions", "folder", "folders", "a")
 """Names of the arguments that are sessions."""
 
 _MADE = frozenset({"measure", "station", "simulate"})
 """Commands whose `--out` is a session."""
 
-_OF_FOLDERS = frozenset({"history"})
+_OF_FOLDERS = frozenset({"fleet", "history"})
 """Commands whose folder holds sessions, and is none."""
 
 _KEPT, _TAKEN, _LEFT = "dbbstation.settings", "dbbstation.settings.taken", "dbbstation.settings.left"

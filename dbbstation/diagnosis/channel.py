@@ -22,7 +22,7 @@ from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import Block, compress, with_random
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -133,6 +133,12 @@ class CircleChannel:
     def source_of(self, name: str, variant: Variant) -> ErrorSource:
         """Source that a form of a cause is of: a cause may have one form over time, and one by thermometers."""
         return self.sources[name, variant.law]
+
+    def forms(self, but_for: Collection[str]) -> Iterator[tuple[Variant, float]]:
+        """Forms of named causes but for some, as laid out first, and by how much their formulas may be off, as a share."""
+        for (name, law), variants in self._laid.items():
+            if name not in but_for:
+                yield from ((variant, self.sources[name, law].form_uncertainty) for variant in variants)
 
     def happens_once(self, name: str) -> bool:
         """Whether a cause acts once in a session, so that no other tests can show it again."""

@@ -19,7 +19,7 @@ from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.explained import MOST_MEMBERS, Explained, SettledCircles
 from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
-from dbbstation.inference.alternatives import in_place_of
+from dbbstation.inference.alternatives import in_place_of, named_already
 from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.settle import impossibly_negative
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.outliers.outlier import Fit, Outlier
     from dbbstation.inference.harmonics import Spectrum
-    from dbbstation.inference.model_comparison import Member, ModelComparison
+    from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.projection import BesideBase
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
@@ -127,7 +127,7 @@ def _settle(channel: CircleChannel, progress: Callable[[str], None]) -> SettledC
         noise_mm = float(np.sqrt(noise.power[0]))
         beside = channel.beside_base(noise_mm, scatter)
         comparison = beside.comparison(target)
-        causes = (*(c for c in channel.named if c.name not in refused), *channel.set_up, *unmodelled.causes)
+        causes = _listed(channel, unmodelled, comparison, refused)
         named_causes = [cause for cause in causes if cause.named]
         posterior = search(comparison, causes, seeds.values(), most_members=MOST_MEMBERS)
         if posterior.at_limit:
@@ -170,6 +170,15 @@ def _settle(channel: CircleChannel, progress: Callable[[str], None]) -> SettledC
             unmodelled.look(fit, [m for m in best.members if m.cause.named], noise_mm)
             looked = True
     return _fitted_as_named(channel, settled)
+
+
+def _listed(
+    channel: CircleChannel, unmodelled: Unmodelled, comparison: ModelComparison, refused: Collection[str]
+) -> tuple[Cause, ...]:
+    """Causes that are compared: those with a name, faults of the set-up, and effects that none of the former has among its forms."""
+    known = named_already(comparison, unmodelled.causes, channel.forms(but_for=refused))
+    nameless = [cause for cause in unmodelled.causes if cause.name not in known]
+    return (*(c for c in channel.named if c.name not in refused), *channel.set_up, *nameless)
 
 
 def _without_a_name(channel: CircleChannel, unmodelled: Unmodelled, noise: Spectrum, scatter: float) -> SettledCircles:

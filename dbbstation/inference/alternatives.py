@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.hypotheses import Hypothesis, Posterior
-    from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
+    from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
 
 EVEN = 0.5
 """Probability from which on a cause that is not certain is rather there than not."""
@@ -126,6 +126,33 @@ class Alternatives:
         a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
         cosines = np.linalg.svd(_inverse_root(a) @ across @ _inverse_root(b), compute_uv=False)
         return float(min(cosines.min(), 1.0)) if len(cosines) else 0.0
+
+
+def named_already(
+    comparison: ModelComparison, nameless: Sequence[Cause], named: Iterable[tuple[Variant, float]]
+) -> frozenset[str]:
+    """Effects without a name, of one amplitude, that a named cause has among its forms, within what its formula may be off by.
+
+    They are that cause and no hypothesis of their own: listed beside it they would share its probability.
+
+    Args:
+        comparison: of columns.
+        nameless: effects without a name.
+        named: forms of named causes, and by how much their formula may be off, as a share of the effect.
+    """
+    forms = [(variant.columns[0], share) for variant, share in named if len(variant.columns) == 1 and share > 0.0]
+    single = [cause for cause in nameless if len(cause.variants[0].columns) == 1]
+    if not forms or not single:
+        return frozenset()
+    columns = np.array(
+        [*(int(cause.variants[0].columns[0]) for cause in single), *(int(column) for column, _ in forms)]
+    )
+    products = comparison.beside((), columns)
+    size = np.sqrt(np.maximum(np.diag(products), 1e-300))
+    cosine = np.abs(products[: len(single), len(single) :]) / np.outer(size[: len(single)], size[len(single) :])
+    apart = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+    inside = (apart <= [share for _, share in forms]).any(axis=1)
+    return frozenset(cause.name for cause, is_inside in zip(single, inside, strict=True) if is_inside)
 
 
 def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[Member]:

@@ -9,6 +9,7 @@ from dbbstation.results.circles import CirclesResult
 from dbbstation.results.diagnosis import DiagnosisResult
 from dbbstation.results.drive import DriveResult
 from dbbstation.results.evaluation import EvaluationResult
+from dbbstation.results.fleet import FleetResult
 from dbbstation.results.mismatch import MismatchResult
 from dbbstation.results.prediction import PredictionResult
 from dbbstation.results.programs import ProgramsResult
@@ -22,6 +23,7 @@ RESULTS: dict[str, type] = {
     "drive": DriveResult,
     "evaluate": EvaluationResult,
     "mismatch": MismatchResult,
+    "fleet": FleetResult,
     "predict": PredictionResult,
     "program": ProgramsResult,
 }

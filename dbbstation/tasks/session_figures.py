@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Circle
     from dbbstation.results.circles import MeasuredCircle
     from dbbstation.results.tolerances import ToleratedCircle
@@ -45,8 +46,7 @@ def session_figures(folder: Path) -> SessionFigures:
     with input_book():  # recordings are inputs of what is kept, not of the command that happens to read them
         found = load_circles([folder], TOLERATED)
     session = found.sessions[0]
-    shown = [one for one in found.circles if one.analysis is not None]
-    runs = tuple(map(_figures, shown, tolerated_circles(shown)))
+    runs = run_figures(found.circles)
     moments = [one.entry.started for one in found.circles if one.entry.started is not None]
     return SessionFigures(
         name=session.name,
@@ -63,6 +63,12 @@ def session_figures(folder: Path) -> SessionFigures:
         ),
         anchor=anchor_of(session.seal),
     )
+
+
+def run_figures(circles: Sequence[MeasuredCircle]) -> tuple[RunFigures, ...]:
+    """Return what a history, and a comparison of machines, know of circles; those whose recording shows no circle are left out."""
+    shown = [one for one in circles if one.analysis is not None]
+    return tuple(map(_figures, shown, tolerated_circles(shown)))
 
 
 def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
@@ -149,6 +155,11 @@ def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures
     """
     with input_book():
         identified = read_model(path, every_source(source_files))
+    return ModelFigures(path.name, digest_of(path), dict(identified.sessions), machine_parameters(identified))
+
+
+def machine_parameters(identified: IdentifiedModel) -> tuple[ModelParameter, ...]:
+    """Return the machine's parameters of a model, with uncertainties for their difference from those of another session."""
     u = identified.uncertainties_between_sessions
     parameters = []
     for fitted in identified.model.sources:
@@ -159,4 +170,4 @@ def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures
             parameters.append(
                 _as_printed(ModelParameter(fitted.source.name, parameter.name, float(value), sure, parameter.unit))
             )
-    return ModelFigures(path.name, digest_of(path), dict(identified.sessions), tuple(parameters))
+    return tuple(parameters)

@@ -7,9 +7,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from dbbstation.inference.alternatives import EVEN, Alternatives, standing_out
+from dbbstation.inference.alternatives import EVEN, Alternatives, named_already, standing_out
 from dbbstation.inference.hypotheses import Hypothesis, Posterior
 from dbbstation.inference.verdict import SURE
+from tests.inference.dense import Dense, cause, variant
 
 NAMES = "abcdef"
 
@@ -68,3 +69,20 @@ def test_nothing_is_made_sure_by_what_is_not_there() -> None:
 def test_combinations_stand_out_by_their_eigenvalues() -> None:
     products = np.array([[4.0, 0.0], [0.0, 9.0]])
     assert standing_out(products, np.array([10.0, 1.0])) == pytest.approx([3.0, 20.0])
+
+
+def test_an_effect_that_a_named_cause_has_among_its_forms_is_that_cause(rng) -> None:
+    """The angle between two effects beside the base, from their columns, against what the formula may be off by."""
+    base, effects = rng.normal(size=(60, 3)), rng.normal(size=(60, 4))
+    effects[:, 1] = 2.0 * effects[:, 0] + 0.3 * effects[:, 1] + base[:, 0]
+    dense = Dense(base, effects, np.zeros(60), 0.1)
+    one, other = dense.columns[:, 0], dense.columns[:, 1]
+    apart = float(np.sqrt(1.0 - (one @ other) ** 2 / (one @ one) / (other @ other)))
+    assert 0.05 < apart < 0.3
+    nameless = [cause("alike", variant(1), named=False), cause("curve", variant(1, 2), named=False)]
+    for share, expected in ((1.01 * apart, {"alike"}), (0.99 * apart, set()), (0.0, set())):
+        found = named_already(
+            dense.comparison(), nameless, [(variant(0), share), (variant(3), share), (variant(0, 3), share)]
+        )
+        assert found == expected
+    assert named_already(dense.comparison(), nameless, []) == frozenset()

@@ -242,10 +242,19 @@ def write_model(
         ValueError: the model could not be read back: its covariance is none, or does not fit its rows.
     """
     refuse_existing(path, force=force)
+    write_text(path, model_text(model, provenance), force=force)
+
+
+def model_text(model: IdentifiedModel, provenance: Provenance | None = None) -> str:
+    """Return a model as the text of its file, with where it comes from.
+
+    Raises:
+        ValueError: as `write_model`.
+    """
     data = model_data(model)
     if provenance is not None:
         data["provenance"] = provenance.data()
-    write_text(path, yaml_text({**data, "format": format_for(ModelFile, data)}), force=force)
+    return yaml_text({**data, "format": format_for(ModelFile, data)})
 
 
 def model_data(model: IdentifiedModel) -> dict[str, Any]:

@@ -1,0 +1,199 @@
+"""`dbbstation fleet`: the same task on many sessions, and which machines are unlike their sisters."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from dbbstation.cli.calibrate import names_in
+from dbbstation.cli.chosen_tests import chosen_tests_options
+from dbbstation.cli.number_types import Finite
+from dbbstation.cli.output import echo
+from dbbstation.cli.source_files import source_file_option
+
+if TYPE_CHECKING:
+    from dbbstation.results.fleet import FleetResult
+
+TASKS = ("calibrate", "circles", "diagnose", "report")
+
+ONLY_OF = {
+    "sources": ("calibrate", "diagnose"),
+    "source_files": ("calibrate", "diagnose"),
+    "method": ("calibrate",),
+    "law_over_time": ("calibrate",),
+    "findings": ("circles",),
+}
+"""Tasks that take an option; the others have none such."""
+
+
+@click.command()
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
+@click.option("--do", "task", required=True, type=click.Choice(TASKS), help="What to do of every session.")
+@click.option("--sources", metavar="A,B,...", help="Error sources, as `calibrate` and `diagnose` take them.")
+@source_file_option
+@click.option("--law-over-time", is_flag=True, help="As `calibrate` takes it.")
+@click.option(
+    "--method",
+    type=click.Choice(["jig", "conv-a", "conv-b"]),
+    default="jig",
+    show_default=True,
+    help="As `calibrate` takes it.",
+)
+@click.option("--findings", is_flag=True, help="As `circles` takes it.")
+@chosen_tests_options
+@click.option(
+    "--false-alarms",
+    type=Finite(1e-6, 0.5),
+    default=0.01,
+    show_default=True,
+    help="Probability that like machines show any unlike value.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("fleet"),
+    show_default=True,
+    help="Folder of the results; made where it is not there.",
+)
+@click.option(
+    "--table",
+    "out_table",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the table here too: a .csv or .parquet file.",
+)
+@click.option("--jobs", type=click.IntRange(1), help="Processes of this computer  [default: one for each core].")
+@click.option(
+    "--scheduler", metavar="ADDRESS", default="", help="Dask scheduler that does it, such as tcp://server:8786."
+)
+@click.option("--anew", is_flag=True, help="Work out again what is up to date.")
+@click.option("--force", is_flag=True, help="Replace an existing --table.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def fleet(
+    folders: tuple[Path, ...],
+    *,
+    task: str,
+    sources: str | None,
+    source_files: tuple[Path, ...],
+    law_over_time: bool,
+    method: str,
+    findings: bool,
+    tests: tuple[str, ...],
+    exclude: tuple[str, ...],
+    false_alarms: float,
+    out: Path,
+    out_table: Path | None,
+    jobs: int | None,
+    scheduler: str,
+    anew: bool,
+    force: bool,
+    as_json: bool,
+) -> None:
+    r"""Do one task on every session of some folders, and show which machines are unlike their sisters.
+
+    Writes into --out one table, TASK.csv, one page with a row for each machine, TASK.html, and what each session gave:
+    everything as JSON, the model or the report. A session that fails is named and the others are done; the exit code is 1
+    then. What has the same inputs, options and program as before is not worked out again, so that work that was
+    interrupted goes on where it stopped.
+
+    \b
+    Examples:
+      dbbstation fleet sessions --do calibrate
+      dbbstation fleet hall-1 hall-2 --do diagnose --out diagnosed --json
+      dbbstation fleet sessions --do circles --table circles.parquet
+      dbbstation fleet /srv/ballbar --do calibrate --scheduler tcp://server:8786
+    """
+    from dbbstation.cli.output import print_result, say
+    from dbbstation.cli.progress import count_bar
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.cli.shop import shop_settings
+    from dbbstation.files.atomic import refuse_outputs
+    from dbbstation.files.formats.settings import Settings
+    from dbbstation.tasks.fleet import fleet as worked_out
+    from dbbstation.tasks.fleet_table import FORMATS, write_fleet_table
+    from dbbstation.tasks.fleet_work import FleetOptions
+
+    _refuse_options_of_others(task)
+    if out_table is not None:
+        if out_table.suffix.lower() not in FORMATS:
+            raise click.UsageError(f"--table {out_table}: name a file that ends in {' or '.join(FORMATS)}")
+        refuse_outputs([out_table], force=force)
+    names = names_in(sources)
+    options = FleetOptions(
+        sources=None if names is None else tuple(names),
+        method=method,
+        law_over_time=law_over_time,
+        findings=findings,
+        tests=tests,
+        exclude=exclude,
+        source_files=tuple(path.absolute() for path in source_files),
+        settings=shop_settings() if task == "report" else Settings(),
+    )
+    with count_bar(f"sessions: {task}") as progress:
+        result = worked_out(
+            folders,
+            task,
+            out,
+            options=options,
+            processes=jobs or os.cpu_count() or 1,
+            scheduler=scheduler,
+            false_alarms=false_alarms,
+            anew=anew,
+            provenance=provenance,
+            progress=lambda _, done=0, of=0: progress(done, of),
+            say=say,
+        )
+    if out_table is not None:
+        write_fleet_table(out_table, result, provenance(), force=force)
+    if as_json:
+        print_result(result)
+    else:
+        _print(result)
+    if result.failed:
+        raise click.exceptions.Exit(1)
+
+
+def _refuse_options_of_others(task: str) -> None:
+    """Refuse options that the task does not take, rather than pass over them."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        name = option.name or ""
+        given = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+        if given and task not in ONLY_OF.get(name, (task,)):
+            raise click.UsageError(f"{option.opts[0]} is an option of {' and '.join(ONLY_OF[name])}, not of {task}")
+
+
+def _print(result: FleetResult) -> None:
+    from dbbstation.cli.output import print_table
+    from dbbstation.report.fleet_page import headline_of
+
+    rows = [
+        [one.machine, one.session, one.state, (one.problem or one.headline).splitlines()[0]] for one in result.sessions
+    ]
+    print_table(["machine", "session", "state", "result"], rows)
+    echo()
+    echo(headline_of(result))
+    comparison = result.comparison
+    if comparison is not None:
+        if comparison.quantities:
+            echo(
+                f"{comparison.quantities} quantities compared; like machines show any unlike value with a probability of "
+                f"{comparison.false_alarms:g}"
+            )
+        for one in comparison.unlike:
+            u = "" if one.uncertainty is None else f" (u {one.uncertainty:.2g})"
+            echo(
+                f"  {one.machine}: {one.quantity} {one.value:.4g}{u} {one.unit}, the others {one.usual:.4g} with a scatter of "
+                f"{one.scatter:.2g}"
+            )
+        for cause in comparison.causes:
+            echo(
+                f"  {cause.name}: found in {len(cause.found_in)} of {cause.machines}, {', '.join(cause.found_in)} "
+                f"({cause.false_claims:.2g} false claims expected)"
+            )
+        for note in comparison.notes:
+            echo(f"note: {note}")
+    echo(f"table: {result.table}")
+    echo(f"page:  {result.page}")

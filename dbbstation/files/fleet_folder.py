@@ -1,0 +1,109 @@
+"""The folder of a fleet's results: each whole under its key, so that work that is interrupted loses nothing.
+
+A result is one file under a name with its key; models and pages lie beside it and are written first. Who finds the result finds
+all of it. Two processes at once write the same content under the same name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.errors import OutputError
+from dbbstation.files.atomic import remove_leftovers, write_bytes, write_text
+from dbbstation.files.gateway import content_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+FORMAT = "dbb-fleet-result/1"
+
+_MARK = "fleet.json"
+"""File by which a folder is known to be one of these."""
+
+_SHOWN = 16
+"""Digits of a key that are in names."""
+
+_LONGEST = 60
+"""Characters of a session's name that are in names."""
+
+
+def key_of(what: Mapping[str, Any]) -> str:
+    """Return the key of a result: a SHA-256 over everything that decides what it is."""
+    return hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()
+
+
+class FleetFolder:
+    """Results of one task in a folder.
+
+    Args:
+        folder: made where it is not there.
+        task: name of the task.
+
+    Attributes:
+        folder: as given.
+        table: file for every value.
+        page: file for the page.
+
+    Raises:
+        OutputError: something else lies in the folder, or it cannot be written.
+    """
+
+    def __init__(self, folder: Path, task: str) -> None:
+        mark = folder / _MARK
+        if folder.exists() and not mark.is_file() and (not folder.is_dir() or any(folder.iterdir())):
+            what = "this is no folder of fleet results, and something lies in it"
+            raise OutputError(what, where=str(folder), remedy="name another with --out, or an empty one")
+        self.folder = folder
+        self.table = folder / f"{task}.csv"
+        self.page = folder / f"{task}.html"
+        self._results = folder / task
+        try:
+            self._results.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"cannot be made: {error.strerror}", where=str(self._results)) from error
+        remove_leftovers(folder)
+        if not mark.is_file():
+            write_text(mark, json.dumps({"format": "dbb-fleet/1"}) + "\n")
+
+    def known(self, name: str, key: str) -> dict[str, Any] | None:
+        """Return a result that was kept under a key; None where there is none that can be read."""
+        path = self._file(name, key)
+        try:
+            data = json.loads(content_of(path))
+        except (OSError, ValueError):
+            return None
+        if not isinstance(data, dict) or (data.get("format"), data.get("key")) != (FORMAT, key):
+            return None
+        return data if all((self.folder / file).is_file() for file in data.get("files", ())) else None
+
+    def keep(self, name: str, key: str, data: Mapping[str, Any], files: Mapping[str, bytes]) -> dict[str, Any]:
+        """Keep a result, and return it as `known` would.
+
+        Args:
+            name: of the session.
+            key: of the result.
+            data: what is kept.
+            files: further files, by their ending.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        path = self._file(name, key)
+        for ending, content in files.items():
+            write_bytes(path.with_suffix(ending), content, force=True)
+        places = [path.with_suffix(ending).relative_to(self.folder).as_posix() for ending in files]
+        whole = {"format": FORMAT, "key": key, **data, "files": places}
+        write_text(path, json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False) + "\n", force=True)
+        return whole
+
+    def file_of(self, name: str, key: str) -> str:
+        """Return the path of a result, within the folder."""
+        return self._file(name, key).relative_to(self.folder).as_posix()
+
+    def _file(self, name: str, key: str) -> Path:
+        plain = re.sub(r"[^A-Za-z0-9_-]+", "-", name)[-_LONGEST:].strip("-") or "session"
+        return self._results / f"{plain}-{key[:_SHOWN]}.json"

@@ -1,0 +1,58 @@
+"""Which program works here: what results depend on beside their inputs, and by what two computers know that they run the same."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from functools import cache
+from importlib.metadata import version
+from importlib.resources import as_file, files
+
+from dbbstation import __version__
+from dbbstation.files.gateway import content_of
+
+ENDINGS = frozenset({".py", ".html", ".css", ".js"})
+"""Files of the package that decide what comes out."""
+
+LIBRARIES = ("numpy", "scipy", "numba", "pydantic")
+"""Libraries that work out numbers, or write them."""
+
+
+@cache
+def program_identity() -> dict[str, str]:
+    """Return version and content of the program, and the versions of Python and of the libraries that it computes with.
+
+    The content is a SHA-256 over the files of the package: two checkouts may have one version.
+    """
+    return {
+        "dbbstation": __version__,
+        "code": code_digest(),
+        "python": ".".join(platform.python_version_tuple()[:2]),
+        **{name: version(name) for name in LIBRARIES},
+    }
+
+
+@cache
+def code_digest() -> str:
+    """Return a SHA-256 over all files of the package that decide what comes out, with their names."""
+    digest = hashlib.sha256()
+    with as_file(files("dbbstation")) as folder:
+        for path in sorted(path for path in folder.rglob("*") if path.suffix in ENDINGS):
+            digest.update(path.relative_to(folder).as_posix().encode() + b"\0")
+            digest.update(hashlib.sha256(content_of(path)).digest())
+    return digest.hexdigest()
+
+
+def differences_of(one: dict[str, str], other: dict[str, str]) -> str:
+    """Return in words what differs between two programs; empty where nothing does.
+
+    Args:
+        one: this one.
+        other: another one.
+    """
+    names = [name for name in dict.fromkeys([*one, *other]) if one.get(name) != other.get(name)]
+    return ", ".join(f"{name} {_short(other, name)} and not {_short(one, name)}" for name in names)
+
+
+def _short(identity: dict[str, str], name: str) -> str:
+    return identity.get(name, "none")[:12]

@@ -1,0 +1,207 @@
+"""Which of many machines is unlike its sisters in some quantity, at a stated rate of false alarms.
+
+Machines that are alike scatter normally about a middle, by a scatter that is the same for all of them, and each value has its
+own standard uncertainty beside. Middle and scatter are estimated from the machines themselves: by weights, the scatter as Paule and
+Mandel do [Paule and Mandel 1982, J. Res. NBS 87, 377; DerSimonian and Kacker 2007, Contemp. Clin. Trials 28, 105]. A machine that is
+unlike the others must not hide itself or another one in these estimates. So the machine that is farthest off is taken out, again and
+again up to a quarter of them, each held against those that are left; the last that is too far off for chance shows how many are unlike
+[Rosner 1983, Technometrics 25, 165]. Of one machine this is the test of Grubbs, which is exact where uncertainties are alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import ndtri, stdtr, stdtrit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FALSE_ALARMS = 0.01
+"""Probability that a fleet of like machines shows any unlike value."""
+
+FEWEST = 3
+"""Machines from which on one of them can be unlike: the others have a scatter."""
+
+MOST_UNLIKE = 4
+"""One machine in so many may be unlike: where more are, they are a kind of their own, and nobody knows which is which."""
+
+_STEPS = 100
+"""Newton's steps for the scatter; it comes from one side and takes a dozen."""
+
+_SETTLED = 1e-12
+"""Share of the variance below which a step changes nothing."""
+
+_SMALLEST = 1e-300
+"""Probabilities below it are taken for it: the score that belongs to it is 37, far beyond every limit."""
+
+_ROUNDED = 1e-12
+"""Share of a value below which two values differ by rounding only."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sisters:
+    """Machines held against their sisters, quantity by quantity; arrays have shape (q, n), NaN where nothing is known.
+
+    Attributes:
+        unlike: whether a machine is unlike its sisters.
+        score: standard normal where it is like them, from those that are not unlike.
+        middle: of those sisters, in the quantity's unit.
+        scatter: their standard deviation beyond their uncertainties, in the quantity's unit.
+        smallest_seen: departure from the middle from which on a machine would count as unlike, in the quantity's unit.
+    """
+
+    unlike: NDArray[np.bool_]
+    score: NDArray[np.float64]
+    middle: NDArray[np.float64]
+    scatter: NDArray[np.float64]
+    smallest_seen: NDArray[np.float64]
+
+
+def held_against_sisters(
+    values: NDArray[np.float64], u: NDArray[np.float64], false_alarms: float = FALSE_ALARMS
+) -> Sisters:
+    """Hold machines against their sisters.
+
+    Args:
+        values: of each quantity and machine, shape (q, n); NaN where a machine has none.
+        u: standard uncertainties, in the same units, shape (q, n); NaN or 0 where not known: the scatter covers them then.
+        false_alarms: probability of any unlike value where all machines are alike, all quantities and machines together.
+    """
+    unlike = unlike_machines(values, u, false_alarms)
+    return _scored(values, u, unlike, _share(values, false_alarms))
+
+
+def unlike_machines(
+    values: NDArray[np.float64], u: NDArray[np.float64], false_alarms: float = FALSE_ALARMS
+) -> NDArray[np.bool_]:
+    """Return which machines are unlike their sisters, shape (q, n); arguments as those of `held_against_sisters`."""
+    known = np.isfinite(values)
+    left = known.copy()
+    variance = np.where(np.isfinite(u), u, 0.0) ** 2
+    counts = known.sum(axis=1)
+    most = np.where(counts >= FEWEST, np.maximum(counts // MOST_UNLIKE, 1), 0)
+    rows = np.arange(len(values))
+    removed_at = np.full(values.shape, 0)
+    found = np.zeros(len(values), dtype=np.int64)
+    share = _share(values, false_alarms)
+    for step in range(1, int(most.max(initial=0)) + 1):
+        going = step <= most
+        middle, square = _middle(values, variance, left)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = np.abs(values - middle[:, None]) / np.sqrt(square[:, None] + variance)
+        off = np.where(left, np.nan_to_num(off, nan=0.0, posinf=np.inf), -1.0)
+        farthest = off.argmax(axis=1)
+        others = left.copy()
+        others[rows, farthest] = False
+        probability = 2.0 * _departure(values, variance, others, farthest).beyond
+        signal = going & (probability * left.sum(axis=1) < share)
+        found[signal] = step
+        removed_at[rows[going], farthest[going]] = step
+        left = np.where(going[:, None], others, left)
+    return (removed_at > 0) & (removed_at <= found[:, None])
+
+
+def _share(values: NDArray[np.float64], false_alarms: float) -> float:
+    """Return the false alarms that one quantity may give: all together give as many as are stated [Bonferroni]."""
+    compared = int((np.isfinite(values).sum(axis=1) >= FEWEST).sum())
+    return false_alarms / max(compared, 1)
+
+
+def _middle(
+    values: NDArray[np.float64], variance: NDArray[np.float64], taken: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return weighted mean and squared scatter of the machines that are taken, shape (q,) each.
+
+    The scatter solves sum((x - mean)^2 / (scatter^2 + u^2)) = n - 1, or is zero where the left side is less with none. Newton's
+    steps begin below the solution: with the greatest u for all, every weight is as small as it can be.
+    """
+    count = taken.sum(axis=1)
+    x = np.where(taken, values, 0.0)
+    u2 = np.where(taken, variance, 0.0)
+    plain = x.sum(axis=1) / np.maximum(count, 1)
+    about = np.where(taken, x - plain[:, None], 0.0)
+    freedom = np.maximum(count - 1, 1)
+    spread = (about**2).sum(axis=1) / freedom
+    floor = (_ROUNDED * np.abs(x).max(axis=1, initial=0.0)) ** 2 + np.finfo(float).tiny
+    square = np.maximum(spread - u2.max(axis=1, initial=0.0), 0.0)
+    mean = np.zeros(len(values))
+    for _ in range(_STEPS):
+        weight = np.where(taken, 1.0 / (square[:, None] + u2 + floor[:, None]), 0.0)
+        mean = (weight * about).sum(axis=1) / np.maximum(weight.sum(axis=1), np.finfo(float).tiny)
+        residual = np.where(taken, about - mean[:, None], 0.0)
+        excess = (weight * residual**2).sum(axis=1) - freedom
+        slope = (weight**2 * residual**2).sum(axis=1)
+        step = np.where((excess > 0.0) & (slope > 0.0), excess / np.where(slope > 0.0, slope, 1.0), 0.0)
+        square = square + step
+        if np.all(step <= _SETTLED * (square + floor)):
+            break
+    return plain + mean, square + floor
+
+
+@dataclass(frozen=True, eq=False)
+class _Departure:
+    """One machine of each quantity, held against others; arrays have shape (q,).
+
+    Attributes:
+        off: its departure from their middle.
+        spread: standard deviation of that where it is like them.
+        freedom: degrees of freedom of `spread`.
+        middle: of the others.
+        scatter: of the others.
+    """
+
+    off: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    freedom: NDArray[np.float64]
+    middle: NDArray[np.float64]
+    scatter: NDArray[np.float64]
+
+    @property
+    def beyond(self) -> NDArray[np.float64]:
+        """Probability of that much on this side, by Student's t; not a number counts as a half."""
+        probability = stdtr(self.freedom, -np.abs(self.off) / self.spread)
+        return np.asarray(np.where(np.isfinite(probability), probability, 0.5))
+
+
+def _departure(
+    values: NDArray[np.float64], variance: NDArray[np.float64], others: NDArray[np.bool_], machine: NDArray[np.int64]
+) -> _Departure:
+    """Hold one machine of each quantity against the others.
+
+    A scatter that values of unlike uncertainty tell is known less well than their number says: its degrees of freedom are
+    those of Satterthwaite, by the Fisher information of the scatter [Viechtbauer 2005, J. Educ. Behav. Stat. 30, 261].
+    """
+    rows = np.arange(len(values))
+    middle, square = _middle(values, variance, others)
+    weight = np.where(others, 1.0 / (square[:, None] + variance), 0.0)
+    of_middle = 1.0 / np.maximum(weight.sum(axis=1), np.finfo(float).tiny)
+    of_one = square + variance[rows, machine]
+    count = np.maximum(others.sum(axis=1), 2)
+    information = of_one**2 * (weight**2).sum(axis=1) * (count - 1.0) / count
+    freedom = np.clip(information, 1.0, count - 1.0)
+    return _Departure(values[rows, machine] - middle, np.sqrt(of_one + of_middle), freedom, middle, np.sqrt(square))
+
+
+def _scored(values: NDArray[np.float64], u: NDArray[np.float64], unlike: NDArray[np.bool_], share: float) -> Sisters:
+    variance = np.where(np.isfinite(u), u, 0.0) ** 2
+    alike = np.isfinite(values) & ~unlike
+    score, middle, scatter, smallest = (np.full(values.shape, np.nan) for _ in range(4))
+    for machine in range(values.shape[1]):
+        others = alike.copy()
+        others[:, machine] = False
+        count = others.sum(axis=1)
+        shown = np.isfinite(values[:, machine]) & (count >= FEWEST - 1)
+        at = np.full(len(values), machine)
+        found = _departure(values, variance, others, at)
+        limit = -stdtrit(found.freedom, share / (2.0 * (count + 1.0)))
+        for of_all, one in (
+            (score, -np.sign(found.off) * ndtri(np.maximum(found.beyond, _SMALLEST))),
+            (middle, found.middle),
+            (scatter, found.scatter),
+            (smallest, limit * found.spread),
+        ):
+            of_all[shown, machine] = one[shown]
+    return Sisters(unlike, score, middle, scatter, smallest)

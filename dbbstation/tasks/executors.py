@@ -1,0 +1,182 @@
+"""Where pieces of work are done: in processes of this computer, or by the workers of a Dask scheduler. One way for both."""
+
+from __future__ import annotations
+
+from collections import deque
+from concurrent.futures import BrokenExecutor, CancelledError, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from dbbstation.errors import StationError
+from dbbstation.files.program_identity import differences_of, program_identity
+from dbbstation.processes import deaf, processes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterator, Sequence
+    from concurrent.futures import Executor
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+REACHED_S = 10.0
+"""How long a scheduler may take to answer, and its first worker to be there [s]."""
+
+
+class SchedulerError(StationError):
+    """A scheduler is not there, has no workers, or workers with another program."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A piece of work whose process ended before it was done, also where it worked alone.
+
+    Attributes:
+        why: in words.
+    """
+
+    why: str
+
+
+@dataclass(frozen=True)
+class Workplace(Generic[Item, Result]):
+    """Where work is done.
+
+    Attributes:
+        count: processes of this computer.
+        scheduler: address of a Dask scheduler, such as `tcp://server:8786`; empty for this computer.
+    """
+
+    count: int = 1
+    scheduler: str = ""
+
+    @contextmanager
+    def executor(self, count: int) -> Iterator[Executor]:
+        """Yield an executor; all that it does ends where this process is interrupted.
+
+        Args:
+            count: of processes, where they are this computer's.
+
+        Raises:
+            SchedulerError: there is no such scheduler; its workers have another program, or several threads.
+        """
+        if self.scheduler:
+            with _of_dask(self.scheduler) as pool:
+                yield pool
+        else:
+            with processes(count) as pool:
+                yield pool
+
+    def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> Generator[tuple[int, Result | Ended]]:
+        """Yield the place of an item and what was worked out of it, each once, as they are done.
+
+        A process that ends while it works takes nothing with it but what it worked on: that is done anew. Dask does so by
+        itself. A pool of this computer is begun anew; what may have ended it is done piece by piece, one process for each, and
+        what ends that, too, is `Ended`.
+
+        Args:
+            work: can be sent to another process: a function of a module.
+            items: can be sent too.
+
+        Raises:
+            SchedulerError: as `executor`; the scheduler went away.
+            Exception: whatever `work` raises.
+        """
+        left = deque(range(len(items)))
+        while left:
+            count = min(self.count, len(left))
+            broken = yield from self._in_pool(work, items, left, count)
+            suspects = [left.popleft() for _ in range(min(count, len(left)))] if broken else []
+            for place in suspects:
+                alone = deque([place])
+                if (yield from self._in_pool(work, items, alone, 1)):
+                    yield place, Ended("its process was ended, twice: by the system, where memory ran out")
+
+    def _in_pool(
+        self, work: Callable[[Item], Result], items: Sequence[Item], left: deque[int], count: int
+    ) -> Generator[tuple[int, Result | Ended], None, bool]:
+        """Do what is left, and take what is done off it; return whether the pool broke."""
+        with self.executor(count) as pool:
+            with deaf():
+                futures = {pool.submit(work, items[place]): place for place in left}
+            for future in as_completed(futures):
+                place = futures.pop(future)
+                try:
+                    result: Result | Ended = future.result()
+                except BrokenExecutor:
+                    return True
+                except CancelledError as error:
+                    raise SchedulerError(
+                        "the scheduler went away", where=self.scheduler, remedy="start it, and give the command again"
+                    ) from error
+                except Exception as error:
+                    if not _is_killed(error):
+                        raise
+                    result = Ended("its worker was ended, several times: by the system, where memory ran out")
+                left.remove(place)
+                yield place, result
+        return False
+
+
+def _is_killed(error: Exception) -> bool:
+    """Whether Dask gave a piece up because every worker that took it ended."""
+    return type(error).__name__ == "KilledWorker"
+
+
+@contextmanager
+def _of_dask(address: str) -> Iterator[Executor]:
+    try:
+        from distributed import Client  # noqa: PLC0415 - an extra that only this needs
+    except ImportError as error:
+        remedy = "install it with `pip install 'dbbstation[dask]'`"
+        raise SchedulerError("distributed, Dask's scheduler, is not installed", remedy=remedy) from error
+    try:
+        client = Client(address, timeout=REACHED_S, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        what = f"no scheduler answers: {str(error) or type(error).__name__}"
+        raise SchedulerError(
+            what, where=address, remedy="check the address; docs/fleet.md says how to start one"
+        ) from error
+    try:
+        _check_workers(client, address)
+        pool = client.get_executor(pure=False)
+        try:
+            yield pool
+        except BaseException:
+            pool.shutdown(wait=False)
+            raise
+    finally:
+        client.close()
+
+
+def _check_workers(client: Any, address: str) -> None:  # noqa: ANN401 - distributed ships no types
+    """Refuse workers that would work otherwise than this process."""
+    try:
+        client.wait_for_workers(1, timeout=REACHED_S)
+    except TimeoutError as error:
+        raise SchedulerError("the scheduler has no workers", where=address, remedy="start some") from error
+    for worker, about in client.scheduler_info(n_workers=-1)["workers"].items():
+        if about["nthreads"] != 1:
+            what = f"the worker {worker} has {about['nthreads']} threads, which wait for one another"
+            raise SchedulerError(what, where=address, remedy="start workers with --nthreads 1, one for each core")
+    try:
+        found = client.run(program_identity)
+    except Exception as error:
+        what = f"a worker has no dbbstation, or another one: {type(error).__name__}: {error}"
+        raise SchedulerError(what, where=address, remedy="install the same version there") from error
+    for worker, identity in found.items():
+        refuse_other_program(identity, f"the worker {worker}")
+
+
+def refuse_other_program(identity: dict[str, str], whose: str) -> None:
+    """Refuse a program that differs from this one: its numbers would not be those of this one.
+
+    Args:
+        identity: of the other.
+        whose: in words.
+
+    Raises:
+        SchedulerError: it differs.
+    """
+    if unlike := differences_of(program_identity(), identity):
+        raise SchedulerError(f"{whose} has another program: {unlike}", remedy="install the same version everywhere")

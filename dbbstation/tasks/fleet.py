@@ -1,0 +1,296 @@
+"""Fleet: the same task on many sessions, each once, on this computer or on those of a Dask scheduler."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.counting import natural
+from dbbstation.errors import StationError
+from dbbstation.files.atomic import write_bytes
+from dbbstation.files.fleet_folder import FleetFolder, key_of
+from dbbstation.files.gateway import digest_of
+from dbbstation.files.inputs import input_book, note_known
+from dbbstation.files.places import real_path, text_of_name
+from dbbstation.files.program_identity import program_identity
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
+from dbbstation.files.recordings.session import read_session
+from dbbstation.files.recordings.session_name import SESSION_FILE
+from dbbstation.report.fleet_page import fleet_html
+from dbbstation.results.fleet import FleetFound, FleetResult, FleetSession, found_from
+from dbbstation.sisters.unlike import FALSE_ALARMS
+from dbbstation.tasks.executors import Ended, Workplace
+from dbbstation.tasks.fleet_compare import Sister, compared
+from dbbstation.tasks.fleet_table import write_fleet_table
+from dbbstation.tasks.fleet_work import TASKS, FleetOptions, Piece, Worked, worked
+from dbbstation.tasks.load import paths_of
+from dbbstation.tasks.provenance import from_python
+from dbbstation.tasks.telling import Telling, never, silent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.tasks.load import Sessions
+    from dbbstation.tasks.telling import Progress
+
+WORKING = "sessions"
+"""Stage in which sessions are worked on."""
+
+DEFAULT_FOLDER = "fleet"
+
+AS_USUAL = FleetOptions()
+"""What a task does of a session where nothing else is asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Named:
+    """A session of the fleet.
+
+    Attributes:
+        name: its path in the folder that was named.
+        folder: where it is.
+        session: what its file says; None where that cannot be read.
+        inputs: SHA-256 of the files that decide what comes out of it.
+        problem: why it cannot be read; empty where it can.
+    """
+
+    name: str
+    folder: Path
+    session: SessionFolder | None = None
+    inputs: Mapping[str, str] | None = None
+    problem: str = ""
+
+    @property
+    def machine(self) -> str:
+        """Serial number of the machine, or the name in its file."""
+        return "" if self.session is None else self.session.serial_number or self.session.machine.name
+
+    @property
+    def started(self) -> str | None:
+        """Start of the first run that says when it started."""
+        moments = () if self.session is None else [run.started for run in self.session.runs if run.started is not None]
+        return min(moments).isoformat() if moments else None
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    session: FleetSession
+    found: FleetFound | None
+
+
+def fleet(
+    folders: Sessions,
+    task: str,
+    out: str | Path = DEFAULT_FOLDER,
+    *,
+    options: FleetOptions = AS_USUAL,
+    processes: int = 1,
+    scheduler: str = "",
+    false_alarms: float = FALSE_ALARMS,
+    anew: bool = False,
+    provenance: Callable[[], Provenance] = from_python,
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
+) -> FleetResult:
+    """Do one task on every session of some folders, and hold the machines against one another.
+
+    Each result is written whole as soon as it is there. What has the same inputs, options and program as one that is kept is not
+    worked out again. A session that fails is named, and the others are done.
+
+    Args:
+        folders: that hold session folders, at most four folders deep, or session folders.
+        task: `calibrate`, `circles`, `diagnose` or `report`.
+        out: folder of the results.
+        options: of the task.
+        processes: of this computer.
+        scheduler: address of a Dask scheduler whose workers do it in place of them; empty for none.
+        false_alarms: probability that like machines show any value as unlike.
+        anew: work everything out again.
+        provenance: asked, when all is done, where table and page come from.
+        progress: told how many sessions are done.
+        stop: asked after each session whether to stop.
+        say: told what is noticed.
+
+    Raises:
+        InputError: a folder holds no session.
+        OutputError: the folder of the results holds something else, or cannot be written.
+        SchedulerError: there is no such scheduler, or its workers have another program.
+        StoppedError: `stop` returned True; what was done is kept.
+    """
+    if task not in TASKS:
+        raise StationError(f"there is no task {task!r} for a fleet", remedy=f"it is one of {', '.join(TASKS)}")
+    telling = Telling(progress, stop, say)
+    kept = FleetFolder(Path(out), task)
+    with input_book():
+        named = _once(_sessions(paths_of(folders), telling), telling)
+        extra = {str(path): digest_of(path) for path in options.source_files}
+    program = program_identity()
+    about = {"task": task, "options": _plain(options), "sources": list(extra.values()), "program": program}
+    keys = {
+        place: key_of({**about, "inputs": {Path(p).name: d for p, d in one.inputs.items()}, "name": one.folder.name})
+        for place, one in enumerate(named)
+        if one.inputs is not None
+    }
+    outcomes: dict[int, _Outcome] = {}
+    todo = []
+    for place, one in enumerate(named):
+        if one.problem:
+            outcomes[place] = _failed(one, one.problem)
+        elif not anew and (data := kept.known(one.name, keys[place])) is not None:
+            outcomes[place] = _known(one, kept, data, fresh=False)
+        else:
+            todo.append(place)
+    pieces = [
+        Piece(task, real_path(named[place].folder), options, {**(named[place].inputs or {}), **extra}, program)
+        for place in todo
+    ]
+    workplace: Workplace[Piece, Worked] = Workplace(min(processes, len(pieces)), scheduler)
+    telling.stage(WORKING, 0, len(pieces))
+    with closing(workplace.each(worked, pieces)) as results:
+        for done, (at, outcome) in enumerate(results, start=1):
+            place = todo[at]
+            outcomes[place] = _taken(named[place], kept, keys[place], outcome)
+            if outcomes[place].found is None:
+                say(f"failed: {named[place].name}: {outcomes[place].session.problem}")
+            telling.stage(WORKING, done, len(pieces))
+    result = _result(task, kept, named, [outcomes[place] for place in range(len(named))], false_alarms)
+    for one in named:
+        if one.session is not None:
+            note_known(one.folder / SESSION_FILE, one.session.sha256)
+    write_fleet_table(kept.table, result, provenance(), force=True)
+    write_bytes(kept.page, fleet_html(result, provenance()), force=True)
+    return result
+
+
+def _sessions(folders: Sequence[Path], telling: Telling) -> Iterator[_Named]:
+    """Yield every session that some folders hold, in the order in which people count."""
+    for folder in folders:
+        if (folder / SESSION_FILE).is_file() or folder.name == SESSION_FILE:
+            place = folder.parent if folder.name == SESSION_FILE else folder
+            yield _read(real_path(place).name, place)
+            continue
+        found = files_of(folder)
+        for name, why in found.closed:
+            telling.note(f"{name}: {why}")
+        for name in sorted(found.sessions, key=natural):
+            yield _read(name.removesuffix(f"/{SESSION_FILE}"), found.sessions[name].parent)
+
+
+def _read(name: str, folder: Path) -> _Named:
+    """Read what a session says of itself, and hash what decides its results."""
+    name = text_of_name(name)
+    try:
+        session = read_session(folder)
+        runs = [run for run in session.runs if run.state is RunState.ACCEPTED]
+        files = [folder / SESSION_FILE, session.machine_path, session.plan_path, *(run.path for run in runs)]
+        files += [run.program.path for run in runs if run.program is not None]
+        inputs = {str(real_path(path)): digest_of(path) for path in dict.fromkeys(files)}
+    except OSError as error:
+        return _Named(name, folder, problem=reason_of(error))
+    except StationError as error:
+        return _Named(name, folder, problem=str(error))
+    return _Named(name, folder, session, inputs)
+
+
+def _once(sessions: Iterator[_Named], telling: Telling) -> list[_Named]:
+    """Return each session once, whatever folder it was found by, and its copies not at all; names are told apart."""
+    first: dict[str, _Named] = {}
+    names: dict[str, int] = {}
+    kept = []
+    for one in sessions:
+        mark = str(real_path(one.folder)) if one.session is None else one.session.sha256
+        before = first.setdefault(mark, one)
+        if before is not one:
+            if real_path(before.folder) != real_path(one.folder):
+                telling.note(
+                    f"{one.name} is a copy of {before.name}, by the SHA-256 of its session file: it is done once"
+                )
+            continue
+        names[one.name] = names.get(one.name, 0) + 1
+        kept.append(replace(one, name=f"{one.name} ({names[one.name]})") if names[one.name] > 1 else one)
+    return kept
+
+
+def _plain(options: FleetOptions) -> dict[str, Any]:
+    """Return options as what decides results: files by their content, which stands beside, and settings by their tolerances."""
+    data = {key: value for key, value in vars(options).items() if key not in {"source_files", "settings"}}
+    return {**data, "tolerances": [asdict(one) for one in options.settings.tolerances]}
+
+
+def _taken(one: _Named, kept: FleetFolder, key: str, result: Worked | Ended) -> _Outcome:
+    """Keep what came of a session."""
+    if isinstance(result, Ended):
+        return _failed(one, result.why)
+    if result.problem:
+        return _failed(one, result.problem)
+    data = {"session": one.name, "machine": one.machine, **result.found, "result": result.result}
+    return _known(one, kept, kept.keep(one.name, key, data, result.files), fresh=True)
+
+
+def _known(one: _Named, kept: FleetFolder, data: dict[str, Any], *, fresh: bool) -> _Outcome:
+    found = found_from(data)
+    files = (kept.file_of(one.name, data["key"]), *data["files"])
+    about = FleetSession(
+        session=one.name,
+        machine=one.machine,
+        started=one.started,
+        state="done" if fresh else "up-to-date",
+        problem="",
+        files=files,
+        headline=found.headline,
+        compared=False,
+        notes=found.notes,
+        values=found.values,
+    )
+    return _Outcome(about, found)
+
+
+def _failed(one: _Named, problem: str) -> _Outcome:
+    about = FleetSession(
+        session=one.name,
+        machine=one.machine,
+        started=one.started,
+        state="failed",
+        problem=problem,
+        files=(),
+        headline="",
+        compared=False,
+        notes=(),
+        values=(),
+    )
+    return _Outcome(about, None)
+
+
+def _result(
+    task: str, kept: FleetFolder, named: Sequence[_Named], outcomes: Sequence[_Outcome], false_alarms: float
+) -> FleetResult:
+    """Put the outcomes together, and compare the last session of each machine."""
+    last: dict[str, int] = {}
+    for place, outcome in enumerate(outcomes):
+        if outcome.found is None:
+            continue
+        before = last.setdefault(outcome.session.machine, place)
+        if (outcome.session.started or "") >= (outcomes[before].session.started or ""):
+            last[outcome.session.machine] = place
+    chosen = sorted(last.values())
+    sessions = tuple(replace(outcome.session, compared=place in set(chosen)) for place, outcome in enumerate(outcomes))
+    sisters = [
+        Sister(named[place].machine, named[place].name, session.machine, found)
+        for place in chosen
+        if (session := named[place].session) is not None and (found := outcomes[place].found) is not None
+    ]
+    has_values = any(sister.found.values for sister in sisters)
+    return FleetResult(
+        task=task,
+        folder=str(kept.folder),
+        table=str(kept.table),
+        page=str(kept.page),
+        sessions=sessions,
+        comparison=compared(sisters, false_alarms) if has_values else None,
+    )

@@ -1,0 +1,173 @@
+"""Machines of a fleet, held against one another in what they share."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.difference import NOT_PREDICTED, differences, in_words
+from dbbstation.results.fleet import Comparison, Scored, SharedCause
+from dbbstation.sisters.unlike import FEWEST, held_against_sisters
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.machine.difference import Difference
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.results.fleet import FleetFound, FleetValue
+
+MOST_NAMED = 5
+"""Machines that a note names."""
+
+CLAIMED = frozenset({"identified", "happened"})
+"""Verdicts that say that a cause is there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sister:
+    """One machine of a fleet, by its last session.
+
+    Attributes:
+        name: serial number, or the name in its machine file.
+        session: name of the session.
+        machine: nominal machine of the session.
+        found: what the task found.
+    """
+
+    name: str
+    session: str
+    machine: Machine
+    found: FleetFound
+
+
+_Key = tuple[str, ...]
+
+
+def compared(sisters: Sequence[Sister], false_alarms: float) -> Comparison:
+    """Hold machines against one another.
+
+    Figures are compared between all machines that drove the same circle. Parameters, and those of causes, are departures from
+    the nominal machine: they are compared between machines of one nominal geometry only.
+
+    Args:
+        sisters: each machine once.
+        false_alarms: probability that like machines show any value as unlike.
+    """
+    kinds, notes = _geometries(sisters)
+    rows: dict[_Key, dict[int, FleetValue]] = defaultdict(dict)
+    for place, sister in enumerate(sisters):
+        for value in sister.found.values:
+            kind = "" if value.kind == "figure" else str(kinds[place])
+            rows[value.kind, value.quantity, value.of, value.unit, kind][place] = value
+    keys = list(rows)
+    numbers, u = (np.full((len(keys), len(sisters)), np.nan) for _ in range(2))
+    for row, key in enumerate(keys):
+        for place, value in rows[key].items():
+            number, sure = value.value, value.uncertainty or 0.0
+            if value.logarithmic and number > 0.0:
+                number, sure = float(np.log(number)), sure / number
+            numbers[row, place], u[row, place] = number, sure
+    held = held_against_sisters(numbers, u, false_alarms)
+    scored = []
+    for row, key in enumerate(keys):
+        for place, value in rows[key].items():
+            middle, scatter, score, smallest = (
+                float(of[row, place]) for of in (held.middle, held.scatter, held.score, held.smallest_seen)
+            )
+            known = bool(np.isfinite(score))
+            if value.logarithmic:
+                middle = float(np.exp(middle))
+                scatter, smallest = middle * scatter, middle * float(np.expm1(min(smallest, _LARGEST_LOG)))
+            scored.append(
+                Scored(
+                    machine=sisters[place].name,
+                    session=sisters[place].session,
+                    kind=value.kind,
+                    quantity=value.quantity,
+                    of=value.of,
+                    unit=value.unit,
+                    value=value.value,
+                    uncertainty=value.uncertainty,
+                    sisters=len(rows[key]) - 1,
+                    usual=middle if known else None,
+                    scatter=scatter if known else None,
+                    score=score if known else None,
+                    smallest_seen=smallest if known else None,
+                    unlike=bool(held.unlike[row, place]),
+                )
+            )
+    enough = sum(len(of) >= FEWEST for of in rows.values())
+    notes += _alone([key for key in keys if len(rows[key]) < FEWEST])
+    return Comparison(
+        false_alarms=false_alarms,
+        machines=len(sisters),
+        quantities=enough,
+        scored=tuple(sorted(scored, key=lambda one: one.machine)),
+        causes=_causes(sisters),
+        notes=tuple(notes),
+    )
+
+
+_LARGEST_LOG = 300.0
+"""Logarithms above it have no number; of three machines, none is far enough off to be seen."""
+
+
+def _geometries(sisters: Sequence[Sister]) -> tuple[list[int], list[str]]:
+    """Return which kind each machine is of, by its nominal geometry, and say what differs where there are several."""
+    first: list[int] = []
+    kinds: list[int] = []
+    for place, sister in enumerate(sisters):
+        same = (k for k, other in enumerate(first) if not _unlike(sisters[other].machine, sister.machine))
+        kind = next(same, len(first))
+        if kind == len(first):
+            first.append(place)
+        kinds.append(kind)
+    notes = []
+    for kind, place in enumerate(first[1:], start=1):
+        names = [sister.name for sister, of in zip(sisters, kinds, strict=True) if of == kind]
+        unlike = in_words(_unlike(sisters[first[0]].machine, sisters[place].machine), 2)
+        notes.append(
+            f"{_named(names)}: another nominal machine than {sisters[first[0]].name} ({unlike}): compared with the others in "
+            "figures only, parameters are departures from the nominal machine"
+        )
+    return kinds, notes
+
+
+def _unlike(one: Machine, other: Machine) -> tuple[Difference, ...]:
+    return tuple(found for found in differences(one, other) if found.first_key not in NOT_PREDICTED)
+
+
+def _alone(keys: Sequence[_Key]) -> list[str]:
+    """Say what too few machines have."""
+    if not keys:
+        return []
+    names = list(dict.fromkeys(key[1] for key in keys))
+    return [f"fewer than {FEWEST} machines have these, which are not compared: {_named(names)}"]
+
+
+def _named(names: Sequence[str]) -> str:
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _causes(sisters: Sequence[Sister]) -> tuple[SharedCause, ...]:
+    """Return causes that were found anywhere, those of the fewest machines first."""
+    there: dict[str, dict[str, float]] = defaultdict(dict)
+    asked: dict[str, int] = defaultdict(int)
+    for sister in sisters:
+        for cause in sister.found.causes:
+            asked[cause.name] += 1
+            if cause.verdict in CLAIMED:
+                there[cause.name][sister.name] = 1.0 if cause.probability is None else cause.probability
+    return tuple(
+        SharedCause(
+            name=name,
+            found_in=tuple(of),
+            machines=asked[name],
+            false_claims=sum(1.0 - probability for probability in of.values()),
+        )
+        for name, of in sorted(there.items(), key=lambda pair: (len(pair[1]), pair[0]))
+    )

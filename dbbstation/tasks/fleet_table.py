@@ -1,0 +1,75 @@
+"""Every value of a fleet as one tidy table, CSV or Parquet."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import OutputError
+from dbbstation.files.atomic import streamed
+from dbbstation.files.provenance import write_table
+from dbbstation.files.recordings.table_csv import table_csv
+from dbbstation.results.fleet import TABLE
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.results.fleet import FleetResult
+
+FORMATS = (".csv", ".parquet")
+"""Formats of a table, by the ending of its file."""
+
+_NUMBERS = frozenset({"value", "u", "usual", "scatter", "score", "smallest_seen"})
+_WHOLE = frozenset({"sisters"})
+_YES_OR_NO = frozenset({"unlike"})
+
+
+def write_fleet_table(path: Path, result: FleetResult, provenance: Provenance, *, force: bool = False) -> None:
+    """Write every value of a fleet, one row for each.
+
+    Args:
+        path: of the table, .csv or .parquet.
+        result: of the fleet.
+        provenance: where it comes from.
+        force: overwrite.
+
+    Raises:
+        OutputError: the ending is another; the file exists and `force` is not given; pyarrow is not installed.
+    """
+    rows = result.rows()
+    if path.suffix.lower() == FORMATS[0]:
+        columns = [[_cell(row[name]) for row in rows] for name in TABLE]
+        write_table(path, table_csv(TABLE, columns), provenance, force=force)
+        return
+    if path.suffix.lower() != FORMATS[1]:
+        raise OutputError("a table is written as .csv or .parquet", where=str(path), remedy="name such a file")
+    try:
+        import pyarrow as pa  # noqa: PLC0415 - an extra of 100 MB that only this needs
+        from pyarrow import parquet  # noqa: PLC0415
+    except ImportError as error:
+        remedy = "install it with `pip install 'dbbstation[parquet]'`, or name a .csv file"
+        raise OutputError(
+            "Parquet is written by pyarrow, which is not installed", where=str(path), remedy=remedy
+        ) from error
+    kinds = {
+        name: pa.float64()
+        if name in _NUMBERS
+        else pa.int64()
+        if name in _WHOLE
+        else pa.bool_()
+        if name in _YES_OR_NO
+        else pa.string()
+        for name in TABLE
+    }
+    told = {"dbbstation": json.dumps(provenance.data(), ensure_ascii=False)}
+    arrays = [pa.array([row[name] for row in rows], type=kinds[name]) for name in TABLE]
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(list(kinds.items()), metadata=told))
+    with streamed(path, force=force) as file:
+        parquet.write_table(table, file)
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "" if value is None else value

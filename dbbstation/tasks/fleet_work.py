@@ -1,0 +1,271 @@
+"""What is done of one session of a fleet, in whatever process: a task, and what others may compare of it."""
+
+from __future__ import annotations
+
+import shlex
+import tempfile
+from collections import defaultdict
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation import __version__
+from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.files.formats.model import model_text
+from dbbstation.files.formats.settings import Settings
+from dbbstation.files.gateway import content_of, digest_of
+from dbbstation.files.inputs import input_book, inputs_so_far
+from dbbstation.files.own_sources import every_source
+from dbbstation.files.places import name_of
+from dbbstation.files.provenance import Provenance
+from dbbstation.files.recordings.folder_of_sessions import reason_of
+from dbbstation.results.fleet import FleetCause, FleetFound, FleetValue
+from dbbstation.results.serialise import plain
+from dbbstation.tasks.calibrate import calibrate
+from dbbstation.tasks.circles import circle_figures
+from dbbstation.tasks.diagnose import diagnose
+from dbbstation.tasks.executors import refuse_other_program
+from dbbstation.tasks.report import report
+from dbbstation.tasks.session_figures import machine_parameters, run_figures
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from dbbstation.history.record import RunFigures
+    from dbbstation.model.identified import IdentifiedModel
+
+
+@dataclass(frozen=True)
+class FleetOptions:
+    """What is asked of every session.
+
+    Attributes:
+        sources: names of error sources, as `calibrate` and `diagnose` take them; None: as these choose.
+        method: how ball positions are known, as `calibrate` takes it.
+        law_over_time: as `calibrate` takes it.
+        findings: judge every run, as `circles` does.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        source_files: Python files with error sources of one's own.
+        settings: of the shop, for a report.
+    """
+
+    sources: tuple[str, ...] | None = None
+    method: str = "jig"
+    law_over_time: bool = False
+    findings: bool = False
+    tests: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    source_files: tuple[Path, ...] = ()
+    settings: Settings = field(default_factory=Settings)
+
+    def words(self) -> list[str]:
+        """Return them as the command of one session takes them, in its order."""
+        words = [] if self.sources is None else ["--sources", ",".join(self.sources)]
+        for path in self.source_files:
+            words += ["--source-file", name_of(path)]
+        words += ["--law-over-time"] if self.law_over_time else []
+        words += [] if self.method == "jig" else ["--method", self.method]
+        words += ["--findings"] if self.findings else []
+        words += [word for name in self.tests for word in ("--test", name)]
+        return words + [word for name in self.exclude for word in ("--exclude", name)]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One session that is to be worked on.
+
+    Attributes:
+        task: what is done.
+        folder: of the session.
+        options: that are asked for.
+        inputs: SHA-256 of the files that decide what comes out, by path.
+        program: identity of the program that asks.
+    """
+
+    task: str
+    folder: Path
+    options: FleetOptions
+    inputs: Mapping[str, str]
+    program: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Worked:
+    """What came of a piece.
+
+    Attributes:
+        problem: why it failed; empty where it did not.
+        found: as plain numbers, what others may compare.
+        result: what the task's command prints as JSON.
+        files: further files of it, by their ending.
+    """
+
+    problem: str = ""
+    found: Mapping[str, Any] = field(default_factory=dict)
+    result: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def worked(piece: Piece) -> Worked:
+    """Do a task on one session, and return what came of it or why nothing did.
+
+    Raises:
+        SchedulerError: this process has another program than the one that asks.
+    """
+    refuse_other_program(piece.program, "the process that asks")
+    try:
+        _refuse_other_inputs(piece.inputs)
+        with input_book():
+            found, result, files = TASKS[piece.task](piece)
+    except (StationError, OSError) as error:
+        return Worked(reason_of(error) if isinstance(error, OSError) else str(error))
+    except Exception as error:  # noqa: BLE001 - a fault of ours in one session must not cost the others
+        return Worked(f"{type(error).__name__}: {error} (this is a fault of dbbstation itself)")
+    return Worked("", asdict(found), result, files)
+
+
+def _refuse_other_inputs(inputs: Mapping[str, str]) -> None:
+    """Refuse files that are other ones here than where the work was asked for."""
+    for path, digest in inputs.items():
+        if digest_of(Path(path)) != digest:
+            what = "this file is another one where the work is done, or was changed since"
+            raise InputError([Problem(path, 0, 0, what, "let all computers see one folder, under one path")])
+
+
+Done = tuple[FleetFound, "dict[str, Any]", "dict[str, bytes]"]
+
+
+def _calibrated(piece: Piece) -> Done:
+    options = piece.options
+    result = calibrate(
+        piece.folder,
+        sources=options.sources,
+        method=options.method,
+        tests=options.tests,
+        exclude=options.exclude,
+        law_over_time=options.law_over_time,
+        known=every_source(options.source_files),
+    )
+    figures = (
+        _size("noise of one reading", result.noise_um),
+        _size("residual within mountings", result.residual_within_mounting_rms_um),
+        _size("nominal machine leaves", result.nominal_rms_um),
+    )
+    misfit = (
+        f"{result.misfit.rms_um:.2f} µm rms unexplained" if result.misfit.missing_physics else "nothing unexplained"
+    )
+    headline = (
+        f"{result.parameters_identified} parameters, {result.residual_within_mounting_rms_um:.2f} µm rms left, {misfit}"
+    )
+    outliers = tuple(f"outlier, kept out of the fit: {one.text}" for one in result.outliers)
+    found = FleetFound(_parameters(result.model) + figures, (), headline, (*result.notes, *outliers))
+    return found, plain(result), {".yaml": model_text(result.model, _provenance(piece)).encode()}
+
+
+def _diagnosed(piece: Piece) -> Done:
+    options = piece.options
+    result = diagnose(
+        piece.folder,
+        sources=options.sources,
+        tests=options.tests,
+        exclude=options.exclude,
+        known=every_source(options.source_files),
+    )
+    figures = [
+        _size("noise of one reading", result.noise_um),
+        _size("residual within mountings", result.residual_rms_um.after),
+        _size("error in held-out tests", result.held_out_rms_um.after),
+    ]
+    causes = tuple(FleetCause(one.name, one.verdict, one.probability) for one in result.sources)
+    named = [one.name for one in result.sources if one.verdict in {"identified", "happened"}]
+    headline = f"found: {', '.join(named)}" if named else "no cause found"
+    if result.mismatch and not named:
+        headline += f", {result.misfit_rms_um:.2f} µm rms without a name"
+    of_causes = {one.name for one in result.sources if one.verdict == "identified"}
+    parameters = [
+        FleetValue("cause" if source in of_causes else "parameter", quantity, unit, value, u)
+        for source, quantity, unit, value, u in _numbers(result.model)
+    ]
+    notes = (*result.notes, *(f"outlier, kept out of the fits: {one.text}" for one in result.outliers))
+    found = FleetFound((*parameters, *figures), causes, headline, notes)
+    return found, plain(result), {".yaml": model_text(result.model, _provenance(piece)).encode()}
+
+
+def _circles(piece: Piece) -> Done:
+    options = piece.options
+    result = circle_figures(piece.folder, tests=options.tests, exclude=options.exclude, findings=options.findings)
+    runs = run_figures(result.circles.circles)
+    worst = max(
+        (one for run in runs for one in run.figures if one.name == "G"), key=lambda one: one.value_um, default=None
+    )
+    headline = f"{len(runs)} circles" + ("" if worst is None else f", G up to {worst.value_um:.1f} µm")
+    return FleetFound(_of_circles(runs), (), headline, result.notes), plain(result), {}
+
+
+def _reported(piece: Piece) -> Done:
+    options = piece.options
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "report.html"
+        written = report(
+            piece.folder,
+            page,
+            settings=options.settings,
+            tests=options.tests,
+            exclude=options.exclude,
+            provenance=lambda: _provenance(piece),
+        )
+        html = content_of(page)
+    numbers = dict(written.numbers)
+    return FleetFound((), (), str(numbers["verdict"]["headline"]), ()), numbers, {".html": html}
+
+
+TASKS = {"calibrate": _calibrated, "circles": _circles, "diagnose": _diagnosed, "report": _reported}
+"""What can be done of every session, by name."""
+
+
+def _provenance(piece: Piece) -> Provenance:
+    """Return where an output comes from: from what a command of this session alone would."""
+    command = shlex.join(["dbbstation", piece.task, name_of(piece.folder), *piece.options.words()])
+    return Provenance(f"dbbstation {__version__}", command, inputs_so_far())
+
+
+def _size(name: str, value_um: float) -> FleetValue:
+    return FleetValue("figure", name, "µm", value_um, logarithmic=True)
+
+
+def _parameters(model: IdentifiedModel) -> tuple[FleetValue, ...]:
+    return tuple(FleetValue("parameter", quantity, unit, value, u) for _, quantity, unit, value, u in _numbers(model))
+
+
+def _numbers(model: IdentifiedModel) -> list[tuple[str, str, str, float, float | None]]:
+    """Source, quantity, unit, value and uncertainty of the machine's parameters that were not held."""
+    return [
+        (one.source, f"{one.source}: {one.name}", one.unit, one.value, one.u)
+        for one in machine_parameters(model)
+        if one.u is not None
+    ]
+
+
+LOGARITHMIC = frozenset({"G"})
+"""Figures of circles that are positive sizes."""
+
+COMPARED = ("G", "X", "Y", "R")
+"""Figures of circles that machines are compared by; the distance of the centre is in X and Y."""
+
+
+def _of_circles(runs: Sequence[RunFigures]) -> tuple[FleetValue, ...]:
+    """Means over the repeats of each test and direction; what is common to repeats is not averaged out of u."""
+    grouped: dict[tuple[str, str, str, str], list[tuple[float, float]]] = defaultdict(list)
+    for run in runs:
+        for figure in run.figures:
+            if figure.name in COMPARED:
+                grouped[figure.name, run.test, run.direction, run.circle].append((figure.value_um, figure.u_um))
+    values = []
+    for (name, test, direction, circle), repeats in grouped.items():
+        value, u = np.mean(repeats, axis=0).tolist()
+        quantity = f"{name} {test} {direction}"
+        values.append(FleetValue("figure", quantity, "µm", value, u or None, circle, name in LOGARITHMIC))
+    return tuple(values)

@@ -6,6 +6,7 @@ from typing import Any
 
 from dbbstation.results.calibration import CalibrationResult
 from dbbstation.results.circles import CirclesResult
+from dbbstation.results.comparison import ComparisonResult
 from dbbstation.results.diagnosis import DiagnosisResult
 from dbbstation.results.drive import DriveResult
 from dbbstation.results.evaluation import EvaluationResult
@@ -18,6 +19,7 @@ from dbbstation.results.serialise import schema_of
 RESULTS: dict[str, type] = {
     "calibrate": CalibrationResult,
     "circles": CirclesResult,
+    "compare": ComparisonResult,
     "compensate": ProgramsResult,
     "diagnose": DiagnosisResult,
     "drive": DriveResult,

@@ -39,7 +39,7 @@ class Ended:
 
 
 @dataclass(frozen=True)
-class Workplace(Generic[Item, Result]):
+class WorkPool(Generic[Item, Result]):
     """Where work is done.
 
     Attributes:

@@ -8,13 +8,13 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.computing.processes import each
 from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.files.recordings.drive_csv import read_drive
-from dbbstation.processes import each
 from dbbstation.results.of_comparison import comparison_result
 from dbbstation.results.of_drive import drive_result
 from dbbstation.results.of_mismatch import mismatch_result

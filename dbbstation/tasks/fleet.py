@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.counting import natural
 from dbbstation.errors import StationError
 from dbbstation.files.atomic import write_bytes
 from dbbstation.files.fleet_folder import FleetFolder, key_of
@@ -29,6 +28,7 @@ from dbbstation.tasks.fleet_work import TASKS, FleetOptions, FleetPiece, Worked,
 from dbbstation.tasks.load import paths_of
 from dbbstation.tasks.provenance import from_python
 from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.text.counting import natural
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

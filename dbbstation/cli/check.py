@@ -158,7 +158,7 @@ def _hold_against(results: Sequence[Checked], anchor: str | None) -> None:
 
 def _file(result: Checked) -> dict[str, object]:
     """Return what was found in a file; of a session also the findings of its runs."""
-    from dbbstation.quality.summary import findings_summary
+    from dbbstation.results.findings import plain_findings
 
     told: dict[str, object] = {
         "file": str(result.path),
@@ -167,7 +167,7 @@ def _file(result: Checked) -> dict[str, object]:
         "summary": result.summary,
     }
     if result.judgements:
-        told["runs"] = [{"run": one.run.label, "findings": findings_summary(one.findings)} for one in result.judgements]
+        told["runs"] = [{"run": one.run.label, "findings": plain_findings(one.findings)} for one in result.judgements]
     return told
 
 

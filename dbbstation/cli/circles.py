@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,7 +13,10 @@ from dbbstation.cli.filter_option import filter_of, filter_option
 from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
+
+    from dbbstation.results.circle_figures import CircleFiguresResult, PairFigures, QuickLookResult, RunWithoutCircle
+    from dbbstation.results.circles import CirclesResult
 
 
 @click.command()
@@ -58,7 +62,7 @@ def circles(
       dbbstation circles session --test a --budget --json
       dbbstation circles session --test a --quick-look
     """
-    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.files.provenance import refuse_existing_table, write_table
@@ -81,29 +85,29 @@ def circles(
             progress=lambda _, done=0, of=0: progress(done, of),
             say=lambda text: say(f"note: {text}"),
         )
-    summary = result.to_dict()
     if out is not None:
         rows = result.rows()
         names = list(dict.fromkeys(name for row in rows for name in row))
         columns = [[row.get(name, "") for name in names] for row in rows]
         write_table(out, table_csv(names, list(zip(*columns, strict=True))), provenance(), force=force)
-        summary["csv"] = str(out)
+        result = replace(result, csv=str(out))
     if as_json:
-        print_json(summary)
+        print_result(result)
         return
-    _print(summary, several=len(sessions) > 1)
+    _print(result, several=len(sessions) > 1)
     if budget:
-        _print_budgets(summary)
+        _print_budgets(result)
     if findings:
-        _print_findings(summary["runs"])
+        _print_findings(result.runs)
     if quick_look:
-        _print_quick_looks(summary["quick_look"])
+        _print_quick_looks(result.quick_look or ())
 
 
-def _print(summary: Mapping[str, Any], *, several: bool) -> None:
+def _print(result: CirclesResult, *, several: bool) -> None:
     from dbbstation.cli.output import EXPANDED, print_table
+    from dbbstation.results.circle_figures import RunWithoutCircle
 
-    echo(f"figures of {summary['edition']}, filter: {summary['filter']}, lengths in µm, {EXPANDED}")
+    echo(f"figures of {result.edition}, filter: {result.filter}, lengths in µm, {EXPANDED}")
     head = ["session"] if several else []
     rows: list[list[object]] = []
     titles = [
@@ -127,146 +131,153 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
         "drift",
         "noise",
     ]
-    for run in summary["runs"]:
-        name: list[object] = [run["session"]] if several else []
-        name += [run["test"], run["direction"], run["repeat"]]
-        if run["problem"]:
+    for run in result.runs:
+        name: list[object] = [run.session] if several else []
+        name += [run.test, run.direction, run.repeat]
+        if isinstance(run, RunWithoutCircle):
             rows.append([*name, *["-"] * (len(head) + len(titles) - len(name))])
             continue
-        steps = [abs(step["height_um"]) for step in run["reversal_steps"]]
-        drift = run["drift_um_per_turn"]
+        steps = [abs(step.height_um) for step in run.reversal_steps]
+        drift = run.drift_um_per_turn
         rows.append(
             [
                 *name,
-                *_figure(run, "G", run["g_um"]),
-                *_figure(run, "G(LS)", run["g_least_squares_um"]),
-                *_figure(run, "Fmax", run["f_um"]["max"]),
-                *_figure(run, "Fmin", run["f_um"]["min"]),
-                *_figure(run, "X", run["centre_um"]["x"]),
-                *_figure(run, "Y", run["centre_um"]["y"]),
+                *_figure(run, "G", run.g_um),
+                *_figure(run, "G(LS)", run.g_least_squares_um),
+                *_figure(run, "Fmax", run.f_um.max),
+                *_figure(run, "Fmin", run.f_um.min),
+                *_figure(run, "X", run.centre_um.x),
+                *_figure(run, "Y", run.centre_um.y),
                 max(steps) if steps else "-",
-                "-" if run["closure"] is None else run["closure"]["height_um"],
+                "-" if run.closure is None else run.closure.height_um,
                 "-" if drift is None else drift,
                 _noise(run),
             ]
         )
     print_table([*head, *titles], rows)
-    if summary["pairs"]:
+    if result.pairs:
         echo("\nboth directions")
         rows = []
-        for pair in summary["pairs"]:
-            name = [pair["session"]] if several else []
+        for pair in result.pairs:
+            name = [pair.session] if several else []
             rows.append(
                 [
                     *name,
-                    pair["test"],
-                    pair["repeat"],
-                    *_figure(pair, "G(b)", pair["g_um"]),
-                    *_figure(pair, "G(b)(LS)", pair["g_least_squares_um"]),
-                    *_figure(pair, "D", pair["d_um"]),
-                    *_figure(pair, "H", pair["h_um"]),
-                    pair["h_deg"],
+                    pair.test,
+                    pair.repeat,
+                    *_figure(pair, "G(b)", pair.g_um),
+                    *_figure(pair, "G(b)(LS)", pair.g_least_squares_um),
+                    *_figure(pair, "D", pair.d_um),
+                    *_figure(pair, "H", pair.h_um),
+                    pair.h_deg,
                 ]
             )
         print_table([*head, *["test", "n", "G(b)", "U", "G(b)(LS)", "U", "D", "U", "H", "U"], "at [deg]"], rows)
     echo("\nWhat noise adds to G, F and H is taken off; --budget says how much that is.")
-    _print_why_not([*summary["runs"], *summary["pairs"]])
+    _print_why_not(_with_budgets(result))
 
 
-def _figure(run: Mapping[str, Any], name: str, value: float) -> tuple[str, str]:
+def _figure(run: CircleFiguresResult | PairFigures, name: str, value: float) -> tuple[str, str]:
     """Return a figure and its U as they are printed."""
     from dbbstation.cli.output import COVERAGE_FACTOR
     from dbbstation.text.digits import with_uncertainty
 
-    u = run["uncertainty"][name]["u_um"]
+    u = run.uncertainty[name].u_um
     return with_uncertainty(value, None if u is None else COVERAGE_FACTOR * u)
 
 
-def _print_why_not(runs: Sequence[Mapping[str, Any]]) -> None:
+def _print_why_not(runs: Sequence[CircleFiguresResult | PairFigures]) -> None:
     """Say which figures have no U, and why."""
     of: dict[str, dict[str, None]] = {}
     for run in runs:
-        for figure, budget in run.get("uncertainty", {}).items():
-            if budget["why_not"]:
-                of.setdefault(budget["why_not"], {})[figure] = None
+        for figure, budget in run.uncertainty.items():
+            if budget.why_not:
+                of.setdefault(budget.why_not, {})[figure] = None
     for why, figures in of.items():
         echo(f"{', '.join(figures)}: {why}")
 
 
-def _noise(run: Mapping[str, Any]) -> object:
-    noise = run["noise_um"]["of_a_reading"]
+def _with_budgets(result: CirclesResult) -> list[CircleFiguresResult | PairFigures]:
+    """Return circles and pairs that have figures."""
+    from dbbstation.results.circle_figures import RunWithoutCircle
+
+    return [*(run for run in result.runs if not isinstance(run, RunWithoutCircle)), *result.pairs]
+
+
+def _noise(run: CircleFiguresResult) -> object:
+    noise = run.noise_um.of_a_reading
     return "-" if noise is None else f"{noise:.2f}"
 
 
-def _print_budgets(summary: Mapping[str, Any]) -> None:
+def _print_budgets(result: CirclesResult) -> None:
     from dbbstation.cli.output import print_table
 
     rows: list[list[object]] = []
     missing: dict[str, None] = {}
-    for run in [*summary["runs"], *summary["pairs"]]:
-        for figure, budget in run.get("uncertainty", {}).items():
-            name = [run["test"], run.get("direction", "both"), run["repeat"], figure]
-            rows += [[*name, cause, f"{size:.3f}"] for cause, size in budget["terms_um"].items()]
-            u = budget["u_um"]
+    for run in _with_budgets(result):
+        for figure, budget in run.uncertainty.items():
+            name = [run.test, getattr(run, "direction", "both"), run.repeat, figure]
+            rows += [[*name, cause, f"{size:.3f}"] for cause, size in budget.terms_um.items()]
+            u = budget.u_um
             rows.append([*name, "u, all together", "-" if u is None else f"{u:.3f}"])
-            if budget["as_read_um"] != budget["value_um"]:
-                taken = abs(budget["as_read_um"] - budget["value_um"])
+            if budget.as_read_um != budget.value_um:
+                taken = abs(budget.as_read_um - budget.value_um)
                 rows.append([*name, "added by noise, taken off", f"{taken:.3f}"])
-            missing |= dict.fromkeys(budget["missing"])
+            missing |= dict.fromkeys(budget.missing)
     echo("\nstandard uncertainties u [µm]")
     print_table(["test", "dir", "n", "figure", "term", "u"], rows)
     echo(f"not stated, and not in U: {', '.join(missing)}")
 
 
-def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
+def _print_findings(runs: Sequence[CircleFiguresResult | RunWithoutCircle]) -> None:
     from dbbstation.cli.output import print_table
     from dbbstation.quality.finding import FindingVerdict
 
     rows: list[list[object]] = [
         [
-            run["test"],
-            run["direction"],
-            run["repeat"],
-            finding["name"],
-            "-" if finding["value"] is None else f"{finding['value']:.2f}",
-            "-" if finding["limit"] is None else f"{finding['limit']:.2f}",
-            finding["unit"],
-            finding["verdict"],
+            run.test,
+            run.direction,
+            run.repeat,
+            finding.name,
+            "-" if finding.value is None else f"{finding.value:.2f}",
+            "-" if finding.limit is None else f"{finding.limit:.2f}",
+            finding.unit,
+            finding.verdict,
         ]
         for run in runs
-        for finding in run["findings"]
+        for finding in run.findings or ()
     ]
     echo("\nfindings")
     print_table(["test", "dir", "n", "finding", "value", "limit", "unit", "verdict"], rows)
     wrong = [
-        f"{run['test']} {run['direction']} {run['repeat']}: {finding['name']}: {finding['text']}"
+        f"{run.test} {run.direction} {run.repeat}: {finding.name}: {finding.text}"
         for run in runs
-        for finding in run["findings"]
-        if finding["verdict"] == FindingVerdict.WRONG
+        for finding in run.findings or ()
+        if finding.verdict == FindingVerdict.WRONG
     ]
     echo("\n".join(wrong) if wrong else "nothing is wrong")
 
 
-def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
+def _print_quick_looks(looks: Sequence[QuickLookResult]) -> None:
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
     from dbbstation.text.digits import with_uncertainty
 
     rows: list[list[object]] = []
     for look in looks:
-        name = [look["test"], "+".join(look["directions"]), look["repeat"]]
-        if not look["symptoms"]:
+        name = [look.test, "+".join(look.directions), look.repeat]
+        if not look.symptoms:
             rows.append([*name, "too few samples", "", "-", "-", "", "-", ""])
-        for one in look["symptoms"]:
-            known = one["value"] is not None
+        for one in look.symptoms:
+            known = one.value is not None and one.u is not None
             rows.append(
                 [
                     *name,
-                    one["signature"],
-                    one["place"] or "",
-                    *(with_uncertainty(one["value"], COVERAGE_FACTOR * one["u"]) if known else ("-", "-")),
-                    one["unit"],
-                    ("yes" if one["seen"] else "no") if known else "-",
-                    one["text"] or "",
+                    one.signature,
+                    one.place or "",
+                    *(with_uncertainty(one.value or 0.0, COVERAGE_FACTOR * (one.u or 0.0)) if known else ("-", "-")),
+                    one.unit,
+                    ("yes" if one.seen else "no") if known else "-",
+                    one.text or "",
                 ]
             )
     echo(f"\nquick look at the signatures of serial axes, {EXPANDED}")

@@ -8,7 +8,7 @@ import threading
 from typing import TYPE_CHECKING, Any, TextIO
 
 from dbbstation.cli.output import echo, log_said
-from dbbstation.quality.summary import findings_summary
+from dbbstation.results.findings import plain_findings
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, AddNote, GoTo, Pause, Quit, Reject, Repeat, Resume, Skip, Start
@@ -161,7 +161,7 @@ class Summary:
             "doubtful": completed.doubtful,
             "problem": completed.problem or None,
         }
-        told["findings"] = findings_summary(completed.findings)
+        told["findings"] = plain_findings(completed.findings)
         if completed.figures is not None:
             told |= {
                 "centre_deviation_um": completed.figures.centre_deviation_um,

@@ -8,17 +8,33 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.circles.analysis import EDITION
 from dbbstation.circles.budget import budgets, pair_budgets
+from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.quick_look import quick_look
-from dbbstation.circles.summary import circle_summary, pair_summary, quick_look_summary
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
-from dbbstation.quality.summary import findings_summary
+from dbbstation.results.circle_figures import (
+    CircleFiguresResult,
+    FigureBudget,
+    HarmonicResult,
+    LargestAndLeast,
+    NoiseFigures,
+    PairFigures,
+    PlaneVector,
+    QuickLookResult,
+    ReversalStepResult,
+    RunWithoutCircle,
+    ShownFeed,
+    SymptomResult,
+)
+from dbbstation.results.findings import finding_results
 from dbbstation.results.frame import Framed
+from dbbstation.results.inference import finite
 from dbbstation.results.serialise import Absent, AsItIs, Kept
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
-    from dbbstation.circles.budget import SetUpKnowledge
+    from dbbstation.circles.budget import Budget, SetUpKnowledge
     from dbbstation.circles.path import Filter
+    from dbbstation.circles.reversals import ReversalStep
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.quality.judge import Judgement
@@ -86,9 +102,10 @@ class CirclesResult(Framed):
         filter: of G, F and H, in words.
         reference_circle: about which each figure is taken.
         false_alarms_per_run: that the limits of findings are made for.
-        runs: figures of each circle with their budgets, by key as docs/circles.md has them; lengths in µm.
+        runs: figures of each circle with their budgets; lengths in µm.
         pairs: the same of both directions together.
         quick_look: signatures of serial axes; None where they were not asked for.
+        csv: file of the table; absent where none was written.
         circles: the circles themselves, with their analyses.
     """
 
@@ -96,14 +113,15 @@ class CirclesResult(Framed):
     filter: str
     reference_circle: Mapping[str, str]
     false_alarms_per_run: float
-    runs: tuple[Mapping[str, Any], ...]
-    pairs: tuple[Mapping[str, Any], ...]
-    quick_look: Annotated[tuple[Mapping[str, Any], ...] | None, Absent] = None
+    runs: tuple[CircleFiguresResult | RunWithoutCircle, ...]
+    pairs: tuple[PairFigures, ...]
+    quick_look: Annotated[tuple[QuickLookResult, ...] | None, Absent] = None
+    csv: Annotated[str | None, Absent] = None
     circles: Annotated[Circled, AsItIs, Kept] = field(repr=False)
 
     def rows(self) -> list[dict[str, object]]:
         """Every number of every circle, one row for each."""
-        return [_flattened(run) for run in self.runs]
+        return [run.row() for run in self.runs]
 
 
 def circles_result(found: Circled, chosen: Filter, *, quick_look: bool = False) -> CirclesResult:
@@ -114,10 +132,14 @@ def circles_result(found: Circled, chosen: Filter, *, quick_look: bool = False) 
         chosen: filter that they were worked out with.
         quick_look: look for signatures of serial axes.
     """
-    numbers = circled_summary(found, chosen)
     return CirclesResult(
-        **{**numbers, "runs": tuple(numbers["runs"]), "pairs": tuple(numbers["pairs"])},
-        quick_look=tuple(quick_looks(found)) if quick_look else None,
+        edition=EDITION,
+        filter=chosen.words,
+        reference_circle={"g_um": "minimum zone", "g_least_squares_um": "least squares", "f_um": "least squares"},
+        false_alarms_per_run=FALSE_ALARMS_PER_RUN,
+        runs=tuple(_run(circle) for circle in found.circles),
+        pairs=tuple(_pair(pair) for pair in found.pairs),
+        quick_look=tuple(_quick_looks(found)) if quick_look else None,
         circles=found,
         notes=found.warnings,
     )
@@ -130,46 +152,83 @@ def circled_summary(found: Circled, chosen: Filter) -> dict[str, Any]:
         found: the circles.
         chosen: filter that they were worked out with.
     """
-    runs = []
-    for circle in found.circles:
-        entry = circle.entry
-        run: dict[str, Any] = {
-            "session": circle.session,
-            "test": entry.test,
-            "direction": str(entry.direction),
-            "repeat": entry.repeat,
-            "problem": circle.problem or None,
-        }
-        if circle.analysis is not None:
-            run |= circle_summary(circle.analysis, budgets(circle.analysis, circle.known))
-        if circle.judgement is not None:
-            run["findings"] = findings_summary(circle.judgement.findings)
-        runs.append(run)
-    pairs = [
-        {
-            "session": pair.one.session,
-            "test": pair.one.entry.test,
-            "repeat": pair.one.entry.repeat,
-            **pair_summary(pair.analysis, pair_budgets(pair.analysis, pair.one.known)),
-        }
-        for pair in found.pairs
-    ]
+    return circles_result(found, chosen).to_dict()
+
+
+def _run(circle: MeasuredCircle) -> CircleFiguresResult | RunWithoutCircle:
+    entry, one = circle.entry, circle.analysis
+    findings = None if circle.judgement is None else finding_results(circle.judgement.findings)
+    if one is None:
+        name = (circle.session, entry.test, str(entry.direction), entry.repeat)
+        return RunWithoutCircle(*name, circle.problem or None, findings)
+    figures, (x_mm, y_mm), raw = budgets(one, circle.known), one.centre_mm, one.raw
+    value_um = {quantity: budget.value_um for quantity, budget in figures.items()}
+    return CircleFiguresResult(
+        session=circle.session,
+        test=entry.test,
+        direction=str(raw.circle.direction),
+        repeat=entry.repeat,
+        problem=circle.problem or None,
+        tilt_deg=tuple(raw.circle.tilt_deg),
+        elevation_deg=raw.circle.elevation_deg,
+        radius_mm=one.path.radius_mm,
+        bar_mm=raw.circle.bar_mm,
+        feed_mm_min=raw.circle.feed_mm_min,
+        samples=len(raw),
+        samples_lost=one.lost,
+        g_um=value_um[BudgetQuantity.G],
+        g_least_squares_um=value_um[BudgetQuantity.G_LS],
+        f_um=LargestAndLeast(value_um[BudgetQuantity.F_MAX], value_um[BudgetQuantity.F_MIN]),
+        f_about_commanded_centre_um=LargestAndLeast(one.f_commanded.largest_um, one.f_commanded.least_um),
+        radius_error_um=one.radius_error_um,
+        mean_radial_error_um=one.mean_radial_error_um,
+        centre_um=PlaneVector(1e3 * x_mm, 1e3 * y_mm),
+        harmonics=tuple(HarmonicResult(h.undulations, h.amplitude_um, h.peak_deg) for h in one.harmonics),
+        reversal_steps=tuple(_step(step) for step in one.steps),
+        closure=None if one.closure is None else _step(one.closure),
+        drift_um_per_turn=None if one.passes is None else one.passes.mean_um,
+        feed_shown_mm_min=None if one.feed_mm_min is None else ShownFeed(*one.feed_mm_min),
+        noise_um=NoiseFigures(finite(one.noise.slow_um), finite(one.noise.reading_um), one.noise.resolution_um),
+        uncertainty=_budgets(figures),
+        findings=findings,
+    )
+
+
+def _pair(pair: MeasuredPair) -> PairFigures:
+    figures = pair_budgets(pair.analysis, pair.one.known)
+    return PairFigures(
+        session=pair.one.session,
+        test=pair.one.entry.test,
+        repeat=pair.one.entry.repeat,
+        g_um=figures[BudgetQuantity.G_BOTH].value_um,
+        g_least_squares_um=figures[BudgetQuantity.G_BOTH_LS].value_um,
+        d_um=pair.analysis.d_um,
+        h_um=figures[BudgetQuantity.H].value_um,
+        h_deg=pair.analysis.h_deg,
+        uncertainty=_budgets(figures),
+    )
+
+
+def _budgets(figures: Mapping[BudgetQuantity, Budget]) -> dict[str, FigureBudget]:
     return {
-        "edition": EDITION,
-        "filter": chosen.words,
-        "reference_circle": {"g_um": "minimum zone", "g_least_squares_um": "least squares", "f_um": "least squares"},
-        "false_alarms_per_run": FALSE_ALARMS_PER_RUN,
-        "runs": runs,
-        "pairs": pairs,
+        str(quantity): FigureBudget(
+            u_um=budget.u_um,
+            terms_um={str(term): float(size) for term, size in budget.terms_um.items()},
+            missing=tuple(budget.missing),
+            why_not=budget.why_not or None,
+            value_um=budget.value_um,
+            as_read_um=budget.as_read_um,
+        )
+        for quantity, budget in figures.items()
     }
 
 
-def quick_looks(found: Circled) -> list[dict[str, Any]]:
-    """Signatures of serial axes in every circle, both directions of one together: what `circles --quick-look` prints.
+def _step(step: ReversalStep) -> ReversalStepResult:
+    return ReversalStepResult(step.theta_deg, step.height_um, step.u_um)
 
-    Args:
-        found: the circles.
-    """
+
+def _quick_looks(found: Circled) -> list[QuickLookResult]:
+    """Signatures of serial axes in every circle, both directions of one together."""
     partner = {id(pair.one): pair.other for pair in found.pairs}
     second = {id(pair.other) for pair in found.pairs}
     looks = []
@@ -178,39 +237,28 @@ def quick_looks(found: Circled) -> list[dict[str, Any]]:
             continue
         turns = [one for one in (circle, partner.get(id(circle))) if one is not None]
         looked = quick_look([one.analysis for one in turns if one.analysis is not None])
+        symptoms = () if looked is None else looked.symptoms
         looks.append(
-            {
-                "session": circle.session,
-                "test": circle.entry.test,
-                "repeat": circle.entry.repeat,
-                "directions": [str(one.entry.direction) for one in turns],
-                **quick_look_summary(looked),
-            }
+            QuickLookResult(
+                session=circle.session,
+                test=circle.entry.test,
+                repeat=circle.entry.repeat,
+                directions=tuple(str(one.entry.direction) for one in turns),
+                symptoms=tuple(
+                    SymptomResult(
+                        signature=str(one.signature),
+                        place=one.place or None,
+                        value=one.value,
+                        u=one.u,
+                        below=one.below,
+                        unit=one.unit,
+                        seen=one.seen,
+                        text=one.text or None,
+                    )
+                    for one in symptoms
+                ),
+                form_rms_um=None if looked is None else looked.form_rms_um,
+                left_rms_um=None if looked is None else looked.left_rms_um,
+            )
         )
     return looks
-
-
-def _flattened(run: Mapping[str, Any]) -> dict[str, object]:
-    found: dict[str, object] = {}
-    for key, value in run.items():
-        match value:
-            case str() | int() | float():
-                found[key] = value
-            case {"max": _, "min": _} | {"x": _, "y": _}:
-                found |= {f"{key.removesuffix('_um')}_{part}_um": number for part, number in value.items()}
-            case _:
-                pass
-    for harmonic in run.get("harmonics", ()):
-        found[f"harmonic_{harmonic['undulations']}_um"] = harmonic["amplitude_um"]
-    for step in run.get("reversal_steps", ()):
-        found[f"step_at_{step['theta_deg']:.0f}_deg_um"] = step["height_um"]
-    if run.get("closure"):
-        found["closure_um"] = run["closure"]["height_um"]
-    if run.get("noise_um"):
-        found["noise_um"] = run["noise_um"]["of_a_reading"] or ""
-    for figure, budget in run.get("uncertainty", {}).items():
-        plain = figure.lower().replace("(", "_").replace(")", "").replace(" ", "_")
-        found[f"u_{plain}_um"] = "" if budget["u_um"] is None else budget["u_um"]
-    for finding in run.get("findings", ()):
-        found[f"finding_{finding['name'].replace(' ', '_')}"] = finding["verdict"]
-    return found

@@ -1,0 +1,304 @@
+"""Figures of one circle after ISO 230-4 with their budgets, as `circles --json` has them; lengths in µm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+from dbbstation.results.findings import FindingResult
+from dbbstation.results.serialise import Absent
+
+
+@dataclass(frozen=True)
+class LargestAndLeast:
+    """Largest and least deviation.
+
+    Attributes:
+        max: largest [µm].
+        min: least [µm].
+    """
+
+    max: float
+    min: float
+
+
+@dataclass(frozen=True)
+class PlaneVector:
+    """A place in the plane of the circle.
+
+    Attributes:
+        x: along X [µm].
+        y: along Y [µm].
+    """
+
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class HarmonicResult:
+    """One harmonic of the radius.
+
+    Attributes:
+        undulations: per revolution.
+        amplitude_um: of it [µm].
+        peak_deg: where it is largest [deg].
+    """
+
+    undulations: int
+    amplitude_um: float
+    peak_deg: float
+
+
+@dataclass(frozen=True)
+class ReversalStepResult:
+    """A step of the path.
+
+    Attributes:
+        theta_deg: where [deg].
+        height_um: how much the path rises in the sense of travel [µm].
+        u_um: its standard uncertainty [µm].
+    """
+
+    theta_deg: float
+    height_um: float
+    u_um: float
+
+
+@dataclass(frozen=True)
+class ShownFeed:
+    """The feed that the recording shows.
+
+    Attributes:
+        value: of it [mm/min].
+        u: its standard uncertainty [mm/min].
+    """
+
+    value: float
+    u: float
+
+
+@dataclass(frozen=True)
+class NoiseFigures:
+    """Noise of a recording.
+
+    Attributes:
+        of_slow_figures: standard deviation that figures of a turn have [µm]; None where it cannot be told.
+        of_a_reading: standard deviation of one reading [µm]; likewise.
+        step_of_readings: least difference of two readings [µm].
+    """
+
+    of_slow_figures: float | None
+    of_a_reading: float | None
+    step_of_readings: float
+
+
+@dataclass(frozen=True)
+class FigureBudget:
+    """Uncertainty of one figure.
+
+    Attributes:
+        u_um: standard uncertainty [µm]; None where `why_not` says why.
+        terms_um: standard uncertainties that it is made of, by name [µm].
+        missing: what is not stated and not in it.
+        why_not: why it is not known.
+        value_um: the figure, what noise adds taken off [µm].
+        as_read_um: the figure as read [µm].
+    """
+
+    u_um: float | None
+    terms_um: Mapping[str, float]
+    missing: tuple[str, ...]
+    why_not: str | None
+    value_um: float
+    as_read_um: float
+
+
+@dataclass(frozen=True)
+class RunWithoutCircle:
+    """A run whose recording shows no circle.
+
+    Attributes:
+        session: name of its session.
+        test: name of its test.
+        direction: `ccw` or `cw`.
+        repeat: counts runs of this test and direction.
+        problem: why it shows none.
+        findings: what was found of it; absent where these were not asked for.
+    """
+
+    session: str
+    test: str
+    direction: str
+    repeat: int
+    problem: str | None
+    findings: Annotated[tuple[FindingResult, ...] | None, Absent] = None
+
+    def row(self) -> dict[str, object]:
+        """Its name and findings, for a table."""
+        named = {"session": self.session, "test": self.test, "direction": self.direction, "repeat": self.repeat}
+        return {**named, **({"problem": self.problem} if self.problem else {}), **_verdicts(self.findings)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CircleFiguresResult:
+    """Figures of one circle.
+
+    Attributes:
+        session: name of its session.
+        test: name of its test.
+        direction: `ccw` or `cw`.
+        repeat: counts runs of this test and direction.
+        problem: None.
+        tilt_deg: of the platform [deg].
+        elevation_deg: of the bar [deg].
+        radius_mm: of the circle [mm].
+        bar_mm: nominal length of the bar [mm].
+        feed_mm_min: commanded [mm/min].
+        samples: of the turn.
+        samples_lost: of the recording.
+        g_um: circular deviation G, minimum zone [µm].
+        g_least_squares_um: circular deviation about the least-squares centre [µm].
+        f_um: radial deviations F about the least-squares centre [µm].
+        f_about_commanded_centre_um: radial deviations F about the commanded centre [µm].
+        radius_error_um: radius less commanded radius [µm].
+        mean_radial_error_um: mean length less commanded length [µm].
+        centre_um: least-squares centre less commanded centre [µm].
+        harmonics: of the radius.
+        reversal_steps: steps where an axis reverses.
+        closure: from the end of the turn to its beginning; None where it cannot be told.
+        drift_um_per_turn: of lengths over a turn; None where there is no second pass [µm].
+        feed_shown_mm_min: that the recording shows; None where it cannot be told.
+        noise_um: of the recording.
+        uncertainty: budget of each figure, by its name.
+        findings: what was found of it; absent where these were not asked for.
+    """
+
+    session: str
+    test: str
+    direction: str
+    repeat: int
+    problem: str | None
+    tilt_deg: tuple[float, ...]
+    elevation_deg: float
+    radius_mm: float
+    bar_mm: float
+    feed_mm_min: float
+    samples: int
+    samples_lost: int
+    g_um: float
+    g_least_squares_um: float
+    f_um: LargestAndLeast
+    f_about_commanded_centre_um: LargestAndLeast
+    radius_error_um: float
+    mean_radial_error_um: float
+    centre_um: PlaneVector
+    harmonics: tuple[HarmonicResult, ...]
+    reversal_steps: tuple[ReversalStepResult, ...]
+    closure: ReversalStepResult | None
+    drift_um_per_turn: float | None
+    feed_shown_mm_min: ShownFeed | None
+    noise_um: NoiseFigures
+    uncertainty: Mapping[str, FigureBudget]
+    findings: Annotated[tuple[FindingResult, ...] | None, Absent] = None
+
+    def row(self) -> dict[str, object]:
+        """Every number of the circle, for a table."""
+        found: dict[str, object] = {}
+        for key, value in vars(self).items():
+            match value:
+                case str() | int() | float():
+                    found[key] = value
+                case LargestAndLeast() | PlaneVector():
+                    found |= {f"{key.removesuffix('_um')}_{part}_um": number for part, number in vars(value).items()}
+                case _:
+                    pass
+        found |= {f"harmonic_{one.undulations}_um": one.amplitude_um for one in self.harmonics}
+        found |= {f"step_at_{step.theta_deg:.0f}_deg_um": step.height_um for step in self.reversal_steps}
+        if self.closure is not None:
+            found["closure_um"] = self.closure.height_um
+        found["noise_um"] = self.noise_um.of_a_reading or ""
+        for figure, budget in self.uncertainty.items():
+            plain = figure.lower().replace("(", "_").replace(")", "").replace(" ", "_")
+            found[f"u_{plain}_um"] = "" if budget.u_um is None else budget.u_um
+        return found | _verdicts(self.findings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairFigures:
+    """Figures of both directions of a circle.
+
+    Attributes:
+        session: name of its session.
+        test: name of its test.
+        repeat: counts runs of this test.
+        g_um: bidirectional circular deviation G(b), minimum zone [µm].
+        g_least_squares_um: the same about the least-squares centre [µm].
+        d_um: mean bidirectional radial deviation D [µm].
+        h_um: hysteresis H [µm].
+        h_deg: where that is [deg].
+        uncertainty: budget of each figure, by its name.
+    """
+
+    session: str
+    test: str
+    repeat: int
+    g_um: float
+    g_least_squares_um: float
+    d_um: float
+    h_um: float
+    h_deg: float
+    uncertainty: Mapping[str, FigureBudget]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SymptomResult:
+    """One signature of a serial axis.
+
+    Attributes:
+        signature: its name.
+        place: which axis or end; None where there is one only.
+        value: in its unit; None where it cannot be told.
+        u: standard uncertainty; likewise.
+        below: it is smaller than this, where it was not seen.
+        unit: of all of these.
+        seen: whether it is there.
+        text: in words.
+    """
+
+    signature: str
+    place: str | None
+    value: float | None
+    u: float | None
+    below: float | None
+    unit: str
+    seen: bool
+    text: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuickLookResult:
+    """Signatures of serial axes in one circle.
+
+    Attributes:
+        session: name of its session.
+        test: name of its test.
+        repeat: counts runs of this test.
+        directions: that went in.
+        symptoms: empty where there are too few samples.
+        form_rms_um: of the form [µm]; None there.
+        left_rms_um: of what signatures leave [µm]; None there.
+    """
+
+    session: str
+    test: str
+    repeat: int
+    directions: tuple[str, ...]
+    symptoms: tuple[SymptomResult, ...]
+    form_rms_um: float | None
+    left_rms_um: float | None
+
+
+def _verdicts(findings: tuple[FindingResult, ...] | None) -> dict[str, object]:
+    return {f"finding_{one.name.replace(' ', '_')}": one.verdict for one in findings or ()}

@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 from contextlib import contextmanager
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +23,7 @@ from dbbstation.cli.session_options import require_bar, session_details, session
 from dbbstation.service.patience import RECONNECT_S, driver_patience
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from types import FrameType
 
     from dbbstation.plan.circle import Direction
@@ -58,30 +59,7 @@ _AUTO_PATIENCE_S = 60.0
 @order_options
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON.")
-def measure(
-    *,
-    plan_file: Path,
-    machine_file: Path,
-    instrument: str,
-    profile: str | None,
-    zero_mm: float | None,
-    port: str,
-    baud: int | None,
-    spy: Path | None,
-    out: Path,
-    auto: str | None,
-    time_scale: float,
-    programs: Path | None,
-    rate_hz: float | None,
-    largest_loss_percent: float | None,
-    largest_bar_age_h: float | None,
-    model_file: Path | None,
-    source_files: tuple[Path, ...],
-    order: str,
-    gate: str,
-    as_json: bool,
-    **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
-) -> None:
+def measure(**given: Any) -> None:  # noqa: ANN401 - the options, each with a type of its own
     r"""Measure a plan, test by test, into a session folder.
 
     Tells you which ball goes into which bore and how to tilt the tool. It waits for Enter, then for the machine: it
@@ -95,6 +73,64 @@ def measure(
       dbbstation measure ... --order drift --gate first   (heights in turn, the first test again at the end)
       dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `emulate`)
     """
+    own = {one.name for one in fields(MeasureOptions)} - {"session"}
+    session = {name: value for name, value in given.items() if name not in own}
+    _measured(MeasureOptions(**{name: given[name] for name in own}, session=session))
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasureOptions:
+    """What `measure` was asked.
+
+    Attributes:
+        plan_file: test plan.
+        machine_file: nominal machine.
+        instrument: name of the instrument, or its protocol file.
+        profile: of the instrument; None: its usual one.
+        zero_mm: length at which a relative instrument shows zero; None: that of the bar [mm].
+        port: of the instrument.
+        baud: rate of the line; None: the instrument's usual one [1/s].
+        spy: file for a log of all bytes; None: none.
+        out: session folder.
+        auto: control address of `emulate`; None: a person starts circles.
+        time_scale: of a virtual machine.
+        programs: folder of the NC programs that are run; None: none.
+        rate_hz: sampling rate; None: the instrument's usual one [Hz].
+        largest_loss_percent: of samples, of a run; None: the plan's [%].
+        largest_bar_age_h: of the bar's calibration; None: any [h].
+        model_file: that circles are judged by; None: the nominal machine.
+        source_files: Python files with error sources of that model.
+        order: in which tests are measured.
+        gate: which run must be good before the others.
+        as_json: whether what was recorded is printed as JSON.
+        session: what is stated of the session, by the names of its options.
+    """
+
+    plan_file: Path
+    machine_file: Path
+    instrument: str
+    profile: str | None
+    zero_mm: float | None
+    port: str
+    baud: int | None
+    spy: Path | None
+    out: Path
+    auto: str | None
+    time_scale: float
+    programs: Path | None
+    rate_hz: float | None
+    largest_loss_percent: float | None
+    largest_bar_age_h: float | None
+    model_file: Path | None
+    source_files: tuple[Path, ...]
+    order: str
+    gate: str
+    as_json: bool
+    session: Mapping[str, Any]
+
+
+def _measured(asked: MeasureOptions) -> None:
+    """Measure the plan."""
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.recordings.entries import ReadBy
@@ -105,41 +141,55 @@ def measure(
     from dbbstation.station.programs import load_programs
     from dbbstation.virtual.wire_clock import ScaledClock
 
-    clock = ScaledClock(time_scale)
-    machine = read_machine(machine_file)
-    plan = in_order(with_loss_limit(read_inline_plan(plan_file), largest_loss_percent), order, gate)
-    chosen = chosen_protocol(instrument, profile, zero_mm, bar_length_mm=stated_length_mm(told))
-    protocol = at_rate(chosen, rate_hz)
+    clock = ScaledClock(asked.time_scale)
+    machine = read_machine(asked.machine_file)
+    plan = in_order(
+        with_loss_limit(read_inline_plan(asked.plan_file), asked.largest_loss_percent), asked.order, asked.gate
+    )
+    chosen = chosen_protocol(
+        asked.instrument, asked.profile, asked.zero_mm, bar_length_mm=stated_length_mm(asked.session)
+    )
+    protocol = at_rate(chosen, asked.rate_hz)
     job = Job(
         machine=machine,
         plan=plan,
-        folder=out,
-        details=session_details(**told, stroke_mm=protocol.length.stroke_mm),
-        programs={} if programs is None else load_programs(programs, plan.to_domain(), machine),
-        patience=Patience() if auto is None else Patience(for_machine_s=_AUTO_PATIENCE_S * max(time_scale, 1.0)),
+        folder=asked.out,
+        details=session_details(**asked.session, stroke_mm=protocol.length.stroke_mm),
+        programs={} if asked.programs is None else load_programs(asked.programs, plan.to_domain(), machine),
+        patience=Patience()
+        if asked.auto is None
+        else Patience(for_machine_s=_AUTO_PATIENCE_S * max(asked.time_scale, 1.0)),
         clock=clock,
-        time_scale=time_scale,
-        rate_hz=protocol.fastest_hz(baud),
+        time_scale=asked.time_scale,
+        rate_hz=protocol.fastest_hz(asked.baud),
         range_mm=protocol.length.range_mm,
-        model=judging_model(model_file, source_files),
+        model=judging_model(asked.model_file, asked.source_files),
         # A real machine neither has a control address of `emulate` nor runs faster than it does.
-        instrument=ReadBy(chosen.name, profile or "", port, virtual=auto is not None or time_scale != 1.0),
+        instrument=ReadBy(
+            chosen.name, asked.profile or "", asked.port, virtual=asked.auto is not None or asked.time_scale != 1.0
+        ),
     )
-    job.check(str(plan_file))
-    say_sampling(plan.to_domain(), protocol, baud)
-    if auto is None:  # a virtual machine has a bar of known length
-        require_bar(job, largest_bar_age_h)
-    hands = None if auto is None else VirtualHands(auto)
+    job.check(str(asked.plan_file))
+    say_sampling(plan.to_domain(), protocol, asked.baud)
+    if asked.auto is None:  # a virtual machine has a bar of known length
+        require_bar(job, asked.largest_bar_age_h)
+    hands = None if asked.auto is None else VirtualHands(asked.auto)
     with (
-        spying(spy, protocol, port) as log,
+        spying(asked.spy, protocol, asked.port) as log,
         Instrument(
-            protocol, port, baud=baud, clock=clock, log=log, reconnect_s=RECONNECT_S, **driver_patience(time_scale)
+            protocol,
+            asked.port,
+            baud=asked.baud,
+            clock=clock,
+            log=log,
+            reconnect_s=RECONNECT_S,
+            **driver_patience(asked.time_scale),
         ) as source,
     ):
         workplace = assemble(job, source, source.unreadable, asked=protocol.ask.asked)
         if workplace.writer.runs and job.details.noted:
             echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)
-        interrupted = _run(workplace, hands, as_json=as_json)
+        interrupted = _run(workplace, hands, as_json=asked.as_json)
     if interrupted:
         raise click.Abort
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.counting import natural
+from dbbstation.text.counting import natural
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.texts import Texts
+    from dbbstation.text.texts import Texts
 
 NOT_PUBLIC = {"cli", "tui", "demo", "prepare", "__main__"}
 """Top-level modules that nobody imports: commands, screens, what is run once."""

@@ -13,9 +13,9 @@ from concurrent.futures import as_completed
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.computing.processes import deaf, processes
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.atomic import write_text
-from dbbstation.processes import deaf, processes
 from dbbstation.tasks.diagnose import diagnose_sessions
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.processes import deaf, processes
+from dbbstation.computing.processes import deaf, processes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -8,15 +8,15 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.computing.processes import each
 from dbbstation.diagnosis.compare.comparison import compare
-from dbbstation.diagnosis.compare.summary import comparison_summary
 from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
-from dbbstation.diagnosis.drive.summary import drive_summary
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.files.recordings.drive_csv import read_drive
-from dbbstation.processes import each
+from dbbstation.results.of_comparison import comparison_result
+from dbbstation.results.of_drive import drive_result
 from dbbstation.results.of_mismatch import mismatch_result
 from dbbstation.results.serialise import plain
 from dbbstation.sources.registry import known_sources, sources_named
@@ -245,7 +245,7 @@ def answer_to(variation: Variation) -> Answer:
 
 def _drive_answer(variation: Variation) -> Answer:
     recording = read_drive(variation.paths[0]).recording(variation.force_per_ampere)
-    summary = drive_summary(identify([recording], list(known_drive_sources().values())))
+    summary = plain(drive_result(identify([recording], list(known_drive_sources().values()))))
     base = {name: one for name, one in summary["parameters"].items() if one["identifiable"]}
     return _answer(summary["sources"], _values(base))
 
@@ -254,7 +254,7 @@ def _pair_answer(a: Path, b: Path) -> Answer:
     one, other = load_sessions([a]), load_sessions([b])
     candidates = sources_named(default_candidates(known_sources()))
     usable, lacking = usable_sources(one.machine, [*one.observations, *other.observations], candidates)
-    summary = comparison_summary(compare(one.machine, one.observations, other.observations, usable, lacking), [])
+    summary = plain(comparison_result(compare(one.machine, one.observations, other.observations, usable, lacking)))
     answer = _answer(summary["causes"], {})
     answer.verdicts["the sessions"] = "differ" if summary["differ"] else "do not differ"
     return answer

@@ -10,8 +10,8 @@ import numpy as np
 from dbbstation.circles.noise import noise_of
 from dbbstation.circles.path import CirclePath, Filter, both, path_of
 from dbbstation.circles.reversals import AXES_DEG, closure_of, harmonics_of, step_at
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.plan.circle import FULL_TURN_DEG
-from dbbstation.threads import with_one_thread
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.cut import edges_of, overlap_feed
 from dbbstation.trace.loss import lost_samples

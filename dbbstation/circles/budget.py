@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.circles.estimates import estimate_of, pair_estimate
 from dbbstation.circles.noise import FEWEST_SAMPLES, ROUNDING
 from dbbstation.circles.quantity import ABSOLUTE, BudgetQuantity
-from dbbstation.threads import with_one_thread
+from dbbstation.computing.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -14,8 +14,8 @@ from scipy.optimize import minimize_scalar
 
 from dbbstation.circles.noise import LEAST_UM
 from dbbstation.circles.signatures import Signature, SignatureColumn, cyclic_shapes, shapes_of
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.harmonics import LOW, basis, misfit
-from dbbstation.threads import with_one_thread
 from dbbstation.trace.average import means, sector_of
 
 if TYPE_CHECKING:

@@ -100,7 +100,7 @@ def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:  # noqa: A
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
     open_missing()
-    # All work of this process is the program's own: the threads that `dbbstation.threads` takes away are not even started.
+    # All work of this process is the program's own: the threads that `dbbstation.computing.threads` takes away are not even started.
     # Read when NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     warnings.showwarning = _noted

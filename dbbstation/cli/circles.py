@@ -176,7 +176,7 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
 def _figure(run: Mapping[str, Any], name: str, value: float) -> tuple[str, str]:
     """Return a figure and its U as they are printed."""
     from dbbstation.cli.output import COVERAGE_FACTOR
-    from dbbstation.digits import with_uncertainty
+    from dbbstation.text.digits import with_uncertainty
 
     u = run["uncertainty"][name]["u_um"]
     return with_uncertainty(value, None if u is None else COVERAGE_FACTOR * u)
@@ -249,7 +249,7 @@ def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
 
 def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
-    from dbbstation.digits import with_uncertainty
+    from dbbstation.text.digits import with_uncertainty
 
     rows: list[list[object]] = []
     for look in looks:

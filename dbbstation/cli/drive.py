@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,7 +13,10 @@ from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
+
+    from dbbstation.results.drive import DriveCause, DriveResult, DriveValue, ForceLocation, HeldOutForce
+    from dbbstation.results.serialise import Quantified
 
 
 @click.command()
@@ -59,121 +63,113 @@ def drive(
       dbbstation drive strut3.csv --force-per-ampere 410 --figure strut3.svg
       dbbstation drive strut3.csv --sources coulomb-friction,friction-asymmetry --json
     """
-    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.diagnosis.drive.identify import identify
-    from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
-    from dbbstation.diagnosis.drive.summary import drive_summary
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.provenance import refuse_existing_table, write_table
-    from dbbstation.files.recordings.drive_csv import compared_csv, read_drive
+    from dbbstation.files.recordings.drive_csv import compared_csv
+    from dbbstation.tasks.drive import STAGES
+    from dbbstation.tasks.drive import drive as identified
 
     if out is not None:
         refuse_existing_table(out, force=force)
     if figure is not None:
         refuse_existing(figure, force=force)
-    known = known_drive_sources()
-    named = drive_sources_named([name.strip() for name in sources.split(",")] if sources else known)
-    files = [read_drive(path) for path in recordings]
-    for warning in (warning for file in files for warning in file.warnings):
-        say(f"note: {warning}")
-    raw = [file.recording(force_per_ampere) for file in files]
     with stage_bar("identification", STAGES) as progress:
-        found = identify(raw, named, cutoff_hz, progress, hold_out=not no_held_out)
-    summary = drive_summary(found)
+        result = identified(
+            recordings,
+            force_per_ampere=force_per_ampere,
+            sources=[name.strip() for name in sources.split(",")] if sources else None,
+            cutoff_hz=cutoff_hz,
+            hold_out=not no_held_out,
+            progress=progress,
+            say=lambda text: say(f"note: {text}"),
+        )
     if out is not None:
-        write_table(out, compared_csv(found.table()), provenance(), force=force)
-        summary["compared"] = str(out)
-    if figure is not None:
-        from dbbstation.report.drive_figure import drive_figure
-
-        write_bytes(figure, drive_figure(found, format_of(figure)), force=force)
-        summary["figure"] = str(figure)
-    for note in summary["notes"]:
-        say(f"note: {note}")
+        write_table(out, compared_csv(result.table), provenance(), force=force)
+        result = replace(result, compared=str(out))
+    if figure is not None and result.drawing is not None:
+        write_bytes(figure, result.drawing(format_of(figure)), force=force)
+        result = replace(result, figure=str(figure))
     if as_json:
-        print_json(summary)
+        print_result(result)
     else:
-        _print(summary)
+        _print(result)
 
 
-STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-out part": 40, "held-back stretch": 98}
-"""Stages of an identification, and the share of its time that has passed by then [%]."""
-
-
-def _print(summary: Mapping[str, Any]) -> None:
-    _print_if_worse(summary["held_out_rms_n"])
-    if summary["mismatch"]:
+def _print(result: DriveResult) -> None:
+    _print_if_worse(result.held_out_rms_n)
+    if result.mismatch:
         echo(
-            f"Mass and viscous friction leave {summary['misfit_rms_n']:.3g} N rms beyond noise "
-            f"(probability by chance {max(summary['probability'], 1e-99):.1g})."
+            f"Mass and viscous friction leave {result.misfit_rms_n:.3g} N rms beyond noise "
+            f"(probability by chance {max(result.probability, 1e-99):.1g})."
         )
     else:
-        echo(f"Mass and viscous friction are enough (probability {summary['probability']:.2g}).")
+        echo(f"Mass and viscous friction are enough (probability {result.probability:.2g}).")
     echo()
-    _print_sources(summary["sources"])
+    _print_sources(result.sources)
     echo("\nidentified:")
-    for name, number in summary["parameters"].items():
-        known = _number(number) if number["identifiable"] else "not identifiable from this recording"
+    for name, number in result.parameters.items():
+        known = _number(number) if number.identifiable else "not identifiable from this recording"
         echo(f"  {name}: {known}")
-    for side, values in summary["friction"].items():
+    for side, values in result.friction.items():
         echo(f"  friction {side}: " + ", ".join(f"{name} {_number(n)}" for name, n in values.items()))
-    held_back = summary["held_back"]
-    first, last = held_back["t_s"]
+    held_back = result.held_back
+    first, last = held_back.t_s
     echo(f"\nrelative force error on {first:.2f} to {last:.2f} s, fitted without it:")
     before = float("inf")
-    for step in held_back["steps"]:
-        name = f"+ {step['added']}" if step["added"] else "mass and viscous friction"
-        error = step["relative_force_error"]
+    for step in held_back.steps:
+        name = f"+ {step.added}" if step.added else "mass and viscous friction"
+        error = step.relative_force_error
         worse = "  worse than without it: it does not carry over to this stretch" if error > before else ""
         echo(f"  {name:<26} {100 * error:6.2f} %{worse}")
         before = error
-    if left_out := held_back["not_in_model"]:
+    if left_out := held_back.not_in_model:
         echo(f"  not in the model, since nothing decides on it: {', '.join(left_out)}")
-    if summary["locations"]:
+    if result.locations:
         echo("\nwhere the misfit of mass and viscous friction is largest:")
-        _print_locations(summary["locations"])
-    echo("\n" + summary["unexplained"]["text"])
-    if summary["unexplained"]["significant"]:
-        for effect in summary["unexplained"]["effects"][:3]:
+        _print_locations(result.locations)
+    echo("\n" + result.unexplained.text)
+    if result.unexplained.significant:
+        for effect in result.unexplained.effects[:3]:
             echo(
-                f"  {effect['text']}: {effect['rms_n']:.2g} N rms, from {effect['from']:.4g} to {effect['to']:.4g} {effect['unit']} "
-                f"(probability {_probability(effect['probability'])})"
+                f"  {effect.text}: {effect.rms_n:.2g} N rms, from {effect.low:.4g} to {effect.high:.4g} {effect.unit} "
+                f"(probability {_probability(effect.probability)})"
             )
-        echo(f"It is {summary['unexplained']['rms_n']:.2g} N rms; largest:")
-        _print_locations(summary["unexplained"]["locations"][:3])
-    for sentence in summary["cannot_tell"]:
+        echo(f"It is {result.unexplained.rms_n:.2g} N rms; largest:")
+        _print_locations(result.unexplained.locations[:3])
+    for sentence in result.cannot_tell:
         echo(sentence)
-    signals = summary["signals"]
-    echo(f"band up to {signals['cutoff_hz']:.3g} Hz, {signals['samples_compared']} samples compared")
+    signals = result.signals
+    echo(f"band up to {signals.cutoff_hz:.3g} Hz, {signals.samples_compared} samples compared")
 
 
-def _print_if_worse(held: Mapping[str, Any] | None) -> None:
+def _print_if_worse(held: HeldOutForce | None) -> None:
     """Say first of all that the model does not predict, where it does not."""
-    if held and held["worse"]:
+    if held and held.worse:
         echo(
-            f"Everything found predicts held-out parts worse than mass and friction alone: {held['corrected']:.3g} N rms against "
-            f"{held['reference']:.3g} N. Nothing is identified."
+            f"Everything found predicts held-out parts worse than mass and friction alone: {held.corrected:.3g} N rms against "
+            f"{held.reference:.3g} N. Nothing is identified."
         )
 
 
-def _print_locations(locations: Sequence[Mapping[str, Any]]) -> None:
+def _print_locations(locations: Sequence[ForceLocation]) -> None:
     for location in locations[:5]:
-        echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
+        echo(f"  {location.text} ({100 * location.share:.0f} % of it)")
 
 
-def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
+def _print_sources(sources: Sequence[DriveCause]) -> None:
     from dbbstation.cli.output import print_table
 
     rows = [
         [
-            s["name"],
-            s["verdict"],
-            _probability(s["probability"]),
-            f"{s['gain']:.0f}",
-            f"{100 * s['concealed']:.0f} %",
-            ", ".join(s["ambiguous_with"]),
+            s.name,
+            s.verdict,
+            _probability(s.probability),
+            f"{s.gain:.0f}",
+            f"{100 * s.concealed:.0f} %",
+            ", ".join(s.ambiguous_with),
         ]
         for s in sources
     ]
@@ -181,29 +177,29 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
         ["cause", "verdict", "probability", "log Bayes factor", "concealed (R²)", "not distinguished from"], rows
     )
     for source in sources:
-        if source["verdict"] in {"identified", "happened", "does-not-predict", "ambiguous"}:
+        if source.verdict in {"identified", "happened", "does-not-predict", "ambiguous"}:
             echo()
             _print_parts(source)
-            echo(f"  {source['text']}")
+            echo(f"  {source.text}")
 
 
-def _print_parts(source: Mapping[str, Any]) -> None:
+def _print_parts(source: DriveCause) -> None:
     """Numbers of a cause, or of each wave and pulse where it has several."""
-    if source["parameters"] and len(source["parts"]) <= 1:
-        for name, number in source["parameters"].items():
-            echo(f"{source['name']}: {name} {_number(number)}")
+    if source.parameters and len(source.parts) <= 1:
+        for name, number in source.parameters.items():
+            echo(f"{source.name}: {name} {_number(number)}")
         return
-    for part in source["parts"]:
-        when = f"from {part['t_s'][0]:.3f} to {part['t_s'][1]:.3f} s, " if part["t_s"] else ""
-        numbers = ", ".join(f"{name} {_number(number)}" for name, number in part["parameters"].items())
-        echo(f"{source['name']}: {when}{numbers}")
+    for part in source.parts:
+        when = f"from {part.t_s[0]:.3f} to {part.t_s[1]:.3f} s, " if part.t_s else ""
+        numbers = ", ".join(f"{name} {_number(number)}" for name, number in part.parameters.items())
+        echo(f"{source.name}: {when}{numbers}")
 
 
 def _probability(probability: float) -> str:
     return "> 0.999" if probability > 0.999 else f"{probability:.3f}"  # noqa: PLR2004 - three digits are shown
 
 
-def _number(number: Mapping[str, Any]) -> str:
-    if number["uncertainty"] is None:
-        return f"{number['value']:#.4g} {number['unit']}"
-    return f"{number['value']:#.4g} ± {number['uncertainty']:.2g} {number['unit']}"
+def _number(number: Quantified | DriveValue) -> str:
+    if number.uncertainty is None:
+        return f"{number.value:#.4g} {number.unit}"
+    return f"{number.value:#.4g} ± {number.uncertainty:.2g} {number.unit}"

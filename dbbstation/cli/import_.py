@@ -11,7 +11,7 @@ import click
 from dbbstation.cli.mapping_options import mapping_options
 from dbbstation.cli.output import echo
 from dbbstation.cli.session_options import noted_options, session_details
-from dbbstation.printable import printable
+from dbbstation.text.printable import printable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -142,12 +142,12 @@ def _read(
 
     from dbbstation.cli.mapping_options import chosen_mapping, read_tables
     from dbbstation.cli.provenance import provenance
-    from dbbstation.counting import repeats_in_order
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.recordings.entries import Note
     from dbbstation.tasks.importing.runs import Reader
     from dbbstation.tasks.importing.session import originals
+    from dbbstation.text.counting import repeats_in_order
 
     tables = read_tables(files, of_mapping)
     chosen = chosen_mapping(list(tables.values()), of_mapping, asker)

@@ -23,7 +23,7 @@ import click
 
 from dbbstation.cli.provenance import PROGRAM, command_of
 from dbbstation.files.recorded_ground import session_around
-from dbbstation.printable import printable
+from dbbstation.text.printable import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
+from dbbstation.cli.effects import LIKELY, SURELY_FOUND, first_names, parts_with_gain, residual_text, with_uncertainty
 from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     from dbbstation.diagnosis.simulator.answer import SimulatorComparison
     from dbbstation.files.formats.number_language import NumberLanguage
+    from dbbstation.results.simulator import PortTerm, SimulatorParameterResult, SimulatorResult
 
 
 def mismatch_with_simulator(
@@ -29,14 +32,15 @@ def mismatch_with_simulator(
     as_json: bool,
 ) -> None:
     """Compare a simulator with recordings, print what is said and write what is asked for."""
-    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.diagnosis.simulator.answer import find
     from dbbstation.diagnosis.simulator.model import SimulationRequest
-    from dbbstation.diagnosis.simulator.summary import simulator_summary
     from dbbstation.files.atomic import refuse_existing, write_bytes, write_text
     from dbbstation.files.provenance import refuse_existing_table, write_table
+    from dbbstation.results.of_simulator import simulator_result
+    from dbbstation.results.simulator import SimulationsRun
     from dbbstation.simulators.code import missing_code
     from dbbstation.simulators.loading import load_simulator
     from dbbstation.simulators.running import MOST_SECONDS, Runs
@@ -63,23 +67,23 @@ def mismatch_with_simulator(
                 progress(spent, done, of)
 
             answer = find(model, runs, own=loaded.own, hold_out=hold_out, progress=told)
-        summary = simulator_summary(answer) | {"simulations": {"run": runs.ran, "most": runs.most, "one_s": one_s}}
+        result = simulator_result(answer, SimulationsRun(runs.ran, runs.most, one_s))
     if out is not None:
         write_text(out, missing_code(answer), force=force)
-        summary["out"] = str(out)
+        result = replace(result, out=str(out))
     if corrected is not None:
         write_table(corrected, _corrected(answer), provenance(), force=force)
-        summary["corrected"] = str(corrected)
+        result = replace(result, corrected=str(corrected))
     if figure is not None:
         from dbbstation.cli.figure_option import format_of
         from dbbstation.report.simulator_figure import simulator_figure
 
         write_bytes(figure, simulator_figure(answer, format_of(figure)), force=force)
-        summary["figure"] = str(figure)
+        result = replace(result, figure=str(figure))
     if as_json:
-        print_json(summary)
+        print_result(result)
     else:
-        _print(summary)
+        _print(result)
 
 
 STAGES = {"refit": 0, "look": 5, "sets of causes": 10, "held-out part": 40}
@@ -113,106 +117,94 @@ def _corrected(answer: SimulatorComparison) -> str:
     return table_csv(names, columns)
 
 
-def _print(summary: Mapping[str, Any]) -> None:
-    unit, held_out = summary["unit"], summary["held_out_rms"]
-    _print_whether(summary)
-    findings = summary["findings"]
-    there = [f for f in findings if f["verdict"] in SHOWN]
-    likely = [f for f in findings if f["verdict"] == "ambiguous" and (f["put_in"] or f["probability"] >= LIKELY)]
+def _print(result: SimulatorResult) -> None:
+    unit, held_out = result.unit, result.held_out_rms
+    _print_whether(result)
+    findings = result.findings
+    there = [f for f in findings if f.verdict in SURELY_FOUND]
+    likely = [f for f in findings if f.verdict == "ambiguous" and (f.put_in or f.probability >= LIKELY)]
     if there or likely:
         echo()
         _print_findings([*there, *likely])
-    _print_parameters(summary["parameters"])
+    _print_parameters(result.parameters)
     if held_out:
         echo(
-            f"\nheld-out error: {held_out['as_simulated']:.3g} as simulated, {held_out['refitted']:.3g} refitted, "
-            f"{held_out['corrected']:.3g} {unit} rms corrected; over {len(held_out['parts'])} parts, each chosen anew and simulated"
+            f"\nheld-out error: {held_out.as_simulated:.3g} as simulated, {held_out.refitted:.3g} refitted, "
+            f"{held_out.corrected:.3g} {unit} rms corrected; over {len(held_out.parts)} parts, each chosen anew and simulated"
         )
     elif there:
         echo("\nheld-out parts were not asked for, or not reached: whether what is found predicts was not tested.")
     echo()
-    _print_left(summary)
-    if summary["next"]:
+    _print_left(result)
+    if result.next:
         echo("\nmeasure next:")
-        for step in summary["next"]:
-            echo(f"  {step['text']}")
+        for step in result.next:
+            echo(f"  {step.text}")
 
 
-def _print_whether(summary: Mapping[str, Any]) -> None:
+def _print_whether(result: SimulatorResult) -> None:
     """Is there a mismatch, how large, beside which noise."""
-    unit, rms, held_out = summary["unit"], summary["rms"], summary["held_out_rms"]
-    if held_out and held_out["worse"]:
+    unit, rms, held_out = result.unit, result.rms, result.held_out_rms
+    if held_out and held_out.worse:
         echo(
-            f"Held-out parts are predicted worse than as simulated: {held_out['corrected']:.3g} corrected, "
-            f"{held_out['as_simulated']:.3g} {unit} rms as simulated. Nothing is identified.\n".replace("  ", " ")
+            f"Held-out parts are predicted worse than as simulated: {held_out.corrected:.3g} corrected, "
+            f"{held_out.as_simulated:.3g} {unit} rms as simulated. Nothing is identified.\n".replace("  ", " ")
         )
-    if summary["stopped"]:
-        echo(f"Ended early: {summary['stopped']}. Allow more with --most-runs.\n")
-    if summary["mismatch"]:
+    if result.stopped:
+        echo(f"Ended early: {result.stopped}. Allow more with --most-runs.\n")
+    if result.mismatch:
         echo(
-            f"There is a mismatch: {rms['as_simulated']:.3g} {unit} rms as simulated, {rms['refitted']:.3g} refitted, "
-            f"{rms['corrected']:.3g} corrected."
+            f"There is a mismatch: {rms.as_simulated:.3g} {unit} rms as simulated, {rms.refitted:.3g} refitted, "
+            f"{rms.corrected:.3g} corrected."
         )
     else:
         echo(
-            f"No mismatch: what the refitted simulator leaves, {rms['refitted']:.3g} {unit} rms, is noise.".replace(
+            f"No mismatch: what the refitted simulator leaves, {rms.refitted:.3g} {unit} rms, is noise.".replace(
                 "  ", " "
             )
         )
-    echo(f"noise of one row: {summary['noise']['sigma']:.3g} {unit}".rstrip())
-    if not summary["settled"] and not summary["stopped"]:
+    echo(f"noise of one row: {result.noise.sigma:.3g} {unit}".rstrip())
+    if not result.settled and not result.stopped:
         echo("The search did not settle: what it ended at is not the only set of terms that it came by.")
 
 
-def _print_left(summary: Mapping[str, Any]) -> None:
-    left = summary["left"]
-    if left["is_noise"]:
-        echo("Nothing is left beyond noise.")
-    else:
-        worst = min(left["looks"], key=lambda look: look["probability"])
-        echo(
-            f"Something is left beyond noise: {worst['name']}, {worst['rms']:.2g} {summary['unit']}. No term at a port says it."
-        )
+def _print_left(result: SimulatorResult) -> None:
+    beyond = "" if result.left.is_noise else " No term at a port says it."
+    echo(residual_text(result.left, result.unit) + beyond)
     for verdict in ("not-testable", "ruled-out"):
-        names = [f["name"] for f in summary["findings"] if f["verdict"] == verdict]
+        names = [f.name for f in result.findings if f.verdict == verdict]
         if names:
-            shown = ", ".join(names[:MOST_NAMES])
-            echo(f"{verdict}: {shown}" + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""))
+            echo(f"{verdict}: {first_names(names)}")
 
 
-SHOWN = ("identified", "happened", "does-not-predict")
-LIKELY = 0.5
-"""Probability from which on a term that is not put in is printed; all of them are in the JSON."""
-
-MOST_NAMES = 6
 MOST_VALUES = 4
 
 
-def _print_findings(there: Sequence[Mapping[str, Any]]) -> None:
+def _print_findings(there: Sequence[PortTerm]) -> None:
     from dbbstation.cli.output import print_table
 
     rows = [
         [
-            f["name"],
-            f["verdict"],
-            f"{f['probability']:.3f}",
-            f"{f['log_bayes_factor']:.0f}",
-            f"{100.0 * f['confounded']:.0f} %",
-            f"{f['gains']['with_gain']} of {len(f['gains']['parts'])}" if f["gains"] else "",
+            f.name,
+            f.verdict,
+            f"{f.probability:.3f}",
+            f"{f.log_bayes_factor:.0f}",
+            f"{100.0 * f.confounded:.0f} %",
+            parts_with_gain(f.gains),
         ]
         for f in there
     ]
     print_table(["term", "verdict", "probability", "log Bayes factor", "concealed", "parts with a gain"], rows)
     for f in there:
-        echo(f"\n{f['name']}" + (f" ({f['about']})" if f["about"] else ""))
-        values = ", ".join(f"{name} {_number(value)}" for name, value in f["values"].items())
-        if values and len(f["values"]) <= MOST_VALUES:
+        echo(f"\n{f.name}" + (f" ({f.about})" if f.about else ""))
+        values = ", ".join(f"{name} {with_uncertainty(value)}" for name, value in f.values.items())
+        if values and len(f.values) <= MOST_VALUES:
             echo(f"  {values}")
-        if f["text"]:
-            echo(f"  {f['text']}")
+        if f.text:
+            echo(f"  {f.text}")
 
 
-def _print_parameters(parameters: Sequence[Mapping[str, Any]]) -> None:
+def _print_parameters(parameters: Sequence[SimulatorParameterResult]) -> None:
     from dbbstation.cli.output import print_table
 
     if not parameters:
@@ -220,24 +212,18 @@ def _print_parameters(parameters: Sequence[Mapping[str, Any]]) -> None:
     echo("\nparameters of the simulator:")
     rows = [
         [
-            p["name"],
-            f"{p['stated']:.4g}",
-            _number(p["refitted"] | {"unit": ""}),
-            _number(p["corrected"] | {"unit": ""}),
-            p["unit"],
-            f"{100.0 * p['confounded']:.0f} %",
+            p.name,
+            f"{p.stated:.4g}",
+            with_uncertainty(replace(p.refitted, unit="")),
+            with_uncertainty(replace(p.corrected, unit="")),
+            p.unit,
+            f"{100.0 * p.confounded:.0f} %",
         ]
         for p in parameters
     ]
     print_table(["parameter", "stated", "refitted", "corrected", "unit", "concealed it"], rows)
     for p in parameters:
-        alike = p["not_told_apart_from"]
+        alike = p.not_told_apart_from
         if alike is not None:
             what = f"from {', '.join(alike)}" if alike else "from anything: no output answers to it"
-            echo(f"  The recordings cannot tell {p['name']} {what}.")
-
-
-def _number(number: Mapping[str, Any]) -> str:
-    u = number["uncertainty"]
-    known = f"{number['value']:.4g} ± {u:.2g}" if u is not None else f"{number['value']:.4g}"
-    return f"{known} {number['unit']}".rstrip()
+            echo(f"  The recordings cannot tell {p.name} {what}.")

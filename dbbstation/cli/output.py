@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.printable import on_one_line, printable
+from dbbstation.text.printable import on_one_line, printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -44,8 +44,8 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
       dbbstation session list 2026-11-20-hexapod-7 --json
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json, print_table
-    from dbbstation.counting import repeats_in_order
     from dbbstation.files.recordings.session import read_session
+    from dbbstation.text.counting import repeats_in_order
 
     read = read_session(folder)
     missing = [f"{test} {direction}" for test, direction in _missing(read)]

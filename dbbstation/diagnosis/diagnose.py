@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.stray_balls import beside
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.chosen_anew import without_tests
 from dbbstation.diagnosis.explain import explain, without
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained, Verdict
@@ -25,7 +26,6 @@ from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN
 from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.by_temperature import not_given
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

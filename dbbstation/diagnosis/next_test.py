@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.findings import NextTest, Verdict
 from dbbstation.diagnosis.verdicts import TESTABLE_SHARE
 from dbbstation.errors import MachineError
@@ -17,7 +18,6 @@ from dbbstation.machine.travel import check_travel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.sources.contract import Motion, Need, Setup
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.discrepancy import BY_DIRECTION
 from dbbstation.diagnosis.shapes import SIGNED, TEMPERATURES, Follows, variables
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.laws.by_temperature import FollowsTemperature
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

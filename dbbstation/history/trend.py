@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.history.order import by_time
 from dbbstation.history.run_length import chart_for
 from dbbstation.history.watch import TrendVerdict, watch
 from dbbstation.plan.tolerance import CircleFigure
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

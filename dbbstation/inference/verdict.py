@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum, StrEnum, auto
-from typing import Any
 
 SURE = 0.95
 """Probability from which on something is said to be there: one claim in twenty may be wrong if the model of noise and causes is right."""
@@ -92,15 +91,6 @@ class Gains:
     def predicts(self) -> bool:
         """Whether it brought something in enough parts, and in sum without the best part."""
         return bool(self.parts) and self.with_gain >= PARTS_WITH_GAIN * len(self.parts) and self.without_best > 0.0
-
-    def plain(self) -> dict[str, Any]:
-        """Return it as plain values for JSON."""
-        return {
-            "parts": list(self.parts),
-            "with_gain": self.with_gain,
-            "total": self.total,
-            "predicts": self.predicts,
-        }
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import KinematicsError
 from dbbstation.machine.kinematics import position_responses
 from dbbstation.model.identified import known_u
 from dbbstation.model.machine_model import by_parameters
 from dbbstation.sources.contract import Motion
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable

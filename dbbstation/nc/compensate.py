@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import StationError
 from dbbstation.nc.curve import CommandCurve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, PLANNED_WITHIN, cuts, move_mm
 from dbbstation.nc.splitting import SHORTEST_MM, Pieces, looked_at, moves_of, parts_of, rows_as_pieces, runs_of, split
 from dbbstation.nc.toolpath import RowKind, rounded
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.quality.between import direction, other_direction, repeat
 from dbbstation.quality.finding import Finding, Name
 from dbbstation.quality.knowledge import Others, Run, Seen, across, apart_um, seen
@@ -14,7 +15,6 @@ from dbbstation.quality.place import bore, radius
 from dbbstation.quality.single import by_itself
 from dbbstation.quality.stated import sigmas_apart
 from dbbstation.quality.swapped import of_its_test
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from dbbstation.diagnosis.compare.summary import by_angle_um
+from dbbstation.diagnosis.compare.words import by_angle_um
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, DIVERGING, QUARTERS, in_style
 from dbbstation.report.figure_format import FigureFormat, Stamped, in_format

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import jinja2
 
-from dbbstation.digits import with_uncertainty
 from dbbstation.history.words import DASH, rounded
+from dbbstation.text.digits import with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

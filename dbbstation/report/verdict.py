@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.digits import with_uncertainty
 from dbbstation.quality.conformity import Conformity
+from dbbstation.text.digits import with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

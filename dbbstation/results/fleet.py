@@ -160,7 +160,7 @@ class SharedCause:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class FleetComparison:
     """Machines held against one another.
 
     Attributes:
@@ -204,7 +204,7 @@ class FleetResult(Framed):
     table: str
     page: str
     sessions: tuple[FleetSession, ...]
-    comparison: Annotated[Comparison | None, Absent]
+    comparison: Annotated[FleetComparison | None, Absent]
 
     @property
     def failed(self) -> tuple[FleetSession, ...]:

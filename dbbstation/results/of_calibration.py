@@ -14,6 +14,7 @@ from dbbstation.calibration.checks.plan_check import PlanCheck, check_plan
 from dbbstation.calibration.checks.scatter import ScatterVerdict, check_scatter, seats_of
 from dbbstation.calibration.checks.visibility import visibility
 from dbbstation.calibration.reporting.evaluation import rms_um
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.model.identified import known_u
 from dbbstation.results.calibration import (
     CalibrationFigures,
@@ -34,7 +35,6 @@ from dbbstation.results.of_currents import currents_result
 from dbbstation.results.of_evaluation import evaluated_runs
 from dbbstation.results.serialise import Quantified, plain
 from dbbstation.sources.contract import Owner
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

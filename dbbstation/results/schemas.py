@@ -6,7 +6,9 @@ from typing import Any
 
 from dbbstation.results.calibration import CalibrationResult
 from dbbstation.results.circles import CirclesResult
+from dbbstation.results.comparison import ComparisonResult
 from dbbstation.results.diagnosis import DiagnosisResult
+from dbbstation.results.drive import DriveResult
 from dbbstation.results.evaluation import EvaluationResult
 from dbbstation.results.fleet import FleetResult
 from dbbstation.results.mismatch import MismatchResult
@@ -17,8 +19,10 @@ from dbbstation.results.serialise import schema_of
 RESULTS: dict[str, type] = {
     "calibrate": CalibrationResult,
     "circles": CirclesResult,
+    "compare": ComparisonResult,
     "compensate": ProgramsResult,
     "diagnose": DiagnosisResult,
+    "drive": DriveResult,
     "evaluate": EvaluationResult,
     "mismatch": MismatchResult,
     "fleet": FleetResult,

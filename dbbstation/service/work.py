@@ -68,7 +68,7 @@ class BackgroundWork:
         self._process = subprocess.Popen(  # noqa: S603 - a module of the program
             [sys.executable, "-m", WORKER],
             cwd=folder,
-            # Read when NumPy is imported: the threads that `dbbstation.threads` takes away are not even started.
+            # Read when NumPy is imported: the threads that `dbbstation.computing.threads` takes away are not even started.
             env={"OPENBLAS_NUM_THREADS": "1", **os.environ},
             stdin=subprocess.PIPE,
             stdout=self._answer,

@@ -11,10 +11,10 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from dbbstation.catalogue import in_words, line_in
+from dbbstation.computing.processes import deaf, processes
 from dbbstation.diagnosis.simulator.ports import simulated
 from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
 from dbbstation.errors import CalibrationError
-from dbbstation.processes import deaf, processes
 from dbbstation.simulators.loading import know, simulator_of
 
 if TYPE_CHECKING:

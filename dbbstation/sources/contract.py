@@ -20,7 +20,7 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import Struts, inverse
 from dbbstation.machine.rotation import Frames
-from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
+from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
 from dbbstation.trace.columns import WithLogged
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from dbbstation.computing.processes import deaf, processes
 from dbbstation.errors import StationError
 from dbbstation.files.program_identity import differences_of, program_identity
-from dbbstation.processes import deaf, processes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
@@ -39,7 +39,7 @@ class Ended:
 
 
 @dataclass(frozen=True)
-class Workplace(Generic[Item, Result]):
+class WorkPool(Generic[Item, Result]):
     """Where work is done.
 
     Attributes:

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.counting import natural
 from dbbstation.errors import StationError
 from dbbstation.files.atomic import write_bytes
 from dbbstation.files.fleet_folder import FleetFolder, key_of
@@ -22,13 +21,14 @@ from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.report.fleet_page import fleet_html
 from dbbstation.results.fleet import FleetFound, FleetResult, FleetSession, found_from
 from dbbstation.sisters.unlike import FALSE_ALARMS
-from dbbstation.tasks.executors import Ended, Workplace
+from dbbstation.tasks.executors import Ended, WorkPool
 from dbbstation.tasks.fleet_compare import Sister, compared
 from dbbstation.tasks.fleet_table import write_fleet_table
-from dbbstation.tasks.fleet_work import TASKS, FleetOptions, Piece, Worked, worked
+from dbbstation.tasks.fleet_work import TASKS, FleetOptions, FleetPiece, Worked, worked
 from dbbstation.tasks.load import paths_of
 from dbbstation.tasks.provenance import from_python
 from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.text.counting import natural
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -147,10 +147,10 @@ def fleet(
         else:
             todo.append(place)
     pieces = [
-        Piece(task, real_path(named[place].folder), options, {**(named[place].inputs or {}), **extra}, program)
+        FleetPiece(task, real_path(named[place].folder), options, {**(named[place].inputs or {}), **extra}, program)
         for place in todo
     ]
-    workplace: Workplace[Piece, Worked] = Workplace(min(processes, len(pieces)), scheduler)
+    workplace: WorkPool[FleetPiece, Worked] = WorkPool(min(processes, len(pieces)), scheduler)
     telling.stage(WORKING, 0, len(pieces))
     with closing(workplace.each(worked, pieces)) as results:
         for done, (at, outcome) in enumerate(results, start=1):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.difference import NOT_PREDICTED, differences, in_words
-from dbbstation.results.fleet import Comparison, Scored, SharedCause
+from dbbstation.results.fleet import FleetComparison, Scored, SharedCause
 from dbbstation.sisters.unlike import FEWEST, held_against_sisters
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Sister:
 _Key = tuple[str, ...]
 
 
-def compared(sisters: Sequence[Sister], false_alarms: float) -> Comparison:
+def compared(sisters: Sequence[Sister], false_alarms: float) -> FleetComparison:
     """Hold machines against one another.
 
     Figures are compared between all machines that drove the same circle. Parameters, and those of causes, are departures from
@@ -101,7 +101,7 @@ def compared(sisters: Sequence[Sister], false_alarms: float) -> Comparison:
             )
     enough = sum(len(of) >= FEWEST for of in rows.values())
     notes += _alone([key for key in keys if len(rows[key]) < FEWEST])
-    return Comparison(
+    return FleetComparison(
         false_alarms=false_alarms,
         machines=len(sisters),
         quantities=enough,

@@ -74,7 +74,7 @@ class FleetOptions:
 
 
 @dataclass(frozen=True)
-class Piece:
+class FleetPiece:
     """One session that is to be worked on.
 
     Attributes:
@@ -109,7 +109,7 @@ class Worked:
     files: Mapping[str, bytes] = field(default_factory=dict)
 
 
-def worked(piece: Piece) -> Worked:
+def worked(piece: FleetPiece) -> Worked:
     """Do a task on one session, and return what came of it or why nothing did.
 
     Raises:
@@ -138,7 +138,7 @@ def _refuse_other_inputs(inputs: Mapping[str, str]) -> None:
 Done = tuple[FleetFound, "dict[str, Any]", "dict[str, bytes]"]
 
 
-def _calibrated(piece: Piece) -> Done:
+def _calibrated(piece: FleetPiece) -> Done:
     options = piece.options
     result = calibrate(
         piece.folder,
@@ -165,7 +165,7 @@ def _calibrated(piece: Piece) -> Done:
     return found, plain(result), {".yaml": model_text(result.model, _provenance(piece)).encode()}
 
 
-def _diagnosed(piece: Piece) -> Done:
+def _diagnosed(piece: FleetPiece) -> Done:
     options = piece.options
     result = diagnose(
         piece.folder,
@@ -194,7 +194,7 @@ def _diagnosed(piece: Piece) -> Done:
     return found, plain(result), {".yaml": model_text(result.model, _provenance(piece)).encode()}
 
 
-def _circles(piece: Piece) -> Done:
+def _circles(piece: FleetPiece) -> Done:
     options = piece.options
     result = circle_figures(piece.folder, tests=options.tests, exclude=options.exclude, findings=options.findings)
     runs = run_figures(result.circles.circles)
@@ -205,7 +205,7 @@ def _circles(piece: Piece) -> Done:
     return FleetFound(_of_circles(runs), (), headline, result.notes), plain(result), {}
 
 
-def _reported(piece: Piece) -> Done:
+def _reported(piece: FleetPiece) -> Done:
     options = piece.options
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "report.html"
@@ -226,7 +226,7 @@ TASKS = {"calibrate": _calibrated, "circles": _circles, "diagnose": _diagnosed, 
 """What can be done of every session, by name."""
 
 
-def _provenance(piece: Piece) -> Provenance:
+def _provenance(piece: FleetPiece) -> Provenance:
     """Return where an output comes from: from what a command of this session alone would."""
     command = shlex.join(["dbbstation", piece.task, name_of(piece.folder), *piece.options.words()])
     return Provenance(f"dbbstation {__version__}", command, inputs_so_far())

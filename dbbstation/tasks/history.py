@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from dbbstation.computing.processes import each
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_known
@@ -20,7 +21,6 @@ from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.history.order import date_faults
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.history.trend import histories
-from dbbstation.processes import each
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

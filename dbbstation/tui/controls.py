@@ -7,7 +7,7 @@ from typing import cast
 from rich import control
 from textual import content
 
-from dbbstation.printable import TEXT
+from dbbstation.text.printable import TEXT
 
 
 def show_controls() -> None:

@@ -14,7 +14,7 @@ import pytest
 import dbbstation
 from dbbstation.files.csv_rows import csv_text
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.printable import on_one_line, printable
+from dbbstation.text.printable import on_one_line, printable
 from tests.cli.conftest import call
 
 PACKAGE = Path(dbbstation.__file__).parent

@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 from scipy.stats import rice
 
 from dbbstation.cli import DONE, FAILED
-from dbbstation.digits import with_uncertainty
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.text.digits import with_uncertainty
 from tests.cli.conftest import call
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import subset, table_ii_plan

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.square_root import lost_directions
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

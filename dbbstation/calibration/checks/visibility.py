@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.directions import in_words
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.square_root import complement, spread_over
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -13,13 +13,13 @@ from dbbstation.calibration.fit.directions import in_words, of_circles
 from dbbstation.calibration.fit.nodes import RunNodes, nodes_of, smooth
 from dbbstation.calibration.fit.prescription import Name, names_of, prescribed
 from dbbstation.calibration.layout import Layout, lay_out
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.noise import Noise, noise_of_turns
 from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve, unseen_combinations
 from dbbstation.machine.compiled import in_parallel
 from dbbstation.sources.contract import Need, Owner
 from dbbstation.sources.registry import sources_named
-from dbbstation.threads import with_one_thread
 from dbbstation.trace.circle import RawCircle
 
 if TYPE_CHECKING:

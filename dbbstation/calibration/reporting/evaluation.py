@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import residuals
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import range_uncertainty_mm
 from dbbstation.sources.contract import Motion
-from dbbstation.threads import with_one_thread
 from dbbstation.trace.analysis import CircleFigures, figures
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import residuals
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.harmonics import smooth
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.threads import with_one_thread
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.harmonics import smooth
 from dbbstation.plan.circle import Direction
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.special import expit, logsumexp
 
 from dbbstation.calibration.fit.methods import CENTRED_MM
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.compare.channel import channel_of
 from dbbstation.diagnosis.compare.details import both_directions, effects_of, noticed_mm
 from dbbstation.diagnosis.compare.left_out import predicted, tried_without_tests
@@ -25,7 +26,6 @@ from dbbstation.inference.left_over import left_over
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.verdict import OUT, SURE
-from dbbstation.threads import with_one_thread
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:

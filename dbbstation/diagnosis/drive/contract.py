@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
+from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

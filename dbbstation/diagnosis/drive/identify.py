@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS, METHOD_SHARE, VISCOUS
 from dbbstation.diagnosis.drive.explain import explain
 from dbbstation.diagnosis.drive.findings import (
@@ -26,7 +27,6 @@ from dbbstation.diagnosis.drive.verdicts import Verdicts
 from dbbstation.inference.hypotheses import Hypothesis
 from dbbstation.inference.left_over import SIGNIFICANT, left_over
 from dbbstation.inference.verdict import Value, Verdict
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

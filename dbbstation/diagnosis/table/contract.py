@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
 from dbbstation.sources.contract import Parameter as Parameter  # noqa: PLC0414, TC001 - part of the contract
-from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract
+from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.folds import held_out_error, parts_of
@@ -20,7 +21,6 @@ from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import compress, solve, with_random
 from dbbstation.inference.verdict import OUT, Value, Verdict
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
-    from dbbstation.texts import Texts
+    from dbbstation.text.texts import Texts
 
 FAR_STATED = 3.0
 """Standard uncertainties by which a parameter is off what was stated of it from which on this is said: one in 400 by chance."""

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.variables import TRAVELS
 from dbbstation.inference.verdict import Verdict
-from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -16,6 +16,7 @@ from dbbstation.files.source_text import LARGEST_TABLE, decode, first_line, read
 from dbbstation.trace.drive_recording import DriveRecording
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -196,7 +197,7 @@ def _check_values(numbers: dict[str, NDArray[np.float64]], lines: list[int], fil
             faults.append(Problem(file, lines[index], 0, what, "check the unit, it is the end of the column's name"))
 
 
-def compared_csv(columns: dict[str, NDArray[np.float64]]) -> str:
+def compared_csv(columns: Mapping[str, NDArray[np.float64]]) -> str:
     """Columns of one length as CSV text, six significant digits."""
     out = io.StringIO()
     out.write(",".join(columns) + "\n")

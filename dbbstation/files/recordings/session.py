@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.counting import natural, repeats_in_order
 from dbbstation.errors import InputError, Problem, TraceError
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
@@ -41,6 +40,7 @@ from dbbstation.files.yaml.schema import validate
 from dbbstation.plan.bar import UNKNOWN_BAR_MM
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
+from dbbstation.text.counting import natural, repeats_in_order
 from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
 from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 

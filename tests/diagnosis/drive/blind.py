@@ -14,7 +14,7 @@ import numpy as np
 
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
-from dbbstation.diagnosis.drive.summary import drive_summary
+from dbbstation.results.of_drive import drive_result
 from dbbstation.trace.drive_recording import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
@@ -79,7 +79,9 @@ def judged(rng, seed):
     command = to_and_fro(tuple(rng.uniform(0.02, 0.15, rng.integers(3, 6))), rng.uniform(0.1, 0.3), rng.uniform(0.5, 3))
     noise, resolution = rng.uniform(0.2, 2.0), 10 ** rng.uniform(-7.3, -6.0)
     columns = record(truth, command, seed, force_noise=noise, resolution=resolution)
-    summary = drive_summary(identify([DriveRecording("drawn", *columns)], list(known_drive_sources().values())))
+    summary = drive_result(
+        identify([DriveRecording("drawn", *columns)], list(known_drive_sources().values()))
+    ).to_dict()
     said = {s["name"] for s in summary["sources"] if s["verdict"] in {"identified", "happened"}}
     wrong = said - has - (OFFSETS if "stiffness" in has else set())
     values = [

@@ -17,7 +17,7 @@ from scipy.signal import butter, sosfilt
 
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
-from dbbstation.diagnosis.drive.summary import drive_summary
+from dbbstation.results.of_drive import drive_result
 from dbbstation.trace.drive_recording import DriveRecording
 from tests.diagnosis.drive.plant import RATE_HZ, Truth, record, to_and_fro
 
@@ -80,7 +80,7 @@ def drawn(kind: str, seed: int) -> tuple[Truth, DriveRecording]:
 def judged(kind: str, seed: int) -> tuple[set[str], list[bool]]:
     """False names that were said, and for each value that was, whether it lies within two standard uncertainties."""
     truth, recording = drawn(kind, seed)
-    summary = drive_summary(identify([recording], list(known_drive_sources().values())))
+    summary = drive_result(identify([recording], list(known_drive_sources().values()))).to_dict()
     found = {s["name"]: s for s in summary["sources"] if s["verdict"] in {"identified", "happened"}}
     coulomb = found.pop("coulomb-friction", None)
     parameters = summary["parameters"]

@@ -10,7 +10,7 @@ import pytest
 
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
-from dbbstation.diagnosis.drive.summary import drive_summary
+from dbbstation.results.of_drive import drive_result
 from dbbstation.trace.drive_recording import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
@@ -21,7 +21,7 @@ COVERS = 3.0
 def answered(truth, seed=1, **options):
     t, position, force = record(truth, to_and_fro(), seed, **options)
     recording = DriveRecording("simulated", t, position, force)
-    return drive_summary(identify([recording], list(known_drive_sources().values())))
+    return drive_result(identify([recording], list(known_drive_sources().values()))).to_dict()
 
 
 @cache
@@ -127,7 +127,7 @@ def test_asymmetric_coulomb_friction_and_a_load_look_the_same():
     # Whoever knows that nothing loads the drive says so.
     t, position, force = record(Truth(coulomb=20.0, coulomb_asymmetry=-3.0), to_and_fro())
     sources = [source for name, source in known_drive_sources().items() if name != "constant-load"]
-    without = drive_summary(identify([DriveRecording("simulated", t, position, force)], sources))
+    without = drive_result(identify([DriveRecording("simulated", t, position, force)], sources)).to_dict()
     assert verdicts(without)["friction-asymmetry"] == "identified"
     assert holds(without["friction"]["forwards"]["coulomb_n"], 17.0)
     assert holds(without["friction"]["backwards"]["coulomb_n"], 23.0)

@@ -13,8 +13,8 @@ from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.sampling import evenly_sampled
 from dbbstation.diagnosis.drive.signals import signals_of
 from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
-from dbbstation.diagnosis.drive.summary import drive_summary
 from dbbstation.errors import CalibrationError, ModelError
+from dbbstation.results.of_drive import drive_result
 from dbbstation.trace.drive_recording import DriveRecording
 from tests.diagnosis.drive.plant import Truth, at_constant_speed, record, to_and_fro
 
@@ -28,7 +28,7 @@ def good():
 
 def answered(t, position, force, cutoff_hz=None):
     recording = DriveRecording("simulated", t, position, force)
-    return drive_summary(identify([recording], list(known_drive_sources().values()), cutoff_hz))
+    return drive_result(identify([recording], list(known_drive_sources().values()), cutoff_hz)).to_dict()
 
 
 def verdicts(summary):

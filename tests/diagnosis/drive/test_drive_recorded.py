@@ -13,8 +13,8 @@ import pytest
 
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
-from dbbstation.diagnosis.drive.summary import drive_summary
 from dbbstation.files.recordings.drive_csv import read_drive
+from dbbstation.results.of_drive import drive_result
 from dbbstation.trace.drive_recording import DriveRecording
 
 pytestmark = pytest.mark.slow
@@ -26,7 +26,7 @@ HIDDEN_N, HIDDEN_S = 5.0, 0.5
 @cache
 def answered(path, force_per_ampere=None, cutoff_hz=None):
     recording = read_drive(path).recording(force_per_ampere)
-    return drive_summary(identify([recording], list(known_drive_sources().values()), cutoff_hz))
+    return drive_result(identify([recording], list(known_drive_sources().values()), cutoff_hz)).to_dict()
 
 
 @pytest.fixture
@@ -67,7 +67,9 @@ def test_pulses_taken_out_of_the_known_force_are_found(recorded, starts):
     for start in starts:
         force -= 10.0 * ((raw.t_s >= start) & (raw.t_s < start + 0.4))
     left_out = DriveRecording("emps less pulses", raw.t_s, raw.position_mm, force)
-    transient = sources(drive_summary(identify([left_out], list(known_drive_sources().values()))))["transient-force"]
+    transient = sources(drive_result(identify([left_out], list(known_drive_sources().values()))).to_dict())[
+        "transient-force"
+    ]
     assert transient["verdict"] == "happened"
     for start in starts:
         part = min(transient["parts"], key=lambda one: abs(one["t_s"][0] - start))

@@ -9,8 +9,8 @@ from dbbstation.diagnosis.drive.findings import DrivePart
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, equal_pushes, pooled
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
-from dbbstation.diagnosis.drive.summary import drive_summary
 from dbbstation.inference.verdict import Value
+from dbbstation.results.of_drive import drive_result
 from dbbstation.trace.drive_recording import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
@@ -50,7 +50,7 @@ def test_a_file_with_a_zero_of_its_own_is_told():
     for seed, zero in ((1, 0.0), (2, 0.0), (3, 6.0)):
         t, position, force = record(Truth(coulomb=20.0), to_and_fro(seconds=8.0), seed)
         made.append(DriveRecording(f"file {seed}", t, position, force + zero))
-    summary = drive_summary(identify(made, list(known_drive_sources().values())))
+    summary = drive_result(identify(made, list(known_drive_sources().values()))).to_dict()
     effects = {effect["text"]: effect for effect in summary["unexplained"]["effects"]}
     assert list(effects) == ["offset of file 3"]
     # 6 N in a third of the samples; mass and viscous friction take none of it.

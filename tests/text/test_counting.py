@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dbbstation.counting import natural, repeats_in_order
 from dbbstation.errors import InputError, Problem
+from dbbstation.text.counting import natural, repeats_in_order
 
 
 @dataclass(frozen=True)

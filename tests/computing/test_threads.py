@@ -10,6 +10,7 @@ from threadpoolctl import ThreadpoolController
 
 from dbbstation.calibration.fit import calibrate as fit
 from dbbstation.calibration.reporting.prediction import predicted_circles
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.drive.identify import identify
@@ -19,7 +20,6 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.tasks.load import load_sessions
-from dbbstation.threads import with_one_thread
 
 THREADS = 2
 

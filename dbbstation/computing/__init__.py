@@ -1,0 +1,1 @@
+"""Where computing is done: processes that end with the program, and how many threads linear algebra has."""

@@ -1,0 +1,86 @@
+"""A comparison of two sessions in sentences, and its differences by angle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.compare.comparison import Comparison, RunDifference
+    from dbbstation.inference.left_over import LeftOver
+    from dbbstation.inference.read_off import CauseFinding
+
+SECTORS = 36
+"""Means of ten degrees."""
+
+
+def by_angle_um(run: RunDifference) -> NDArray[np.float64]:
+    """Means of the smooth difference over ten degrees from +X, shape (36,) [µm]."""
+    sector = (run.pair.theta_deg * (SECTORS / 360.0)).astype(np.int64)
+    count = np.bincount(sector, minlength=SECTORS)
+    return np.asarray(
+        1e3 * np.bincount(sector, run.smooth_mm, minlength=SECTORS) / np.maximum(count, 1), dtype=np.float64
+    )
+
+
+def label_of(finding: CauseFinding) -> str:
+    """Name of a cause with its form: which strut, which test, in which session."""
+    return f"{finding.name}, {finding.label}" if finding.label else finding.name
+
+
+def verdict_text(found: Comparison) -> str:
+    """Return what a comparison comes to, in a sentence."""
+    many = sum(run.differs for run in found.runs)
+    if found.differ and found.there:
+        where = f"in {many} of {len(found.runs)} runs" if many else "over all runs, though in no single one for sure"
+        return (
+            f"The sessions differ {where}, by {1e3 * found.found_rms_mm:.2f} µm rms beyond noise and what is stated of balls "
+            f"and bars (probability {found.probability:.3f})."
+        )
+    if found.differ:
+        return "The sessions differ, and no form that was tried describes how: the residual is not noise."
+    if found.there:
+        return (
+            f"These runs do not decide whether the sessions differ (probability {found.probability:.2f}); if they do, it is "
+            f"{', '.join(label_of(finding) for finding in found.there)}."
+        )
+    centre = 1e3 * float(np.median([run.centre_sigma_mm for run in found.runs]))
+    radial = 1e3 * float(np.median([run.radial_sigma_mm for run in found.runs]))
+    return (
+        f"No difference beyond noise, balls and bars (probability of one {found.probability:.2f}). A strut that had become "
+        f"{1e3 * found.noticed_mm:.2g} µm longer would have been found; centres are compared to ± {centre:.2g} µm, mean lengths "
+        f"to ± {radial:.2g} µm."
+    )
+
+
+def organised_text(found: Comparison) -> str:
+    """Return what was found, in short."""
+    if not found.there:
+        return "nothing to organise"
+    parts = []
+    for finding in found.there:
+        effect = found.effects[finding.name]
+        sizes = "; ".join(
+            f"{name} {value.value:.4g} ± {value.uncertainty:.2g} {value.unit}".strip()
+            for name, value in finding.values.items()
+        )
+        parts.append(
+            f"{label_of(finding)}, {100 * effect.share:.0f} %" + (f" ({sizes})" if 0 < len(sizes) < LONG else "")
+        )
+    return " + ".join(parts)
+
+
+LONG = 160
+"""Characters of values that a line holds; there is more with `--json`."""
+
+
+def residual_text(left: LeftOver) -> str:
+    """Return whether something is left beyond noise, in a sentence."""
+    if left.is_noise:
+        return "The residual is noise."
+    worst = left.worst
+    where = f", {worst.where}" if worst.where else ""
+    return f"The residual is not noise: {worst.name}, {1e3 * worst.rms:.2g} µm rms{where}."

@@ -1,0 +1,124 @@
+"""From a simulator in the loop to its result."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dbbstation.diagnosis.simulator.separate import separating_input
+from dbbstation.inference.verdict import Verdict
+from dbbstation.results.inference import all_quantified, finite, gains_result, quantified, residual_result
+from dbbstation.results.simulator import (
+    HeldOutSimulation,
+    HeldOutSimulations,
+    PortTerm,
+    SeparatingInput,
+    SimulatedOutput,
+    SimulatedRun,
+    SimulationNoise,
+    SimulationRms,
+    SimulationsRun,
+    SimulatorParameterResult,
+    SimulatorResult,
+)
+
+if TYPE_CHECKING:
+    from dbbstation.diagnosis.simulator.answer import Moved, SimulatorComparison
+    from dbbstation.inference.read_off import CauseFinding
+
+HIDDEN = 0.1
+"""Share of an effect that parameters had taken up from which on it is reported."""
+
+
+def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -> SimulatorResult:
+    """Return everything that is reported of a simulator.
+
+    Args:
+        answer: the comparison.
+        simulations: how many were run.
+    """
+    found, settled, model = answer.found, answer.found.settled, answer.model
+    return SimulatorResult(
+        simulator=model.name,
+        unit=model.outputs[0].unit,
+        outputs=tuple(
+            SimulatedOutput(output.name, output.unit, float(scale))
+            for output, scale in zip(model.outputs, answer.work.scales, strict=True)
+        ),
+        runs=tuple(SimulatedRun(run.name, len(run)) for run in model.runs),
+        mismatch=bool(answer.terms) or not answer.left.is_noise,
+        rms=SimulationRms(*answer.rms),
+        noise=SimulationNoise(
+            settled.noise.sigma,
+            settled.noise.correlation_samples,
+            None if math.isinf(settled.bank.tails) else settled.bank.tails,
+        ),
+        settled=found.is_settled,
+        stopped=answer.stopped,
+        held_out="not-tested" if answer.held_out is None else "tested",
+        held_out_rms=_held_out(answer),
+        findings=tuple(_term(answer, one) for one in answer.findings),
+        parameters=tuple(_parameter(one) for one in answer.parameters),
+        left=residual_result(answer.left),
+        next=tuple(
+            SeparatingInput(one["text"], tuple(one["terms"]), one["part"], one["sigmas"], one["repeats"])
+            for one in separating_input(answer)
+        ),
+        not_asked=dict(answer.not_asked),
+        simulations=simulations,
+    )
+
+
+def _held_out(answer: SimulatorComparison) -> HeldOutSimulations | None:
+    held = answer.held_out
+    if held is None:
+        return None
+    parts = (HeldOutSimulation(one.as_simulated, one.before, one.after, one.name, one.rows) for one in held.folds)
+    return HeldOutSimulations(held.as_simulated, held.before, held.after, held.is_worse, tuple(parts))
+
+
+def _term(answer: SimulatorComparison, one: CauseFinding) -> PortTerm:
+    term = next((term for term in answer.terms if term.name == one.name), None)
+    port = next((port for port in answer.model.ports if one.name.endswith(f" at {port.name}")), None)
+    return PortTerm(
+        name=one.name,
+        verdict=str(one.verdict),
+        port=port.name if port else "",
+        about=port.about if port else "",
+        form=str(term.form) if term else one.name.split(" of ")[0].split(" at ")[0],
+        put_in=term is not None,
+        probability=one.probability,
+        log_bayes_factor=one.log_factor,
+        rms=one.rms,
+        sigmas=one.sigmas,
+        confounded=one.confounded,
+        linear_and_true_differ_by=finite(answer.nonlinear.get(one.name)),
+        values=all_quantified(one.values),
+        gains=gains_result(one.gains),
+        equivalent=tuple(one.equivalent),
+        ambiguous_with=tuple(one.ambiguous_with),
+        text=one.text or _why(one),
+    )
+
+
+def _why(one: CauseFinding) -> str:
+    """Sentence for a finding that has none of its own."""
+    if one.verdict is not Verdict.IDENTIFIED:
+        return ""
+    hidden = f" The parameters had taken up {100.0 * one.confounded:.0f} % of it." if one.confounded > HIDDEN else ""
+    return f"The recordings want it, and nothing else that was asked does as well.{hidden}"
+
+
+def _parameter(one: Moved) -> SimulatorParameterResult:
+    shift, u = one.after.value - one.before.value, one.before.uncertainty
+    return SimulatorParameterResult(
+        name=one.name,
+        unit=one.before.unit,
+        stated=one.stated,
+        refitted=quantified(one.before),
+        corrected=quantified(one.after),
+        shift=shift,
+        shift_over_u=finite(shift / u if u > 0.0 else None),
+        confounded=one.confounded,
+        not_told_apart_from=None if one.alike is None else tuple(one.alike),
+    )

@@ -1,0 +1,264 @@
+"""What a simulator lacks, and at which port: the result of `mismatch --simulator`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+from dbbstation.results.frame import Framed
+from dbbstation.results.inference import HeldOutGains, ResidualResult
+from dbbstation.results.serialise import Absent, Quantified
+
+
+@dataclass(frozen=True)
+class SimulatedOutput:
+    """An output of the simulator.
+
+    Attributes:
+        name: of the output.
+        unit: of it.
+        divided_by: its residuals, to be compared with those of other outputs.
+    """
+
+    name: str
+    unit: str
+    divided_by: float
+
+
+@dataclass(frozen=True)
+class SimulatedRun:
+    """A recording.
+
+    Attributes:
+        name: of its file.
+        rows: in it.
+    """
+
+    name: str
+    rows: int
+
+
+@dataclass(frozen=True)
+class SimulationRms:
+    """Root mean square of measured less simulated values.
+
+    Attributes:
+        as_simulated: with the parameters as stated.
+        refitted: with the parameters refitted.
+        corrected: with missing terms put in.
+    """
+
+    as_simulated: float
+    refitted: float
+    corrected: float
+
+
+@dataclass(frozen=True)
+class SimulationNoise:
+    """Noise of one row.
+
+    Attributes:
+        sigma: standard deviation.
+        rows_as_one: neighbours that count as one row.
+        degrees_of_freedom: of Student's t; None where it is normal.
+    """
+
+    sigma: float
+    rows_as_one: float
+    degrees_of_freedom: float | None
+
+
+@dataclass(frozen=True)
+class HeldOutSimulation(SimulationRms):
+    """Errors of one part that took no part.
+
+    Attributes:
+        name: of the part.
+        rows: in it.
+    """
+
+    name: str
+    rows: int
+
+
+@dataclass(frozen=True)
+class HeldOutSimulations(SimulationRms):
+    """Errors of all held-out parts.
+
+    Attributes:
+        worse: whether corrected values predict worse than those as simulated.
+        parts: part by part.
+    """
+
+    worse: bool
+    parts: tuple[HeldOutSimulation, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PortTerm:
+    """What was found of one term.
+
+    Attributes:
+        name: of the term.
+        verdict: one of the six words of docs/verdicts.md.
+        port: at which it acts.
+        about: what the model file says of that.
+        form: how it follows its signals.
+        put_in: whether the corrected simulator has it.
+        probability: that it is there.
+        log_bayes_factor: of it, given all else that was found.
+        rms: of its effect.
+        sigmas: norm of its effect over its standard deviation.
+        confounded: R² of its effect on the parameters.
+        linear_and_true_differ_by: how far the linear answer is from the simulated one; None where not known.
+        values: its numbers with their uncertainties.
+        gains: in parts that did not choose it; None where these were not asked for.
+        equivalent: terms that these recordings cannot tell from it.
+        ambiguous_with: terms that would do about as well.
+        text: in words.
+    """
+
+    name: str
+    verdict: str
+    port: str
+    about: str
+    form: str
+    put_in: bool
+    probability: float
+    log_bayes_factor: float
+    rms: float
+    sigmas: float
+    confounded: float
+    linear_and_true_differ_by: float | None
+    values: Mapping[str, Quantified]
+    gains: HeldOutGains | None
+    equivalent: tuple[str, ...]
+    ambiguous_with: tuple[str, ...]
+    text: str
+
+
+@dataclass(frozen=True)
+class SimulatorParameterResult:
+    """A parameter of the simulator.
+
+    Attributes:
+        name: of it.
+        unit: of it.
+        stated: as the model file states it.
+        refitted: without any term.
+        corrected: with what was found put in.
+        shift: from the one to the other.
+        shift_over_u: in standard uncertainties of the first; None where that is not known.
+        confounded: R² of it on what was found.
+        not_told_apart_from: parameters that the recordings cannot tell from it; None where they can.
+    """
+
+    name: str
+    unit: str
+    stated: float
+    refitted: Quantified
+    corrected: Quantified
+    shift: float
+    shift_over_u: float | None
+    confounded: float
+    not_told_apart_from: tuple[str, ...] | None
+
+
+@dataclass(frozen=True)
+class SeparatingInput:
+    """What to record to tell two terms apart.
+
+    Attributes:
+        text: in words.
+        terms: both.
+        part: stretch of the recordings in which they differ most.
+        sigmas: standard deviations by which they differ there.
+        repeats: of that stretch until they are told apart.
+    """
+
+    text: str
+    terms: tuple[str, ...]
+    part: str
+    sigmas: float
+    repeats: int
+
+
+@dataclass(frozen=True)
+class SimulationsRun:
+    """How many simulations it took.
+
+    Attributes:
+        run: that many.
+        most: that were allowed; None where nobody set a limit.
+        one_s: time of one [s].
+    """
+
+    run: int
+    most: int | None
+    one_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatorResult(Framed):
+    """What a simulator lacks.
+
+    Attributes:
+        simulator: its name.
+        unit: of its first output.
+        outputs: of it.
+        runs: recordings.
+        mismatch: whether it lacks anything.
+        rms: of all residuals.
+        noise: of one row.
+        settled: whether the search ended at one set of terms.
+        stopped: why it ended early; empty where it did not.
+        held_out: `tested` or `not-tested`.
+        held_out_rms: errors of held-out parts; None where not tested.
+        findings: terms, those that are there first.
+        parameters: of the simulator.
+        left: whether something is left beyond noise.
+        next: what to record next.
+        not_asked: terms that could not be asked, and why, by name.
+        simulations: how many were run.
+        out: file of the missing terms as code; absent where none was written.
+        corrected: file of the corrected values; absent where none was written.
+        figure: file of the figure; absent where none was written.
+    """
+
+    simulator: str
+    unit: str
+    outputs: tuple[SimulatedOutput, ...]
+    runs: tuple[SimulatedRun, ...]
+    mismatch: bool
+    rms: SimulationRms
+    noise: SimulationNoise
+    settled: bool
+    stopped: str
+    held_out: str
+    held_out_rms: HeldOutSimulations | None
+    findings: tuple[PortTerm, ...]
+    parameters: tuple[SimulatorParameterResult, ...]
+    left: ResidualResult
+    next: tuple[SeparatingInput, ...]
+    not_asked: Mapping[str, str]
+    simulations: SimulationsRun
+    out: Annotated[str | None, Absent] = None
+    corrected: Annotated[str | None, Absent] = None
+    figure: Annotated[str | None, Absent] = None
+
+    def rows(self) -> list[dict[str, object]]:
+        """One dictionary for each term."""
+        return [
+            {
+                "name": one.name,
+                "verdict": one.verdict,
+                "port": one.port,
+                "probability": one.probability,
+                "log_bayes_factor": one.log_bayes_factor,
+                "rms": one.rms,
+                "confounded": one.confounded,
+                "text": one.text,
+            }
+            for one in self.findings
+        ]

@@ -62,10 +62,10 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
     """
     from dbbstation.cli.calibrate import names_in
+    from dbbstation.cli.model_warnings import say_model_warnings
     from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import task_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source
@@ -88,7 +88,7 @@ def diagnose(
         )
     if out is not None:
         write_model(out, result.model, provenance=provenance(), force=force)
-        say_unknown_causes(result.model.model)
+        say_model_warnings(result.model)
     if figure is not None and result.drawing is not None:
         write_bytes(figure, result.drawing(format_of(figure)), force=force)
         say(f"figure written to {figure}")
@@ -130,12 +130,14 @@ def _print(result: DiagnosisFigures) -> None:
 
 def _print_mismatch(result: DiagnosisFigures) -> None:
     """Print whether the recordings differ from the kinematic model; before that, where what was found predicts worse."""
+    from dbbstation.results.model_warnings import chance_in_words
+
     if result.held_out_worse:
         echo("Held-out tests are predicted worse than by the kinematic calibration alone. Nothing is identified.\n")
     if result.mismatch:
         echo(
             f"The recordings differ from the kinematic model by {result.misfit_rms_um:.2f} µm rms beyond noise "
-            f"(probability by chance {_chance(result.probability)})."
+            f"(probability by chance {chance_in_words(result.probability)})."
         )
     else:
         echo(f"The recordings agree with the kinematic model (probability {result.probability:.2g}).")
@@ -253,15 +255,6 @@ def _print_sources(sources: Sequence[CauseResult]) -> None:
 
 SAID = frozenset({"identified", "happened", "does-not-predict", "ambiguous"})
 """Verdicts of causes whose values are printed."""
-
-
-def _chance(probability: float) -> str:
-    """Probability of an F test as printed; the smallest ones underflow."""
-    return "below 1e-99" if probability < LEAST_PRINTED else f"{probability:.1g}"
-
-
-LEAST_PRINTED = 1e-99
-"""Probabilities below are printed alike."""
 
 
 def _probable(source: CauseResult) -> str:

@@ -88,17 +88,18 @@ def program(
       dbbstation program --plan table2.yaml --machine machine.yaml --model model.yaml --out compensated
       dbbstation program --plan table2.yaml --machine machine.yaml --test a,f --out two --json
     """
+    from dbbstation.cli.model_warnings import say_model_warnings
     from dbbstation.cli.output import say
     from dbbstation.cli.programs import print_programs
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.own_dialects import dialect_given
     from dbbstation.files.own_sources import every_source
     from dbbstation.nc.export import circle_programs
+    from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.programs import programs_result
     from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
 
@@ -114,7 +115,8 @@ def program(
             prefer=prefer,
             accept_chord_um=accepted_um,
         )
-        say_unknown_causes(inverse.model)
+        if inverse.identified is not None:
+            say_model_warnings(inverse.identified)
     with count_bar("programs") as writing:
         programs = circle_programs(
             plan,
@@ -131,6 +133,8 @@ def program(
     write_folder(out, {each.name: each.text for each in programs}, force=force)
     written = [(str(out / each.name), each) for each in programs]
     digest = None if model_file is None else sha256_of(model_file)
-    print_programs(programs_result(written, written_in, None if inverse is None else machine, digest), as_json=as_json)
+    warned = () if inverse is None or inverse.identified is None else model_warnings(inverse.identified)
+    planned = None if inverse is None else machine
+    print_programs(programs_result(written, written_in, planned, digest, model_warnings=warned), as_json=as_json)
     if not as_json:
         say(f"{len(programs)} programs written to {out}, all within the machine's travel")

@@ -9,11 +9,12 @@ from dbbstation.machine.difference import differences, in_words
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.quality.conformity import Conformity
 from dbbstation.report.conditions import conditions, when_measured
-from dbbstation.report.model_part import not_visible, parameters
+from dbbstation.report.model_part import not_visible, parameters, quality_of_fit
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
 from dbbstation.report.verdict import verdict_of
 from dbbstation.results.circles import circled_summary
+from dbbstation.results.model_warnings import lacks_physics, model_warnings
 from dbbstation.results.tolerances import held_against, tolerated_circles
 
 if TYPE_CHECKING:
@@ -71,7 +72,8 @@ def numbers_of(reported: Reported) -> dict[str, Any]:
     now = tolerated_circles(reported.found.circles)
     tolerances = reported.settings.tolerances
     held = held_against(tolerances, now, reported.coverage_factor)
-    verdict = verdict_of(held, reported.found, reported.coverage_factor)
+    identified = None if reported.modelled is None else reported.modelled.identified
+    verdict = verdict_of(held, reported.found, reported.coverage_factor, identified)
     before = () if reported.before is None else tolerated_circles(reported.before.circles)
     tests = dict.fromkeys(one.test for one in now)
     rows = list(_side_by_side(now, before))
@@ -82,6 +84,7 @@ def numbers_of(reported: Reported) -> dict[str, Any]:
             "reasons": list(verdict.reasons),
             "to_do": list(verdict.to_do),
         },
+        "model_warnings": [] if identified is None else list(model_warnings(identified)),
         "coverage_factor": reported.coverage_factor,
         "tolerances": [_held_both(one, now, before, reported.coverage_factor) for one in tolerances],
         "tolerances_by_test": [
@@ -140,6 +143,8 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
         if modelled is None
         else {
             "problem": modelled.problem,
+            "failed": lacks_physics(modelled.identified.report),
+            "quality": quality_of_fit(modelled.identified),
             "parameters": parameters(modelled.identified, reported.coverage_factor),
             "not_visible": not_visible(modelled.identified),
         },

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 from dbbstation.digits import with_uncertainty
 from dbbstation.quality.conformity import Conformity
+from dbbstation.results.model_warnings import lacks_physics
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.results.circles import Circled, MeasuredCircle
     from dbbstation.results.tolerances import Held
 
@@ -35,16 +37,19 @@ class ReportVerdict:
     to_do: tuple[str, ...]
 
 
-def verdict_of(held: Sequence[Held], found: Circled, coverage_factor: float) -> ReportVerdict:
+def verdict_of(
+    held: Sequence[Held], found: Circled, coverage_factor: float, identified: IdentifiedModel | None = None
+) -> ReportVerdict:
     """Return the verdict of tolerances held against measured circles.
 
     Args:
         held: tolerances; empty where the shop has none.
         found: the circles, with their findings.
         coverage_factor: k of U = k u.
+        identified: a model beside the circles; None where none is given.
     """
     said = {one.conformity for one in held}
-    repeat = tuple(_to_repeat(found.circles))
+    repeat = (*_to_repeat(found.circles), *_of_the_model(found, identified))
     if not said - {None}:
         nothing = "The shop's settings have no tolerance for these circles: there is no verdict."
         write = "Write tolerances into the shop's settings (`dbbstation settings --template` shows how) and make the report anew."
@@ -53,7 +58,7 @@ def verdict_of(held: Sequence[Held], found: Circled, coverage_factor: float) -> 
     reasons = tuple(_reason(one, coverage_factor) for one in told)
     if Conformity.EXCEEDED in said:
         headline = "The machine is NOT within the shop's tolerances."
-        return ReportVerdict(Conformity.EXCEEDED, headline, reasons, (*repeat, *_cure(found)))
+        return ReportVerdict(Conformity.EXCEEDED, headline, reasons, (*repeat, *_cure(found, identified)))
     if Conformity.UNDECIDED in said:
         headline = "It cannot be told whether the machine is within the shop's tolerances."
         narrow = (
@@ -100,7 +105,25 @@ def _to_repeat(circles: Iterable[MeasuredCircle]) -> list[str]:
     return [*told[:MOST_TOLD], *([f"{more} more runs have findings: see Findings."] if more > 0 else [])]
 
 
-def _cure(found: Circled) -> tuple[str, ...]:
+def _of_the_model(found: Circled, identified: IdentifiedModel | None) -> list[str]:
+    """What to do about a model that lacks physics, whatever the circles are."""
+    if identified is None or not lacks_physics(identified.report):
+        return []
+    return [
+        (
+            f"Do not compensate with this model. Look for what it lacks: `dbbstation diagnose {_names(found)} --out joint.yaml`, and make "
+            "the report again with that model."
+        )
+    ]
+
+
+def _names(found: Circled) -> str:
+    return " ".join(session.name for session in found.sessions)
+
+
+def _cure(found: Circled, identified: IdentifiedModel | None) -> tuple[str, ...]:
+    if identified is not None and lacks_physics(identified.report):
+        return ()
     compensated = all(one.entry.program is not None and one.entry.program.model_sha256 for one in found.circles)
     if compensated:
         return (
@@ -109,11 +132,15 @@ def _cure(found: Circled) -> tuple[str, ...]:
                 "model lacks. See that nothing has moved since the model was made."
             ),
         )
-    names = " ".join(session.name for session in found.sessions)
+    told = (
+        ()
+        if identified is not None
+        else (f"Calibrate the machine: `dbbstation calibrate {_names(found)} --out model.yaml`.",)
+    )
     return (
-        f"Calibrate the machine: `dbbstation calibrate {names} --out model.yaml`.",
+        *told,
         (
-            "Write compensated programs with `dbbstation program --model model.yaml`, measure them, and make the report again "
+            "Write compensated programs with `dbbstation program` and the model, measure them, and make the report again "
             "with `--before` and this session."
         ),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dbbstation.calibration.outliers.outlier import SOURCE_OF, OutlierKind
 from dbbstation.calibration.reporting.evaluation import rms_um
@@ -100,6 +100,17 @@ def diagnosis_result(
     """
     own = {one.name: getattr(figures, one.name) for one in fields(DiagnosisFigures)}
     return DiagnosisResult(**{**own, "drawing": drawing, "notes": notes}, model=model)
+
+
+def kept_of(figures: DiagnosisFigures) -> dict[str, Any]:
+    """Return what a model file keeps of the diagnosis that it comes from: what speaks against its causes.
+
+    Args:
+        figures: what the diagnosis says.
+    """
+    open_ones = (one for one in figures.sources if one.verdict == Verdict.AMBIGUOUS)
+    groups = {frozenset((one.name, *one.ambiguous_with)): [one.name, *one.ambiguous_with] for one in open_ones}
+    return {"ambiguous": list(groups.values()), "held_out_worse": figures.held_out_worse}
 
 
 def _circularity(diagnosis: Diagnosis) -> tuple[CircularityLeft, ...]:

@@ -15,7 +15,7 @@ from dbbstation.diagnosis.unexplained_model import keep_unexplained as keeping
 from dbbstation.errors import ModelError
 from dbbstation.files.own_sources import every_source
 from dbbstation.results.of_calibration import calibration_figures, report_of
-from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result
+from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result, kept_of
 from dbbstation.results.serialise import plain
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.load import loaded
@@ -149,11 +149,12 @@ def diagnose(
     found = diagnosed.diagnosis
     unnamed = _kept(found, telling) if keep_unexplained else None
     fit = found.after if unnamed is None else unnamed.fit
-    report = report_of(calibration_figures(fit, evaluate(fit.model, fit.observations)))
+    figures = diagnosis_figures(found, diagnosed.lacking)
+    report = report_of(calibration_figures(fit, evaluate(fit.model, fit.observations)), diagnosis=kept_of(figures))
     of_sessions = diagnosed.recorded.sessions
     model = identified_model(fit, report, of_sessions) if unnamed is None else unnamed.identified(report, of_sessions)
     return diagnosis_result(
-        diagnosis_figures(found, diagnosed.lacking),
+        figures,
         model=model,
         drawing=partial(_drawn, found),
         notes=tuple(telling.notes),

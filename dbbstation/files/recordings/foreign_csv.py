@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,6 +53,7 @@ class ForeignTable:
         units: what stands below the names of columns, by name; empty where nothing does.
         comments: `key: value` lines above the names, by key in small letters.
         data: the whole file.
+        comment_lines: number of the line of each comment, by key.
     """
 
     table: TableFile
@@ -60,6 +61,7 @@ class ForeignTable:
     units: Mapping[str, str]
     comments: Mapping[str, str]
     data: bytes
+    comment_lines: Mapping[str, int] = field(default_factory=dict)
 
 
 def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: str = "utf-8") -> ForeignTable:
@@ -105,7 +107,9 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
         body = [line.rstrip().removesuffix(chosen.separator) for line in body]
     table = parse_table("\n".join(body), str(path), numbers=chosen)
     units = dict(zip(table.names, rows[near[-1]], strict=False)) if has_units else {}
-    return ForeignTable(table, chosen, units, _comments(lines[:names]), data)
+    comments = _comments(lines[:names])
+    said = {key: text for key, (_, text) in comments.items()}
+    return ForeignTable(table, chosen, units, said, data, {key: line for key, (line, _) in comments.items()})
 
 
 def _text(data: bytes, file: str, encoding: str, faults: list[Problem]) -> str | None:
@@ -166,11 +170,11 @@ def _is_comment(line: str) -> bool:
     return line.lstrip("\ufeff ").startswith("#")
 
 
-def _comments(lines: list[str]) -> dict[str, str]:
-    """What lines `key: value`, `key = value` or `key;value` above the table say."""
+def _comments(lines: list[str]) -> dict[str, tuple[int, str]]:
+    """Line and text of what lines `key: value`, `key = value` or `key;value` above the table say."""
     found = {}
-    for line in lines:
+    for number, line in enumerate(lines, start=1):
         told = re.match(r"[\ufeff# ]*([^:=;\t,]{1,40}?)\s*[:=;\t,]\s*(.+)$", line)
         if told:
-            found[told[1].strip().lower()] = told[2].strip(' ";\t,')
+            found[told[1].strip().lower()] = (number, told[2].strip(' ";\t,'))
     return found

@@ -80,7 +80,7 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
     text = None if data is None else _text(data, str(path), encoding, faults)
     if data is None or text is None:
         raise InputError(faults)
-    lines = text.splitlines()
+    lines = _without_end(text.splitlines())
     chosen = language or _language(lines, str(path))
     stated = "" if language is None else f"; {_STATED}"
     rows = [_cells(line, chosen, str(path), number) for number, line in enumerate(lines[:_LOOKED_AT], start=1)]
@@ -110,6 +110,12 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
     comments = _comments(lines[:names])
     said = {key: text for key, (_, text) in comments.items()}
     return ForeignTable(table, chosen, units, said, data, {key: line for key, (line, _) in comments.items()})
+
+
+def _without_end(lines: list[str]) -> list[str]:
+    """Lines without a last one that only says that the file ends, as Calypso writes it."""
+    last = next((k for k in range(len(lines) - 1, -1, -1) if lines[k].strip()), None)
+    return lines if last is None or not re.fullmatch(r"\s*(END|EOF|ENDE)\s*", lines[last]) else lines[:last]
 
 
 def _text(data: bytes, file: str, encoding: str, faults: list[Problem]) -> str | None:

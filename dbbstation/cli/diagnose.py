@@ -30,6 +30,11 @@ if TYPE_CHECKING:
     help="Keep an unmodelled effect in that model, as a curve over strut length or force: compensated, cause unknown.",
 )
 @figure_option()
+@click.option(
+    "--effects",
+    is_flag=True,
+    help="Rank the causes by what each contributes to the circles, with its cure and the circles as they would be without it.",
+)
 @click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def diagnose(
@@ -42,6 +47,7 @@ def diagnose(
     out: Path | None,
     keep_unexplained: bool,
     figure: Path | None,
+    effects: bool,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -58,10 +64,12 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7
       dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml --figure diagnosis.svg
       dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
+      dbbstation diagnose 2026-11-20-hexapod-7 --effects
       dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
       dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
     """
     from dbbstation.cli.calibrate import names_in
+    from dbbstation.cli.effects import print_effects
     from dbbstation.cli.model_warnings import say_model_warnings
     from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import task_bar
@@ -96,6 +104,8 @@ def diagnose(
         print_result(result)
     else:
         _print(result)
+        if effects:
+            print_effects(result.effects)
         if out is not None:
             say(f"joint model written to {out}")
 

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.quality.conformity import Conformity
+from dbbstation.report.causes_part import cause_rows, cured_polars
 from dbbstation.report.conditions import conditions, when_measured
 from dbbstation.report.model_part import not_visible, parameters, quality_of_fit
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
 from dbbstation.report.verdict import verdict_of
 from dbbstation.results.circles import circled_summary
+from dbbstation.results.effects import effect_results
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
+from dbbstation.results.serialise import plain
 from dbbstation.results.tolerances import held_against, tolerated_circles
 
 if TYPE_CHECKING:
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.files.provenance import Provenance
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.tolerance import Tolerance
+    from dbbstation.report.causes_part import Ranked
     from dbbstation.results.circles import Circled
     from dbbstation.results.tolerances import Held, ToleratedCircle
 
@@ -56,6 +60,7 @@ class Reported:
         before: circles measured before; None where none are given.
         modelled: a model beside them; None where none is given.
         job: what was measured for; empty where not said.
+        ranked: causes of the model beside the circles; None without a model.
     """
 
     found: Circled
@@ -65,6 +70,7 @@ class Reported:
     before: Circled | None = None
     modelled: Modelled | None = None
     job: str = ""
+    ranked: Ranked | None = None
 
 
 def numbers_of(reported: Reported) -> dict[str, Any]:
@@ -73,7 +79,8 @@ def numbers_of(reported: Reported) -> dict[str, Any]:
     tolerances = reported.settings.tolerances
     held = held_against(tolerances, now, reported.coverage_factor)
     identified = None if reported.modelled is None else reported.modelled.identified
-    verdict = verdict_of(held, reported.found, reported.coverage_factor, identified)
+    ranked = reported.ranked
+    verdict = verdict_of(held, reported.found, reported.coverage_factor, identified, reported.ranked)
     before = () if reported.before is None else tolerated_circles(reported.before.circles)
     tests = dict.fromkeys(one.test for one in now)
     rows = list(_side_by_side(now, before))
@@ -96,6 +103,10 @@ def numbers_of(reported: Reported) -> dict[str, Any]:
         "measured": rows,
         "measured_means": _means(rows),
         "circles": circled_summary(reported.found, reported.chosen),
+        "causes": []
+        if ranked is None
+        else [plain(one) for one in effect_results(ranked.effects, ranked.verdicts or {})],
+        "causes_of": None if ranked is None or not ranked.effects else ranked.session,
         "model": None if reported.modelled is None else dict(reported.modelled.evaluation),
     }
 
@@ -133,6 +144,7 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
         "polar_size": SIZE,
         "polar_radius": CIRCLE,
         "polars": _polars(reported),
+        "causes": _causes(reported),
         "before_name": "" if reported.before is None else reported.before.sessions[0].name,
         "several": len(found.sessions) > 1,
         "findings": _findings(found),
@@ -151,6 +163,18 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
         "notes": [*found.warnings, *_notes_before(reported)],
         "files": list(_files(reported, provenance)),
         "provenance": provenance,
+    }
+
+
+def _causes(reported: Reported) -> dict[str, Any] | None:
+    ranked = reported.ranked
+    if ranked is None:
+        return None
+    return {
+        "session": ranked.session,
+        "why_not": ranked.why_not,
+        "rows": cause_rows(ranked, reported.coverage_factor),
+        "polars": cured_polars(ranked),
     }
 
 

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 from dbbstation.digits import with_uncertainty
 from dbbstation.quality.conformity import Conformity
+from dbbstation.report.causes_part import told_causes
 from dbbstation.results.model_warnings import lacks_physics
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.report.causes_part import Ranked
     from dbbstation.results.circles import Circled, MeasuredCircle
     from dbbstation.results.tolerances import Held
 
@@ -38,7 +40,11 @@ class ReportVerdict:
 
 
 def verdict_of(
-    held: Sequence[Held], found: Circled, coverage_factor: float, identified: IdentifiedModel | None = None
+    held: Sequence[Held],
+    found: Circled,
+    coverage_factor: float,
+    identified: IdentifiedModel | None = None,
+    ranked: Ranked | None = None,
 ) -> ReportVerdict:
     """Return the verdict of tolerances held against measured circles.
 
@@ -47,6 +53,7 @@ def verdict_of(
         found: the circles, with their findings.
         coverage_factor: k of U = k u.
         identified: a model beside the circles; None where none is given.
+        ranked: its causes, of which the first page names the greatest first; None where none is given.
     """
     said = {one.conformity for one in held}
     repeat = (*_to_repeat(found.circles), *_of_the_model(found, identified))
@@ -56,16 +63,17 @@ def verdict_of(
         return ReportVerdict("none", nothing, (), (*repeat, write))
     told = [one for one in held if one.conformity in {Conformity.EXCEEDED, Conformity.UNDECIDED}]
     reasons = tuple(_reason(one, coverage_factor) for one in told)
+    causes = () if ranked is None else told_causes(ranked, coverage_factor)[:MOST_TOLD]
     if Conformity.EXCEEDED in said:
         headline = "The machine is NOT within the shop's tolerances."
-        return ReportVerdict(Conformity.EXCEEDED, headline, reasons, (*repeat, *_cure(found, identified)))
+        return ReportVerdict(Conformity.EXCEEDED, headline, reasons, (*repeat, *causes, *_cure(found, identified)))
     if Conformity.UNDECIDED in said:
         headline = "It cannot be told whether the machine is within the shop's tolerances."
         narrow = (
             "A limit lies within the uncertainty U of a figure, or the figure has none. The budget of the figure says what U comes from "
             "(`dbbstation circles --budget`): lessen its largest term, state what the session lacks, or agree on another limit."
         )
-        return ReportVerdict(Conformity.UNDECIDED, headline, reasons, (*repeat, narrow))
+        return ReportVerdict(Conformity.UNDECIDED, headline, reasons, (*repeat, *causes, narrow))
     keep = (
         "The circles need no correction. Measure again after a crash, a repair or a move of the machine; the plan "
         "ten-minute-check.yaml shows in three tests whether this still holds."

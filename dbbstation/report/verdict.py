@@ -82,10 +82,9 @@ def verdict_of(
 
 
 def _reason(held: Held, coverage_factor: float) -> str:
-    worst = held.worst
-    if worst is None:
+    worst, size = held.worst, held.size
+    if worst is None or size is None:
         return ""
-    size = worst.sizes[held.tolerance.figure]
     name = held.tolerance.figure.value.replace("-", " ").capitalize()
     run = f"{worst.test} {worst.direction} {worst.repeat}"
     exceeded = f"{held.exceeded} of {held.circles} circles exceed it"

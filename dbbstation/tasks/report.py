@@ -13,7 +13,7 @@ from dbbstation.errors import StationError
 from dbbstation.files.atomic import refuse_outputs, write_bytes
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.report.causes_part import Ranked
-from dbbstation.report.content import Modelled, Reported, content_of, numbers_of
+from dbbstation.report.content import Modelled, Reported, certified_of, content_of, numbers_of
 from dbbstation.report.html import report_html
 from dbbstation.report.pdf import chromium, printed
 from dbbstation.results.model_warnings import lacks_physics
@@ -75,6 +75,8 @@ def report(
     before: str | PathLike[str] | None = None,
     model: Model | None = None,
     job: str = "",
+    place: str = "",
+    certificate: bool = False,
     pdf: str | PathLike[str] | None = None,
     coverage_factor: float = USUAL_COVERAGE,
     tests: Sequence[str] = (),
@@ -94,6 +96,8 @@ def report(
         before: session that was measured before, to put beside.
         model: a model, a file of one, or the result of `calibrate` or `diagnose`, to put beside.
         job: what was measured for, where the session does not say it or says something else.
+        place: where it was measured.
+        certificate: refuse a report that lacks what a certificate needs.
         pdf: file to print to, by an installed Chromium; None: none.
         coverage_factor: k of U = k u.
         tests: names of tests to take; empty for all.
@@ -108,6 +112,7 @@ def report(
         InputError: faults of files.
         OutputError: a file exists and `force` is not given; no browser prints.
         ModelError: the model is of another machine.
+        StationError: `certificate`, and something is lacking; nothing was written.
         StoppedError: `stop` returned True; nothing was written.
     """
     page, paper = Path(out), None if pdf is None else Path(pdf)
@@ -128,7 +133,15 @@ def report(
             check_model_is_of(session.machine, identified.model.machine)
         modelled = _modelled(paths, identified, (tests, exclude), telling)
         ranked = _ranked(paths if before is None else [Path(before)], identified, (tests, exclude), telling)
-    reported = Reported(found, TOLERATED, settings, coverage_factor, former, modelled, job, ranked)
+    reported = Reported(found, TOLERATED, settings, coverage_factor, former, modelled, job, ranked, place)
+    lacking = certified_of(reported).lacking
+    if certificate and lacking:
+        what = f"this is no certificate: {', '.join(lacking)}"
+        remedy = (
+            "note them when it is measured (`measure --help` has the options), give --place and --job, write tolerances into the settings; or "
+            "leave --certificate out"
+        )
+        raise StationError(what, where=", ".join(session.name for session in found.sessions), remedy=remedy)
     numbers = numbers_of(reported)
     telling.stage("writing")
     html = report_html(content_of(reported, numbers, provenance()))

@@ -82,7 +82,7 @@ def test_the_report_says_it_on_page_1_and_beside_the_parameters(failed, run, tmp
     assert "The model failed" in first
     assert SAID in first
     assert SAID in rest
-    assert rest.index(SAID) < rest.index("U = 2 u; a dash")
+    assert rest.index(SAID) < rest.index("A dash where the model")
     assert [SAID in warning for warning in data["model_warnings"]] == [True]
     assert any("dbbstation diagnose" in step for step in data["verdict"]["to_do"])
     assert not any("dbbstation calibrate" in step for step in data["verdict"]["to_do"])

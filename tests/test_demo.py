@@ -37,6 +37,10 @@ def test_the_whole_job(tmp_path):
     # What remains is where the balls came to stand, 0.6 to 1.9 µm per axis, and the noise of the bar.
     assert max(run["centre_deviation_um"] for run in after) < 10
     assert max(run["circularity_um"] for run in after) < 4
+    report = result["report"]
+    assert report["verdict"]["kind"] == "within"
+    assert [one["cause"] for one in report["causes"]] == ["geometry", "gravity"]
+    assert report["causes"][0]["g_um"] > report["causes"][1]["g_um"] > 5.0
     for name in ("measured", "verified", "programs", "kinematic.yaml", "joint.yaml", "report.html"):
         assert (tmp_path / "job" / name).exists()
     _from_python(tmp_path / "job", result)

@@ -128,9 +128,6 @@ def names_in(text: str | None) -> list[str] | None:
     return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
 
 
-LEAST_PRINTED = 1e-99
-"""Probabilities below are printed alike."""
-
 IN_A_TABLE_OF_THEIR_OWN = frozenset({"drive-friction"})
 """Sources with a row for each motor in place of one for each parameter."""
 
@@ -183,14 +180,14 @@ def _print_plan_check(check: PlanCheckResult) -> None:
 
 def _print_misfit(result: CalibrationResult) -> None:
     """Print what is left beyond noise and mountings; nothing where chance explains it."""
+    from dbbstation.results.model_warnings import exceeds
+
     misfit = result.misfit
     if not misfit.missing_physics:
         return
-    chance = misfit.probability
     echo(
-        f"the residual exceeds noise and mountings by {misfit.rms_um:.2f} µm rms (probability by chance "
-        f"{'below 1e-99' if chance < LEAST_PRINTED else f'{chance:.1g}'}): physics is missing from the model; "
-        "`dbbstation diagnose` looks for it"
+        f"{exceeds(misfit.rms_um, misfit.probability)}: physics is missing from the model; `dbbstation diagnose` looks for it. "
+        "Until then its parameters may be off by many times their u"
     )
     if result.residual_within_mounting_rms_um > NOT_THIS_MACHINE * result.noise_um:
         echo(

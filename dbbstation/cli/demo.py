@@ -48,7 +48,7 @@ def demo(*, out: Path | None, seed: int, as_json: bool) -> None:
 
     result = run_demo(folder, seed, tell, progress)
     if as_json:
-        print_json({"folder": str(folder), "runs": result.runs, "diagnosis": result.diagnosis})
+        print_json({"folder": str(folder), "runs": result.runs, "diagnosis": result.diagnosis, "report": result.report})
     else:
         _print(result)
 
@@ -86,9 +86,16 @@ def _print(result: DemoResult) -> None:
     held_out = result.diagnosis["held_out_rms_um"]
     echo(f"Held-out tests are predicted to {held_out['before']:.1f} µm rms before, {held_out['after']:.1f} after.")
     echo()
+    echo(f"The report says: {result.report['verdict']['headline']}")
+    for rank, one in enumerate(result.report["causes"], start=1):
+        echo(
+            f"Cause {rank} of what was measured before: {one['cause']}, {one['g_um']:.1f} µm of G, {one['centre_um']:.1f} µm of the "
+            f"centres. {one['cure']}"
+        )
+    echo()
     echo(f"everything is in {result.folder}:")
     for name, what in _CONTENTS:
-        echo(f"  {name:<16} {what}")
+        echo(f"  {name:<24} {what}")
 
 
 _CONTENTS = (
@@ -98,6 +105,7 @@ _CONTENTS = (
     ("joint.yaml", "model with what the diagnosis found"),
     ("programs/", "compensated NC programs of the fifteen circles"),
     ("verified/", "session with the compensated programs"),
+    ("dbbstation-settings.yaml", "tolerances of the demonstration"),
     ("report.html", "all of it to read and print: open it in a browser"),
 )
 

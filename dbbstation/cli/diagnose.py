@@ -30,6 +30,11 @@ if TYPE_CHECKING:
     help="Keep an unmodelled effect in that model, as a curve over strut length or force: compensated, cause unknown.",
 )
 @figure_option()
+@click.option(
+    "--effects",
+    is_flag=True,
+    help="Rank the causes by what each contributes to the circles, with its cure and the circles as they would be without it.",
+)
 @click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def diagnose(
@@ -42,6 +47,7 @@ def diagnose(
     out: Path | None,
     keep_unexplained: bool,
     figure: Path | None,
+    effects: bool,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -58,14 +64,16 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7
       dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml --figure diagnosis.svg
       dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
+      dbbstation diagnose 2026-11-20-hexapod-7 --effects
       dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
       dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
     """
     from dbbstation.cli.calibrate import names_in
+    from dbbstation.cli.model_warnings import say_model_warnings
     from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import task_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.cli.unknown_causes import say_unknown_causes
+    from dbbstation.cli.ranked_causes import print_effects
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source
@@ -88,7 +96,7 @@ def diagnose(
         )
     if out is not None:
         write_model(out, result.model, provenance=provenance(), force=force)
-        say_unknown_causes(result.model.model)
+        say_model_warnings(result.model)
     if figure is not None and result.drawing is not None:
         write_bytes(figure, result.drawing(format_of(figure)), force=force)
         say(f"figure written to {figure}")
@@ -96,6 +104,8 @@ def diagnose(
         print_result(result)
     else:
         _print(result)
+        if effects:
+            print_effects(result.effects)
         if out is not None:
             say(f"joint model written to {out}")
 
@@ -130,12 +140,14 @@ def _print(result: DiagnosisFigures) -> None:
 
 def _print_mismatch(result: DiagnosisFigures) -> None:
     """Print whether the recordings differ from the kinematic model; before that, where what was found predicts worse."""
+    from dbbstation.results.model_warnings import chance_in_words
+
     if result.held_out_worse:
         echo("Held-out tests are predicted worse than by the kinematic calibration alone. Nothing is identified.\n")
     if result.mismatch:
         echo(
             f"The recordings differ from the kinematic model by {result.misfit_rms_um:.2f} µm rms beyond noise "
-            f"(probability by chance {_chance(result.probability)})."
+            f"(probability by chance {chance_in_words(result.probability)})."
         )
     else:
         echo(f"The recordings agree with the kinematic model (probability {result.probability:.2g}).")
@@ -253,15 +265,6 @@ def _print_sources(sources: Sequence[CauseResult]) -> None:
 
 SAID = frozenset({"identified", "happened", "does-not-predict", "ambiguous"})
 """Verdicts of causes whose values are printed."""
-
-
-def _chance(probability: float) -> str:
-    """Probability of an F test as printed; the smallest ones underflow."""
-    return "below 1e-99" if probability < LEAST_PRINTED else f"{probability:.1g}"
-
-
-LEAST_PRINTED = 1e-99
-"""Probabilities below are printed alike."""
 
 
 def _probable(source: CauseResult) -> str:

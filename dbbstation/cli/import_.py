@@ -15,6 +15,7 @@ from dbbstation.text.printable import printable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from datetime import datetime
 
     from dbbstation.cli.asking import Asker
     from dbbstation.files.formats.mapping import MappingFile
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.plan import Plan
-    from dbbstation.tasks.importing.runs import ImportedRun, Reader, RunName
+    from dbbstation.tasks.importing.names import RunName
+    from dbbstation.tasks.importing.runs import ImportedRun, Reader
 
 CONDITIONS = ("temperature", "operator", "job", "bar")
 """What a session notes and no table says."""
@@ -39,8 +41,20 @@ CONDITIONS = ("temperature", "operator", "job", "bar")
     "--run",
     "named",
     multiple=True,
-    metavar="FILE=TEST-DIRECTION",
-    help="Which run a file is, such as old1.csv=a-ccw or old1.csv=a-ccw-2, where the file does not say it.",
+    metavar="FILE=TEST-DIRECTION,...",
+    help="Which run a file is, such as old1.csv=a-ccw or old1.csv=a-ccw-2, where the file does not say it; of several, in order.",
+)
+@click.option(
+    "--started",
+    multiple=True,
+    metavar="[FILE=]TIME",
+    help="When the first run of a file was taken, such as 2026-11-20T08:04+01:00, where the file does not say it.",
+)
+@click.option(
+    "--trust",
+    multiple=True,
+    type=click.Choice(["unit", "centre"]),
+    help="Take numbers that do not look like their unit, or circles that look centred, as they are; the session notes that.",
 )
 @noted_options
 @click.option(
@@ -59,6 +73,8 @@ def import_(
     plan: Path | None,
     machine: Path | None,
     named: tuple[str, ...],
+    started: tuple[str, ...],
+    trust: tuple[str, ...],
     not_known: tuple[str, ...],
     yes: bool,
     dry_run: bool,
@@ -95,7 +111,8 @@ def import_(
     elif remembered is not None:
         refuse_existing(remembered, force=False)
     asker = Asker()
-    found = _read(asker, files, of_mapping, (plan, machine), named, options, not_known)
+    told = _Told(named, started, frozenset(trust), not_known)
+    found = _read(asker, files, of_mapping, (plan, machine), told, options)
     writes = (out, found.machine, found.plan, found.runs, found.details, found.more)
     with staged(*writes, dry=dry_run) as put:
         if not as_json:
@@ -112,6 +129,16 @@ def import_(
     else:
         kept = "" if remembered is None else f", the mapping to {remembered}"
         echo(f"{len(found.runs)} runs written to {out}{kept}")
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What somebody says of the files: names of runs, starts, what is to be trusted, what nobody knows."""
+
+    named: Sequence[str]
+    started: Sequence[str]
+    trusted: frozenset[str]
+    not_known: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -132,9 +159,8 @@ def _read(
     files: Sequence[Path],
     of_mapping: Mapping[str, Any],
     paths: tuple[Path | None, Path | None],
-    named: Sequence[str],
+    said: _Told,
     options: dict[str, Any],
-    not_known: Sequence[str],
 ) -> _Import:
     """Read everything, and ask for what is missing."""
     from dataclasses import replace
@@ -153,20 +179,24 @@ def _read(
     chosen = chosen_mapping(list(tables.values()), of_mapping, asker)
     plan = paths[0] or Path(asker.text("test plan whose circles were run", "--plan"))
     machine = paths[1] or Path(asker.text("file of the machine", "--machine"))
-    _ask_conditions(asker, options, not_known)
+    _ask_conditions(asker, options, said.not_known)
     asker.check()
     mapping, inline, nominal = chosen(), read_inline_plan(plan), read_machine(machine)
     planned = inline.to_domain()
-    told = _told(files, named, planned)
-    reader = _with_span(asker, Reader(mapping, planned), list(tables.values()))
+    told = _told(files, said.named, planned)
+    started = _started(files, said.started, mapping.zone)
+    reader = Reader(_split(asker, mapping, list(tables.values())), planned, started, said.trusted)
+    reader = _with_span(asker, reader, list(tables.values()))
     mapping = reader.mapping
     runs: list[ImportedRun] = []
     for path, table in tables.items():
-        runs += reader.read(table, told.get(path) or _asked_run(asker, reader, table, planned))
+        runs += reader.read(table, told.get(path) or [_asked_run(asker, reader, table, planned)])
     reader.check()
     places = {(one.run.test, one.run.direction, one.run.repeat): one for one in runs}
     runs = [places[one.test, one.direction, one.repeat] for one in repeats_in_order(one.run for one in runs)]
-    statements = [*_statements(mapping, runs, _unknown(options)), *reader.left_out]
+    trusted = [f"taken as they are, whatever they look like: {one}" for one in sorted(said.trusted)]
+    centred = [] if "centre" in said.trusted else _asked_centres(asker, runs, planned)
+    statements = [*_statements(mapping, runs, _unknown(options)), *trusted, *centred, *reader.left_out]
     now = datetime.now(UTC).replace(microsecond=0)
     notes = tuple(Note(now, f"imported: {text}") for text in statements)
     details = replace(session_details(**options, stroke_mm=None), notes=notes)
@@ -231,28 +261,28 @@ def _or(option: str, condition: str) -> str:
     return f"{option}, or --not-known {condition}"
 
 
-def _told(files: Sequence[Path], named: Sequence[str], plan: Plan) -> dict[Path, RunName]:
-    """Which run each file is, as `--run` says."""
-    from dbbstation.tasks.importing.runs import run_name
+def _told(files: Sequence[Path], named: Sequence[str], plan: Plan) -> dict[Path, list[RunName]]:
+    """Which runs each file has, as `--run` says."""
+    from dbbstation.tasks.importing.names import run_name
 
-    found = {}
+    found: dict[Path, list[RunName]] = {}
     for text in named:
         name, _, said = text.rpartition("=")
         matching = [path for path in files if name in {str(path), path.name}]
-        run = run_name(said, list(plan.tests))
+        runs = [run for one in said.split(",") if (run := run_name(one.strip(), list(plan.tests))) is not None]
         if len(matching) != 1:
             raise click.UsageError(f"--run {text}: {name or 'it'} names {len(matching)} of the files that are given")
-        if run is None:
+        if len(runs) != len(said.split(",")):
             raise click.UsageError(
                 f"--run {text}: {said} is no run of the plan, whose tests are {', '.join(plan.tests)}"
             )
-        found[matching[0]] = run
+        found[matching[0]] = [*found.get(matching[0], []), *runs]
     return found
 
 
 def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) -> RunName:
     """Which run a file is; asked for where neither its rows nor its name say it."""
-    from dbbstation.tasks.importing.runs import RunName, run_name
+    from dbbstation.tasks.importing.names import RunName, run_name
 
     if not asker.terminal or reader.says_test(table):
         return RunName()
@@ -264,6 +294,76 @@ def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) ->
         if found is not None:
             return found
         echo(f"the plan's tests: {', '.join(plan.tests)}; directions: ccw, cw", err=True)
+
+
+def _started(files: Sequence[Path], said: Sequence[str], zone: str | None) -> dict[str, datetime]:
+    """When the first run of each file was taken, as `--started` says."""
+    from dbbstation.tasks.importing.moments import UnclearMomentError, moment_in, zone_named
+
+    found: dict[str, datetime] = {}
+    for text in said:
+        name, has, when = text.rpartition("=")
+        matching = [path for path in files if not has or name in {str(path), path.name}]
+        if len(matching) != 1:
+            raise click.UsageError(
+                f"--started {text}: it is for {len(matching)} of the files that are given; write FILE=TIME"
+            )
+        try:
+            found[str(matching[0])] = moment_in(when, None if zone is None else zone_named(zone)).at
+        except UnclearMomentError as error:
+            raise click.UsageError(
+                f"--started {text}: {error.what}; write such as 2026-11-20T08:04:11+01:00"
+            ) from error
+    return found
+
+
+def _split(asker: Asker, mapping: MappingFile, tables: Sequence[ForeignTable]) -> MappingFile:
+    """Ask whether a file whose angles turn round has several runs; in a pipe `--split` says it."""
+    import numpy as np
+
+    from dbbstation.files.formats.mapping import ANGLE, OF_RUNS
+    from dbbstation.tasks.importing.splitting import parts_by_direction
+
+    name = mapping.column(ANGLE)
+    told = mapping.split is not None or any(mapping.column(one) is not None for one in OF_RUNS)
+    if not asker.terminal or told or name is None or mapping.columns[name].unit != "deg":
+        return mapping
+    for table in tables:
+        angle = table.table.values.get(name, np.zeros(0))
+        parts = parts_by_direction(angle[np.isfinite(angle)])
+        if len(parts) > 1:
+            file = Path(table.table.file).name
+            if not click.confirm(f"the angles of {file} turn round: has it {len(parts)} runs", err=True):
+                raise click.UsageError("a run turns one way: check the file")
+            return mapping.model_copy(update={"split": "direction", "format": "dbb-mapping/2"})
+    return mapping
+
+
+def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> list[str]:
+    """Refuse circles from which another program took the centre, unless somebody says that they are raw.
+
+    Raises:
+        InputError: nobody is there to say it.
+    """
+    from dbbstation.errors import InputError, Problem
+    from dbbstation.tasks.importing.plausible import CHANCE, chance_of_runs
+
+    chance = chance_of_runs(runs, plan)
+    if chance is None or chance >= CHANCE:
+        return []
+    what = (
+        f"the circles lie nearer to their commanded centres than balls can be put up (probability by chance {chance:.1g}): another program "
+        "took the centre off"
+    )
+    remedy = (
+        "export raw data; or import with a plan whose balls are `placed: under-spindle`, which needs no centre; --trust centre takes them "
+        "as they are"
+    )
+    if not asker.terminal:
+        raise InputError([Problem(runs[0].file, 0, 0, what, remedy)])
+    if not click.confirm(printable(f"{what}. Are they raw all the same"), err=True):
+        raise click.UsageError(remedy)
+    return [f"centres: {what}; they were confirmed to be raw"]
 
 
 def _with_span(asker: Asker, reader: Reader, tables: Sequence[ForeignTable]) -> Reader:

@@ -19,14 +19,19 @@ if TYPE_CHECKING:
 _UNITS = ("mm", "µm", "um", "m", "inch", "mil", "µinch")
 _SHEET = click.argument("sheet", type=click.Path(path_type=Path), metavar="SHEET")
 _UNIT = click.option(
-    "--unit", type=click.Choice(_UNITS), default="mm", show_default=True, help="Of a table's coordinates."
+    "--unit", type=click.Choice(_UNITS), help="Of a table's coordinates  [default: as the sheet says, else mm]."
+)
+_U_UNIT = click.option(
+    "--u-unit",
+    type=click.Choice(_UNITS),
+    help="Of its uncertainties, such as µm beside mm  [default: as the sheet says, else that of coordinates].",
 )
 _COLUMN = click.option(
     "--column",
     "columns",
     multiple=True,
     metavar="WHAT=NAME",
-    help="Which column is what: ball, bore, holder, x, y, z, u or ux, uy, uz, such as x=Ist_X  [default: by their names].",
+    help="Which column is what: ball, bore, holder, x, y, z, u or ux, uy, uz; axis, value, unit of a row per coordinate; such as x=Ist_X  [default: by their names].",
 )
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 _FORCE = click.option("--force", is_flag=True, help="Replace an existing file.")
@@ -50,6 +55,7 @@ def jig() -> None:
 )
 @_COLUMN
 @_UNIT
+@_U_UNIT
 @click.option(
     "--name", "names", multiple=True, metavar="LABEL=BALL", help="Ball of the jig that the sheet calls otherwise."
 )
@@ -68,7 +74,8 @@ def sheet(
     *,
     before: Path,
     columns: tuple[str, ...],
-    unit: str,
+    unit: str | None,
+    u_unit: str | None,
     names: tuple[str, ...],
     coverage: float | None,
     u_um: float | None,
@@ -95,7 +102,7 @@ def sheet(
 
     refuse_existing_table(out, force=force)
     old = read_jig(before)
-    measured = read_sheet(sheet, _pairs(columns, "--column", _WHAT), unit.replace("um", "µm"), coverage)
+    measured = read_sheet(sheet, _pairs(columns, "--column", _WHAT), _micro(unit), coverage, u_unit=_micro(u_unit))
     new = jig_of_sheet(
         old,
         measured,
@@ -151,7 +158,7 @@ def holders(
     sheet: Path,
     *,
     columns: tuple[str, ...],
-    unit: str,
+    unit: str | None,
     holder: str | None,
     cmm_repeatability_um: float,
     before: Path | None,
@@ -181,7 +188,7 @@ def holders(
         )
     if out is not None:
         refuse_existing_table(out, force=force)
-    rows = read_sheet(sheet, _pairs(columns, "--column", _WHAT), unit.replace("um", "µm"), 1.0, of_one_holder=True)
+    rows = read_sheet(sheet, _pairs(columns, "--column", _WHAT), _micro(unit), 1.0, of_one_holder=True)
     found: dict[str, Repeatability] = {}
     try:
         for name, places in _by_holder(rows, holder, sheet).items():
@@ -241,7 +248,11 @@ def _print_holders(found: Mapping[str, Repeatability]) -> None:
             echo(f"{name}: the axes scatter differently (p = {one.axes_differ:.2g}); a jig file has one value for all")
 
 
-_WHAT = ("ball", "bore", "holder", "x", "y", "z", "u", "ux", "uy", "uz")
+def _micro(unit: str | None) -> str | None:
+    return None if unit is None else unit.replace("um", "µm")
+
+
+_WHAT = ("ball", "bore", "holder", "x", "y", "z", "u", "ux", "uy", "uz", "axis", "value", "unit")
 
 
 def _pairs(texts: Sequence[str], option: str, known: Sequence[str] = ()) -> dict[str, str]:

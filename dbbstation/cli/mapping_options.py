@@ -56,6 +56,14 @@ _OPTIONS = (
         type=click.Choice(["whole", "turn"]),
         help="Files without angles: the whole run with feed-in and feed-out, or the full turn alone.",
     ),
+    click.option(
+        "--split",
+        type=click.Choice(["gaps", "direction"]),
+        help="Several runs in a file: parted by gaps (pauses, times that begin anew, empty lines), or where the angles turn round.",
+    ),
+    click.option(
+        "--zone", metavar="ZONE", help="Time zone of dates that have none, such as +01:00  [default: this computer's]."
+    ),
     click.option("--zero-mm", type=Finite(20, 2000), help="Length of the bar at which the deviation is 0 [mm]."),
     click.option("--file-name", metavar="PATTERN", help="What names of files say, such as '{test}_{direction}'."),
     click.option(
@@ -78,6 +86,8 @@ MAPPING_OPTIONS = (
     "angle_grows",
     "angle_span_deg",
     "trace",
+    "split",
+    "zone",
     "zero_mm",
     "file_name",
     "decimal",
@@ -172,6 +182,7 @@ def chosen_mapping(
     means = {one.means for one in columns.values()}
     own = set(table.table.names) >= EXPORTED
     data: dict[str, Any] = {"columns": columns, "trace": options["trace"], "file_name": options["file_name"]}
+    data |= {"split": "column" if "run" in means else options["split"], "zone": options["zone"]}
     if ANGLE in means:
         data["angle"] = {"zero_deg": 0.0, "grows": "ccw"} if own else _angle(options, asker)
         data["angle"] |= {"span_deg": options["angle_span_deg"]}
@@ -244,7 +255,7 @@ def _mapping(table: ForeignTable, data: Mapping[str, Any]) -> MappingFile:
         name: {"means": one.means, **({"unit": one.unit} if one.unit else {})} for name, one in data["columns"].items()
     }
     whole = {
-        "format": "dbb-mapping/1",
+        "format": "dbb-mapping/1" if data["split"] is None and data["zone"] is None else "dbb-mapping/2",
         "separator": separator,
         "decimal": table.language.decimal,
         **data,

@@ -41,10 +41,10 @@ def predict(
       dbbstation predict --model model.yaml --poses commanded.csv --out actual.csv
       dbbstation predict --model model.yaml --poses excel.csv --decimal , --out actual.csv
     """
+    from dbbstation.cli.model_warnings import say_model_warnings
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_result, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.tasks.models import model_of
@@ -53,7 +53,7 @@ def predict(
 
     refuse_existing_table(out, force=force)
     identified = model_of(model, every_source(source_files))
-    say_unknown_causes(identified.model)
+    say_model_warnings(identified)
     with stage_bar("prediction", STAGES) as progress:
         result = predicted(
             identified,

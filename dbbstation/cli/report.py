@@ -21,6 +21,14 @@ from dbbstation.cli.source_files import source_file_option
 @click.option(
     "--job", default="", help="What was measured for, where the session does not say it or says something else."
 )
+@click.option(
+    "--place",
+    default="",
+    help="Where it was measured: a certificate names it  [on a terminal it is asked for with --certificate].",
+)
+@click.option(
+    "--certificate", is_flag=True, help="Refuse to write where something that a certificate needs is not known."
+)
 @source_file_option
 @chosen_tests_options
 @click.option(
@@ -37,6 +45,8 @@ def report(
     before: Path | None,
     model: Path | None,
     job: str,
+    place: str,
+    certificate: bool,
     source_files: tuple[Path, ...],
     tests: tuple[str, ...],
     exclude: tuple[str, ...],
@@ -56,8 +66,10 @@ def report(
     Examples:
       dbbstation report session --out report.html
       dbbstation report verified --before measured --model joint.yaml --out report.html
+      dbbstation report session --certificate --place "hall 3" --out report.html --pdf report.pdf
       dbbstation report session --job "spindle exchanged" --out report.html --pdf report.pdf
     """
+    from dbbstation.cli.asking import Asker
     from dbbstation.cli.output import COVERAGE_FACTOR, print_json, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
@@ -67,6 +79,8 @@ def report(
     from dbbstation.tasks.report import report as written_report
 
     settings = shop_settings()
+    if certificate and not place and (asker := Asker()).terminal:
+        place = asker.text("where it was measured", "--place")
     with stage_bar("report", STAGES) as progress:
         written = written_report(
             sessions,
@@ -75,6 +89,8 @@ def report(
             before=before,
             model=model,
             job=job,
+            place=place,
+            certificate=certificate,
             pdf=pdf,
             coverage_factor=COVERAGE_FACTOR,
             tests=tests,
@@ -90,6 +106,7 @@ def report(
     if as_json:
         print_json({"report": str(out), **written.numbers})
     else:
+        echo(written.numbers["certificate"]["title"])
         _print(written.numbers["verdict"])
 
 

@@ -80,6 +80,8 @@ def built_in() -> dict[str, Any]:
 
 
 def _data(found: Settings) -> dict[str, Any]:
+    from dbbstation.results.tolerances import filter_words
+
     values = {}
     for key, own in built_in().items():
         setting = found.values.get(key)
@@ -91,6 +93,7 @@ def _data(found: Settings) -> dict[str, Any]:
         {
             "quantity": one.figure.value,
             "largest_um": one.largest_um,
+            "filter": filter_words(one),
             "tests": list(one.tests),
             "directions": [direction.value for direction in one.directions],
         }
@@ -116,7 +119,7 @@ def _print(found: Settings) -> None:
     print_table(["setting", "value", "from"], rows)
     for one in data["tolerances"]:
         echo(
-            f"tolerance: {one['quantity']} at most {one['largest_um']:g} µm, {which_circles(one['tests'], one['directions'])}"
+            f"tolerance: {one['quantity']}{_filtered(one['filter'])} at most {one['largest_um']:g} µm, {which_circles(one['tests'], one['directions'])}"
         )
     if found.tolerances_from:
         echo(f"tolerances from {found.tolerances_from}")
@@ -134,3 +137,7 @@ def _template() -> str:
     head, format_line, rest = text.partition(f"format: {format_of(SettingsFile)}\n")
     hint = "# Take away the # in front of what you set; where a line is indented, in front of the line above it too.\n"
     return head + hint + format_line + re.sub(r"^(?=[^#\n])", "#", rest, flags=re.MULTILINE)
+
+
+def _filtered(words: str | None) -> str:
+    return "" if words is None else f" (filter: {words})"

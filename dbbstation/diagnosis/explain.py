@@ -21,8 +21,8 @@ from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
 from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
+from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.model_comparison import SCALES
-from dbbstation.inference.settle import impossibly_negative
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.inference.chosen_anew import LEAST_PARTS
-from dbbstation.inference.folds import FOLDS as GROUPS
+from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn, numbered
 from dbbstation.inference.harmonics import LOW
 from dbbstation.inference.held_out import HeldOut, held_out
 from dbbstation.inference.jackknife import widening
@@ -20,15 +20,10 @@ from dbbstation.inference.square_root import solve
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.explained import Explained
     from dbbstation.inference.square_root import Solution
     from dbbstation.model.observation import Observation
-
-FOLDS = 5
-"""Groups of tests that are left out in turn."""
 
 
 def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
@@ -36,8 +31,7 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
     channel, settled = explained.channel, explained.settled
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
     single = max(_single_noise_mm(channel.observations, noise_mm, fine_noise_mm(settled.after)), SMALLEST_NOISE_MM)
-    tests = tests_of(channel.observations)
-    groups = [test % min(FOLDS, max(tests) + 1) for test in tests]
+    groups = in_turn([o.test for o in channel.observations], FOLDS_OF_AN_ERROR)
     variants = [member.variant for member in settled.members]
     known = channel.known_with(variants)
     blocks = channel.blocks(channel.columns_of(variants), channel.target(settled.after))
@@ -63,7 +57,7 @@ def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
     columns, causes = renumbered([cause for cause in settled.causes if cause.name in wanted])
     return selection_frequency(
         channel.blocks(columns, channel.target(settled.after)),
-        tests_of(channel.observations),
+        numbered([o.test for o in channel.observations]),
         channel.base,
         channel.held,
         causes,
@@ -97,17 +91,10 @@ def widened_by_tests(calibration: Calibration) -> Calibration:
     return replace(calibration, solution=replace(calibration.solution, spreads=spreads))
 
 
-def groups_of(observations: Sequence[Observation]) -> NDArray[np.int64] | None:
+def groups_of(observations: Sequence[Observation]) -> list[int] | None:
     """Group of the test of each run that is held back in turn; None where there are too few groups."""
-    tests = np.array(tests_of(observations))
-    groups = tests % min(GROUPS, int(tests.max()) + 1)
+    groups = in_turn([o.test for o in observations], FOLDS)
     return groups if len(np.unique(groups)) >= LEAST_PARTS else None
-
-
-def tests_of(observations: Sequence[Observation]) -> list[int]:
-    """Number of the test of each run, counted in the order of recording."""
-    order = {name: k for k, name in enumerate(dict.fromkeys(o.test for o in observations))}
-    return [order[o.test] for o in observations]
 
 
 def _single_noise_mm(observations: Sequence[Observation], noise_mm: float, fine_mm: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.inference.verdict import Gains, is_worse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -27,8 +27,23 @@ WIDEST_GAP = 0.5
 """Gap beside a part at the most, as a share of its rows: where neighbours resemble each other for longer, four fifths of the rows are
 still left to choose from."""
 
+FOLDS_OF_AN_ERROR = 5
+"""Groups of tests that are left out in turn where only the error of the prediction is asked for, nothing being chosen anew."""
+
 Kind: TypeAlias = "tuple[str, ...]"
 """Family and variables of an effect, or the name of a law."""
+
+
+def numbered(names: Sequence[str]) -> list[int]:
+    """Number of each name, counted in the order in which they first appear."""
+    order = {name: k for k, name in enumerate(dict.fromkeys(names))}
+    return [order[name] for name in names]
+
+
+def in_turn(names: Sequence[str], most: int) -> list[int]:
+    """Group of each run by the name of its test, tests taken in turn; as many groups as tests where these are fewer."""
+    tests = numbered(names)
+    return [test % min(most, max(tests) + 1) for test in tests]
 
 
 @dataclass(frozen=True)

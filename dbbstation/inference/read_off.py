@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
+from dbbstation.inference.impossible import impossible
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.named_values import named_values, with_jackknife
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
-from dbbstation.inference.settle import impossible
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, Gains, Value, Verdict, claim

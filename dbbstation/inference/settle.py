@@ -11,6 +11,7 @@ import numpy as np
 from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, search
+from dbbstation.inference.impossible import impossible
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import MOVED, places_anew, seen
 from dbbstation.inference.settled import MOST_EXPANDED, Beginning, Settled
@@ -42,9 +43,6 @@ MOST_GROWN = 40
 
 MOST_PLACED = 3
 """Times that what was looked for is moved to better places in the noise that is left, at the most."""
-
-NEGATIVE_SIGMA = 3.0
-"""Standard deviations below zero from which a value that cannot be negative is impossible: one in 700 by chance."""
 
 
 def settle(
@@ -419,36 +417,3 @@ def _negative(settled: Settled) -> dict[str, str]:
             found[law.name] = why
         first += len(member.columns)
     return found
-
-
-def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.float64]) -> str:
-    """Why amplitudes of a law cannot be: one is negative beyond its uncertainty though it cannot be; empty where they can.
-
-    Args:
-        law: whose they are.
-        values: shape (p,).
-        variances: of these, shape (p,).
-    """
-    for k, positive in enumerate(law.positive):
-        value = float(values[k])
-        sigma = float(np.hypot(np.sqrt(variances[k]), law.form_uncertainty * value))
-        if positive and (why := impossibly_negative(law.parameters[k], value, sigma, law.units[k])):
-            return why
-    return ""
-
-
-def impossibly_negative(name: str, value: float, sigma: float, unit: str) -> str:
-    """Why a value that cannot be negative is none that can be: it is so beyond its uncertainty; empty where it is not.
-
-    Args:
-        name: of the parameter.
-        value: of it.
-        sigma: standard uncertainty of that.
-        unit: of both.
-    """
-    if value >= -NEGATIVE_SIGMA * sigma:
-        return ""
-    return (
-        f"It would have to be negative, {name} {value:.3g} ± {sigma:.2g} {unit}, which it "
-        "cannot be: something else that does the opposite is at work."
-    )

@@ -21,6 +21,40 @@ class CircleFigure(StrEnum):
     """Distance between the least-squares centre and the commanded one [CAL Table III]."""
     MEAN_RADIAL_ERROR = "mean-radial-error"
     """Mean length of the bar less its nominal length about the commanded centre, by its size [CAL Table III]."""
+    RADIAL_DEVIATION = "radial-deviation"
+    """F: the greater of Fmax and Fmin about the least-squares centre, by its size [ISO 230-4]."""
+    BIDIRECTIONAL_CIRCULAR_DEVIATION = "bidirectional-circular-deviation"
+    """G(b): greatest less least deviation of both directions together from their least-squares circle [ISO 230-4]."""
+    MEAN_BIDIRECTIONAL_RADIAL_DEVIATION = "mean-bidirectional-radial-deviation"
+    """D: radius of the least-squares circle of both directions less the nominal one, by its size [ISO 230-4]."""
+    CIRCULAR_HYSTERESIS = "circular-hysteresis"
+    """H: greatest radial difference of both directions at one angle [ISO 230-4:1996]."""
+
+
+OF_A_MODEL = (CircleFigure.CIRCULAR_DEVIATION, CircleFigure.CENTRE_DEVIATION, CircleFigure.MEAN_RADIAL_ERROR)
+"""Figures that every circle has in summaries, and that a model predicts."""
+
+OF_BOTH_DIRECTIONS = frozenset(
+    {
+        CircleFigure.BIDIRECTIONAL_CIRCULAR_DEVIATION,
+        CircleFigure.MEAN_BIDIRECTIONAL_RADIAL_DEVIATION,
+        CircleFigure.CIRCULAR_HYSTERESIS,
+    }
+)
+"""Figures of both directions of a test together."""
+
+FILTERED = frozenset(
+    {
+        CircleFigure.CIRCULAR_DEVIATION,
+        CircleFigure.RADIAL_DEVIATION,
+        CircleFigure.BIDIRECTIONAL_CIRCULAR_DEVIATION,
+        CircleFigure.CIRCULAR_HYSTERESIS,
+    }
+)
+"""Figures that a filter acts on."""
+
+USUAL_UPR = 30
+"""Filter of tolerances that name none: cut off sharply at 30 undulations per revolution, as predictions are."""
 
 
 @dataclass(frozen=True)
@@ -32,12 +66,14 @@ class Tolerance:
         largest_um: greatest size that is within tolerance [µm].
         tests: names of the tests it holds for; empty for all.
         directions: senses of travel it holds for; empty for both.
+        upr: cut-off of the filter in undulations per revolution; 0 for none. It acts on the figures in `FILTERED` only.
     """
 
     figure: CircleFigure
     largest_um: float
     tests: tuple[str, ...] = ()
     directions: tuple[Direction, ...] = ()
+    upr: int = USUAL_UPR
 
     def holds_for(self, test: str, direction: str) -> bool:
         """Whether a circle of this test and direction has this limit."""

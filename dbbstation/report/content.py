@@ -6,15 +6,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.machine.difference import differences, in_words
-from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.plan.tolerance import OF_A_MODEL
 from dbbstation.quality.conformity import Conformity
+from dbbstation.report.causes_part import cause_rows, cured_polars
+from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, when_measured
-from dbbstation.report.model_part import not_visible, parameters
+from dbbstation.report.model_part import not_visible, parameters, quality_of_fit
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
 from dbbstation.report.verdict import verdict_of
 from dbbstation.results.circles import circled_summary
-from dbbstation.results.tolerances import held_against, tolerated_circles
+from dbbstation.results.effects import effect_results
+from dbbstation.results.model_warnings import lacks_physics, model_warnings
+from dbbstation.results.serialise import plain
+from dbbstation.results.tolerances import filter_words, held_against, tolerated_circles, tolerated_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -24,6 +29,8 @@ if TYPE_CHECKING:
     from dbbstation.files.provenance import Provenance
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.tolerance import Tolerance
+    from dbbstation.report.causes_part import Ranked
+    from dbbstation.report.certificate import Certified
     from dbbstation.results.circles import Circled
     from dbbstation.results.tolerances import Held, ToleratedCircle
 
@@ -55,6 +62,8 @@ class Reported:
         before: circles measured before; None where none are given.
         modelled: a model beside them; None where none is given.
         job: what was measured for; empty where not said.
+        ranked: causes of the model beside the circles; None without a model.
+        place: where it was measured; empty where nobody says.
     """
 
     found: Circled
@@ -64,15 +73,23 @@ class Reported:
     before: Circled | None = None
     modelled: Modelled | None = None
     job: str = ""
+    ranked: Ranked | None = None
+    place: str = ""
 
 
 def numbers_of(reported: Reported) -> dict[str, Any]:
     """Return the numbers of a report: what its command prints as JSON, and its template shows."""
-    now = tolerated_circles(reported.found.circles)
     tolerances = reported.settings.tolerances
-    held = held_against(tolerances, now, reported.coverage_factor)
-    verdict = verdict_of(held, reported.found, reported.coverage_factor)
-    before = () if reported.before is None else tolerated_circles(reported.before.circles)
+    now = tolerated_circles(reported.found.circles, tolerances)
+    now_both = (*now, *tolerated_pairs(reported.found.pairs, tolerances))
+    held = held_against(tolerances, now_both, reported.coverage_factor)
+    identified = None if reported.modelled is None else reported.modelled.identified
+    ranked = reported.ranked
+    certificate = certified_of(reported)
+    verdict = verdict_of(held, reported.found, reported.coverage_factor, identified, reported.ranked)
+    former = reported.before
+    before = () if former is None else tolerated_circles(former.circles, tolerances)
+    before_both = (*before, *(() if former is None else tolerated_pairs(former.pairs, tolerances)))
     tests = dict.fromkeys(one.test for one in now)
     rows = list(_side_by_side(now, before))
     return {
@@ -82,19 +99,42 @@ def numbers_of(reported: Reported) -> dict[str, Any]:
             "reasons": list(verdict.reasons),
             "to_do": list(verdict.to_do),
         },
+        "certificate": {
+            "title": certificate.title,
+            "lacking": list(certificate.lacking),
+            "place": certificate.place or None,
+        },
+        "model_warnings": [] if identified is None else list(model_warnings(identified)),
         "coverage_factor": reported.coverage_factor,
-        "tolerances": [_held_both(one, now, before, reported.coverage_factor) for one in tolerances],
+        "tolerances": [_held_both(one, now_both, before_both, reported.coverage_factor) for one in tolerances],
         "tolerances_by_test": [
-            {"test": test, **_held_both(one, _of_test(now, test), _of_test(before, test), reported.coverage_factor)}
+            {
+                "test": test,
+                **_held_both(one, _of_test(now_both, test), _of_test(before_both, test), reported.coverage_factor),
+            }
             for test in tests
             for one in tolerances
-            if any(one.holds_for(circle.test, circle.direction) for circle in _of_test(now, test))
+            if any(
+                one.holds_for(circle.test, circle.direction) and circle.size(one) is not None
+                for circle in _of_test(now_both, test)
+            )
         ],
         "measured": rows,
         "measured_means": _means(rows),
         "circles": circled_summary(reported.found, reported.chosen),
+        "causes": []
+        if ranked is None
+        else [plain(one) for one in effect_results(ranked.effects, ranked.verdicts or {})],
+        "causes_of": None if ranked is None or not ranked.effects else ranked.session,
         "model": None if reported.modelled is None else dict(reported.modelled.evaluation),
     }
+
+
+def certified_of(reported: Reported) -> Certified:
+    """Return what a report lacks to be a certificate."""
+    found = reported.found
+    shown = [session for session in found.sessions if any(c.session == session.name for c in found.circles)]
+    return certified(shown, reported.job, reported.place, tolerances=bool(reported.settings.tolerances))
 
 
 def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Provenance) -> dict[str, Any]:
@@ -130,6 +170,7 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
         "polar_size": SIZE,
         "polar_radius": CIRCLE,
         "polars": _polars(reported),
+        "causes": _causes(reported),
         "before_name": "" if reported.before is None else reported.before.sessions[0].name,
         "several": len(found.sessions) > 1,
         "findings": _findings(found),
@@ -140,12 +181,26 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
         if modelled is None
         else {
             "problem": modelled.problem,
+            "failed": lacks_physics(modelled.identified.report),
+            "quality": quality_of_fit(modelled.identified),
             "parameters": parameters(modelled.identified, reported.coverage_factor),
             "not_visible": not_visible(modelled.identified),
         },
         "notes": [*found.warnings, *_notes_before(reported)],
         "files": list(_files(reported, provenance)),
         "provenance": provenance,
+    }
+
+
+def _causes(reported: Reported) -> dict[str, Any] | None:
+    ranked = reported.ranked
+    if ranked is None:
+        return None
+    return {
+        "session": ranked.session,
+        "why_not": ranked.why_not,
+        "rows": cause_rows(ranked, reported.coverage_factor),
+        "polars": cured_polars(ranked),
     }
 
 
@@ -179,9 +234,10 @@ def _held_both(
 
 def _held_data(held: Held, coverage_factor: float) -> dict[str, Any]:
     worst = held.worst
-    size = None if worst is None else worst.sizes[held.tolerance.figure]
+    size = held.size
     return {
         "quantity": held.tolerance.figure.value,
+        "filter": filter_words(held.tolerance),
         "largest_um": held.tolerance.largest_um,
         "tests": list(held.tolerance.tests),
         "directions": [direction.value for direction in held.tolerance.directions],
@@ -233,7 +289,7 @@ def _means(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             "now": _mean_and_largest([row["now"][figure.value]["um"] for row in taken]),
             "before": _mean_and_largest([row["before"][figure.value]["um"] for row in both]),
         }
-        for figure in CircleFigure
+        for figure in OF_A_MODEL
     ]
 
 

@@ -31,6 +31,23 @@ def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tup
     return tuple(rows)
 
 
+def quality_of_fit(identified: IdentifiedModel) -> str:
+    """Return what the fit of a model left beside the noise of its readings, in words; empty where the model does not say.
+
+    Args:
+        identified: the model.
+    """
+    report = identified.report
+    keys = ("nominal_rms_um", "residual_within_mounting_rms_um", "noise_um")
+    nominal, left, noise = (report.get(key) for key in keys)
+    if not (isinstance(nominal, float) and isinstance(left, float) and isinstance(noise, float)):
+        return ""
+    return (
+        f"In its own recordings the model leaves {left:.2f} µm rms within each mounting, the nominal machine {nominal:.1f} µm in all; "
+        f"one reading has {noise:.2f} µm of noise."
+    )
+
+
 def not_visible(identified: IdentifiedModel) -> tuple[str, ...]:
     """Return what the recordings of a model could not see, and what they saw least, in words."""
     lost = [f"Not visible, held at nominal: {text}." for text in identified.directions_lost]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.plan.circle import Circle
     from dbbstation.results.circles import MeasuredCircle
 
 SIZE = 320
@@ -55,6 +56,29 @@ class PolarTrace:
     thin: bool
     name: str
     title: str
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A path to be drawn.
+
+    Attributes:
+        theta_deg: angles, shape (n,) [deg].
+        deviation_um: from its least-squares circle, shape (n,) [µm].
+        direction: `ccw` or `cw`.
+        name: in few letters.
+        title: what is shown where the pointer rests on it.
+        former: whether it is drawn in grey.
+        thin: whether it is a repeat of one that is drawn already.
+    """
+
+    theta_deg: NDArray[np.float64]
+    deviation_um: NDArray[np.float64]
+    direction: str
+    name: str
+    title: str
+    former: bool = False
+    thin: bool = False
 
 
 @dataclass(frozen=True)
@@ -108,20 +132,43 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
     """
     drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in chosen(runs)]
     analysed = [(one, one.analysis, former, thin) for one, former, thin in drawn if one.analysis is not None]
-    most_um = max(float(np.abs(analysis.residual_um).max()) for _, analysis, _, _ in analysed)
+    paths = [
+        Drawn(
+            analysis.path.theta_deg,
+            analysis.residual_um,
+            str(one.entry.direction),
+            f"{'before ' if former else ''}{str(one.entry.direction).upper()} {one.entry.repeat}",
+            f"{'before: ' if former else ''}{one.entry.label}: G {budget_of(analysis, BudgetQuantity.G_LS, one.known).value_um:.1f} µm",
+            former=former,
+            thin=thin,
+        )
+        for one, analysis, former, thin in analysed
+    ]
+    return polar_of(test, analysed[-1][1].raw.circle, paths, len(now) + len(before) - len(drawn))
+
+
+def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int = 0) -> Polar:
+    """Return any paths of one circle to one scale.
+
+    Args:
+        test: its name.
+        circle: as commanded.
+        paths: in drawing order; at least one.
+        not_drawn: repeats that are left out.
+    """
+    most_um = max(float(np.abs(one.deviation_um).max()) for one in paths)
     scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
     traces = tuple(
         PolarTrace(
-            points=_points(analysis.path.theta_deg, analysis.residual_um, scale),
-            direction=str(one.entry.direction),
-            former=former,
-            thin=thin,
-            name=f"{'before ' if former else ''}{str(one.entry.direction).upper()} {one.entry.repeat}",
-            title=f"{'before: ' if former else ''}{one.entry.label}: G {budget_of(analysis, BudgetQuantity.G_LS, one.known).value_um:.1f} µm",
+            points=_points(one.theta_deg, one.deviation_um, scale),
+            direction=one.direction,
+            former=one.former,
+            thin=one.thin,
+            name=one.name,
+            title=one.title,
         )
-        for one, analysis, former, thin in analysed
+        for one in paths
     )
-    circle = analysed[-1][1].raw.circle
     tilt = ", ".join(f"{axis} {angle:g}°" for axis, angle in zip("ABC", circle.tilt_deg, strict=True) if angle)
     step_um = step_of(most_um)
     return Polar(
@@ -131,7 +178,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
         rings=tuple(Ring(CIRCLE + scale * um, um) for um in (-step_um, 0.0, step_um)),
         step_um=step_um,
         scale=scale,
-        not_drawn=len(now) + len(before) - len(drawn),
+        not_drawn=not_drawn,
     )
 
 

@@ -6,11 +6,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.quality.conformity import Conformity
+from dbbstation.report.causes_part import told_causes
+from dbbstation.results.model_warnings import lacks_physics
 from dbbstation.text.digits import with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.report.causes_part import Ranked
     from dbbstation.results.circles import Circled, MeasuredCircle
     from dbbstation.results.tolerances import Held
 
@@ -35,32 +39,41 @@ class ReportVerdict:
     to_do: tuple[str, ...]
 
 
-def verdict_of(held: Sequence[Held], found: Circled, coverage_factor: float) -> ReportVerdict:
+def verdict_of(
+    held: Sequence[Held],
+    found: Circled,
+    coverage_factor: float,
+    identified: IdentifiedModel | None = None,
+    ranked: Ranked | None = None,
+) -> ReportVerdict:
     """Return the verdict of tolerances held against measured circles.
 
     Args:
         held: tolerances; empty where the shop has none.
         found: the circles, with their findings.
         coverage_factor: k of U = k u.
+        identified: a model beside the circles; None where none is given.
+        ranked: its causes, of which the first page names the greatest first; None where none is given.
     """
     said = {one.conformity for one in held}
-    repeat = tuple(_to_repeat(found.circles))
+    repeat = (*_to_repeat(found.circles), *_of_the_model(found, identified))
     if not said - {None}:
         nothing = "The shop's settings have no tolerance for these circles: there is no verdict."
         write = "Write tolerances into the shop's settings (`dbbstation settings --template` shows how) and make the report anew."
         return ReportVerdict("none", nothing, (), (*repeat, write))
     told = [one for one in held if one.conformity in {Conformity.EXCEEDED, Conformity.UNDECIDED}]
     reasons = tuple(_reason(one, coverage_factor) for one in told)
+    causes = () if ranked is None else told_causes(ranked, coverage_factor)[:MOST_TOLD]
     if Conformity.EXCEEDED in said:
         headline = "The machine is NOT within the shop's tolerances."
-        return ReportVerdict(Conformity.EXCEEDED, headline, reasons, (*repeat, *_cure(found)))
+        return ReportVerdict(Conformity.EXCEEDED, headline, reasons, (*repeat, *causes, *_cure(found, identified)))
     if Conformity.UNDECIDED in said:
         headline = "It cannot be told whether the machine is within the shop's tolerances."
         narrow = (
             "A limit lies within the uncertainty U of a figure, or the figure has none. The budget of the figure says what U comes from "
             "(`dbbstation circles --budget`): lessen its largest term, state what the session lacks, or agree on another limit."
         )
-        return ReportVerdict(Conformity.UNDECIDED, headline, reasons, (*repeat, narrow))
+        return ReportVerdict(Conformity.UNDECIDED, headline, reasons, (*repeat, *causes, narrow))
     keep = (
         "The circles need no correction. Measure again after a crash, a repair or a move of the machine; the plan "
         "ten-minute-check.yaml shows in three tests whether this still holds."
@@ -69,10 +82,9 @@ def verdict_of(held: Sequence[Held], found: Circled, coverage_factor: float) -> 
 
 
 def _reason(held: Held, coverage_factor: float) -> str:
-    worst = held.worst
-    if worst is None:
+    worst, size = held.worst, held.size
+    if worst is None or size is None:
         return ""
-    size = worst.sizes[held.tolerance.figure]
     name = held.tolerance.figure.value.replace("-", " ").capitalize()
     run = f"{worst.test} {worst.direction} {worst.repeat}"
     exceeded = f"{held.exceeded} of {held.circles} circles exceed it"
@@ -100,7 +112,25 @@ def _to_repeat(circles: Iterable[MeasuredCircle]) -> list[str]:
     return [*told[:MOST_TOLD], *([f"{more} more runs have findings: see Findings."] if more > 0 else [])]
 
 
-def _cure(found: Circled) -> tuple[str, ...]:
+def _of_the_model(found: Circled, identified: IdentifiedModel | None) -> list[str]:
+    """What to do about a model that lacks physics, whatever the circles are."""
+    if identified is None or not lacks_physics(identified.report):
+        return []
+    return [
+        (
+            f"Do not compensate with this model. Look for what it lacks: `dbbstation diagnose {_names(found)} --out joint.yaml`, and make "
+            "the report again with that model."
+        )
+    ]
+
+
+def _names(found: Circled) -> str:
+    return " ".join(session.name for session in found.sessions)
+
+
+def _cure(found: Circled, identified: IdentifiedModel | None) -> tuple[str, ...]:
+    if identified is not None and lacks_physics(identified.report):
+        return ()
     compensated = all(one.entry.program is not None and one.entry.program.model_sha256 for one in found.circles)
     if compensated:
         return (
@@ -109,11 +139,15 @@ def _cure(found: Circled) -> tuple[str, ...]:
                 "model lacks. See that nothing has moved since the model was made."
             ),
         )
-    names = " ".join(session.name for session in found.sessions)
+    told = (
+        ()
+        if identified is not None
+        else (f"Calibrate the machine: `dbbstation calibrate {_names(found)} --out model.yaml`.",)
+    )
     return (
-        f"Calibrate the machine: `dbbstation calibrate {names} --out model.yaml`.",
+        *told,
         (
-            "Write compensated programs with `dbbstation program --model model.yaml`, measure them, and make the report again "
+            "Write compensated programs with `dbbstation program` and the model, measure them, and make the report again "
             "with `--before` and this session."
         ),
     )

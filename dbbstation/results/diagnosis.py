@@ -10,6 +10,7 @@ from pydantic import Field
 
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.calibration import OutlierResult
+from dbbstation.results.effects import EffectResult
 from dbbstation.results.frame import Framed
 from dbbstation.results.inference import HeldOutGains
 from dbbstation.results.serialise import Absent, AsItIs, Kept, Quantified
@@ -336,7 +337,9 @@ class DiagnosisResult(DiagnosisFigures):
     """What a diagnosis found.
 
     Attributes:
+        effects: what each cause of the joint model contributes to the circles, the greatest circular deviation first.
         model: the joint model, to predict and compensate with, or to write to a file.
     """
 
+    effects: tuple[EffectResult, ...]
     model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dbbstation.calibration.outliers.outlier import SOURCE_OF, OutlierKind
 from dbbstation.calibration.reporting.evaluation import rms_um
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.findings import Curve, Diagnosis, Location, NextTest, SourceFinding
     from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.results.effects import EffectResult
 
 
 def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> DiagnosisFigures:
@@ -88,18 +89,39 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
 
 
 def diagnosis_result(
-    figures: DiagnosisFigures, *, model: IdentifiedModel, drawing: Callable[[object], bytes], notes: tuple[str, ...]
+    figures: DiagnosisFigures,
+    *,
+    effects: tuple[EffectResult, ...],
+    model: IdentifiedModel,
+    drawing: Callable[[object], bytes],
+    notes: tuple[str, ...],
 ) -> DiagnosisResult:
     """Return the whole result of a diagnosis.
 
     Args:
         figures: what it says.
+        effects: of each cause.
         model: the joint model.
         drawing: draws the diagnosis in a format.
         notes: what was noticed on the way.
     """
     own = {one.name: getattr(figures, one.name) for one in fields(DiagnosisFigures)}
-    return DiagnosisResult(**{**own, "drawing": drawing, "notes": notes}, model=model)
+    return DiagnosisResult(**{**own, "drawing": drawing, "notes": notes}, effects=effects, model=model)
+
+
+def kept_of(figures: DiagnosisFigures) -> dict[str, Any]:
+    """Return what a model file keeps of the diagnosis that it comes from: what speaks against its causes.
+
+    Args:
+        figures: what the diagnosis says.
+    """
+    open_ones = (one for one in figures.sources if one.verdict == Verdict.AMBIGUOUS)
+    groups = {frozenset((one.name, *one.ambiguous_with)): [one.name, *one.ambiguous_with] for one in open_ones}
+    return {
+        "ambiguous": list(groups.values()),
+        "held_out_worse": figures.held_out_worse,
+        "verdicts": {one.name: one.verdict for one in figures.sources},
+    }
 
 
 def _circularity(diagnosis: Diagnosis) -> tuple[CircularityLeft, ...]:

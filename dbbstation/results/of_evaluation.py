@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.plan.tolerance import CircleFigure, worst
+from dbbstation.plan.tolerance import OF_A_MODEL, USUAL_UPR, CircleFigure, worst
 from dbbstation.results.evaluation import CircleDeviations, EvaluatedRun, EvaluatedTolerance, WorstRun
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def evaluated_tolerances(
             after=_worst(tolerance, [(run, run.after, _low_passed(run)[1]) for run in runs]),
         )
         for tolerance in tolerances
+        if tolerance.figure in OF_A_MODEL and tolerance.upr == USUAL_UPR
     )
 
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from dbbstation.model.uncertainty import prediction_summary
 from dbbstation.results.frame import Framed
+from dbbstation.results.model_warnings import model_warnings, unknown_causes
 from dbbstation.results.serialise import Absent, AsItIs, Kept
 
 if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.model.machine_model import MachineModel
 
 NAMES = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
@@ -36,6 +36,7 @@ class PredictionResult(Framed):
         uncertainty_not_known_because: why; None where it is known.
         directions_lost: what the recordings of the model could not determine.
         unknown_causes: sources of the model that describe an error without a cause.
+        model_warnings: what speaks against the model, such as physics that it lacks.
         commanded: poses, shape (n, 6) [mm, deg].
         actual: poses, shape (n, 6) [mm, deg].
         uncertainty_mm: standard uncertainties of X, Y and Z, shape (n, 3) [mm]; NaN where not known.
@@ -52,6 +53,7 @@ class PredictionResult(Framed):
     uncertainty_not_known_because: str | None
     directions_lost: tuple[str, ...]
     unknown_causes: tuple[str, ...]
+    model_warnings: tuple[str, ...]
     commanded: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
     actual: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
     uncertainty_mm: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
@@ -91,21 +93,8 @@ def prediction_result(
         uncertainty_not_known_because=identified.why_unknown if unknown else None,
         directions_lost=tuple(identified.directions_lost),
         unknown_causes=unknown_causes(identified.model),
+        model_warnings=model_warnings(identified),
         commanded=commanded,
         actual=actual,
         uncertainty_mm=uncertainty_mm,
     )
-
-
-def unknown_cause_notes(model: MachineModel) -> list[str]:
-    """Say of a model that keeps an error that its cause is unknown."""
-    return [
-        f"the model has {name}, an error whose cause is unknown; it holds where it was measured, while it lasts"
-        for name in unknown_causes(model)
-    ]
-
-
-def unknown_causes(model: MachineModel) -> tuple[str, ...]:
-    """Names of the sources of a model that describe an error without a cause."""
-    own = model.of_the_machine().sources
-    return tuple(fitted.source.name for fitted in own if not fitted.source.candidate and fitted.values.any())

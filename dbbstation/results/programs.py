@@ -64,6 +64,7 @@ class ProgramsResult(Framed):
         acceleration_mm_s2: that pieces are chosen for; None where the dialect says no look-ahead [mm/s²].
         acceleration_known: whether the machine file states it.
         programs: one after the other.
+        model_warnings: what speaks against the model, such as physics that it lacks; empty of nominal programs.
         acceleration_in_words: the acceleration, and where it is known from; empty where there is none.
     """
 
@@ -72,6 +73,7 @@ class ProgramsResult(Framed):
     acceleration_mm_s2: float | None
     acceleration_known: bool | None
     programs: tuple[WrittenProgram, ...]
+    model_warnings: tuple[str, ...] = ()
     acceleration_in_words: Annotated[str, Kept] = ""
 
     def rows(self) -> list[dict[str, object]]:
@@ -96,6 +98,7 @@ def programs_result(
     machine: Machine | None,
     model_sha256: str | None,
     notes: tuple[str, ...] = (),
+    model_warnings: tuple[str, ...] = (),
 ) -> ProgramsResult:
     """Return programs as a result.
 
@@ -105,6 +108,7 @@ def programs_result(
         machine: that compensated programs are for; None of nominal ones.
         model_sha256: of the model's file.
         notes: what was noticed on the way.
+        model_warnings: what speaks against the model.
     """
     planned = None if dialect.look_ahead is None else machine
     return ProgramsResult(
@@ -114,6 +118,7 @@ def programs_result(
         acceleration_mm_s2=None if planned is None else planned.planned_acceleration_mm_s2,
         acceleration_known=None if planned is None else planned.acceleration_mm_s2 is not None,
         programs=tuple(_written(file, each) for file, each in written),
+        model_warnings=model_warnings,
         acceleration_in_words="" if planned is None else said_acceleration(planned),
     )
 

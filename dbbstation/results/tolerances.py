@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.circles.analysis import refiltered
-from dbbstation.circles.budget import budgets
+from dbbstation.circles.analysis import analyse_pair, refiltered
+from dbbstation.circles.budget import budgets, pair_budgets
 from dbbstation.circles.path import Filter
 from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.rice import without_noise
-from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.plan.tolerance import FILTERED, OF_A_MODEL, OF_BOTH_DIRECTIONS, CircleFigure
 from dbbstation.quality.conformity import Conformity, Size, conformity
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis
     from dbbstation.circles.budget import Budget, SetUpKnowledge
     from dbbstation.plan.tolerance import Tolerance
-    from dbbstation.results.circles import MeasuredCircle
+    from dbbstation.results.circles import MeasuredCircle, MeasuredPair
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,10 @@ class ToleratedCircle:
     Attributes:
         session: name of its session.
         test: name of its test.
-        direction: `ccw` or `cw`.
+        direction: `ccw` or `cw`; `both` of both directions together.
         repeat: counts runs of this test and direction.
-        sizes: by figure; G is about the least-squares circle, up to 30 undulations per revolution.
+        sizes: by figure; G is about the least-squares circle, up to 30 undulations per revolution. Of both directions: empty.
+        others: further figures that a tolerance is for, by figure and cut-off of their filter.
     """
 
     session: str
@@ -41,6 +42,14 @@ class ToleratedCircle:
     direction: str
     repeat: int
     sizes: Mapping[CircleFigure, Size]
+    others: Mapping[tuple[CircleFigure, int], Size] = field(default_factory=dict)
+
+    def size(self, tolerance: Tolerance) -> Size | None:
+        """Return the figure that a tolerance is for; None where this circle has none such."""
+        own = self.sizes.get(tolerance.figure)
+        if own is not None and (tolerance.upr == TOLERATED or tolerance.figure not in FILTERED):
+            return own
+        return self.others.get((tolerance.figure, tolerance.upr))
 
     @property
     def key(self) -> tuple[str, str, int]:
@@ -56,6 +65,7 @@ class Held:
         tolerance: the limit.
         conformity: exceeded where one circle exceeds it, else undecided where one is; None where it holds for none.
         worst: the circle with the largest figure; None where it holds for none.
+        size: of that figure.
         exceeded: how many circles exceed it.
         undecided: how many lie within U of the limit.
         circles: how many it holds for.
@@ -64,13 +74,27 @@ class Held:
     tolerance: Tolerance
     conformity: Conformity | None
     worst: ToleratedCircle | None
+    size: Size | None
     exceeded: int
     undecided: int
     circles: int
 
 
-def tolerated_circles(circles: Iterable[MeasuredCircle]) -> tuple[ToleratedCircle, ...]:
-    """Return the figures of measured circles that may have a tolerance; without runs that show no circle."""
+def tolerated_circles(
+    circles: Iterable[MeasuredCircle], tolerances: Sequence[Tolerance] = ()
+) -> tuple[ToleratedCircle, ...]:
+    """Return the figures of measured circles that may have a tolerance; without runs that show no circle.
+
+    Args:
+        circles: as measured.
+        tolerances: whose figures and filters are worked out too.
+    """
+    wanted = [
+        (one.figure, one.upr)
+        for one in tolerances
+        if one.figure not in OF_BOTH_DIRECTIONS
+        and (one.figure not in OF_A_MODEL or (one.figure in FILTERED and one.upr != TOLERATED))
+    ]
     return tuple(
         ToleratedCircle(
             one.session,
@@ -78,10 +102,58 @@ def tolerated_circles(circles: Iterable[MeasuredCircle]) -> tuple[ToleratedCircl
             str(one.entry.direction),
             one.entry.repeat,
             sizes_of(refiltered(one.analysis, TOLERATED), one.known),
+            {key: _size_of(one.analysis, one.known, *key) for key in dict.fromkeys(wanted)},
         )
         for one in circles
         if one.analysis is not None
     )
+
+
+def tolerated_pairs(pairs: Iterable[MeasuredPair], tolerances: Sequence[Tolerance]) -> tuple[ToleratedCircle, ...]:
+    """Return the figures of both directions together that tolerances are for.
+
+    Args:
+        pairs: as measured.
+        tolerances: of the shop.
+    """
+    wanted = dict.fromkeys((one.figure, one.upr) for one in tolerances if one.figure in OF_BOTH_DIRECTIONS)
+    return tuple(
+        ToleratedCircle(
+            pair.one.session,
+            pair.one.entry.test,
+            "both",
+            pair.one.entry.repeat,
+            {},
+            {key: _size_of_pair(pair, *key) for key in wanted},
+        )
+        for pair in (pairs if wanted else ())
+    )
+
+
+def _size_of(one: CircleAnalysis, known: SetUpKnowledge, figure: CircleFigure, upr: int) -> Size:
+    """Size of G with another filter, or of F, whichever of its ends is farther out."""
+    filtered = refiltered(one, Filter(upr))
+    quantities = (
+        (BudgetQuantity.G_LS,)
+        if figure is CircleFigure.CIRCULAR_DEVIATION
+        else (BudgetQuantity.F_MAX, BudgetQuantity.F_MIN)
+    )
+    found = [budgets(filtered, known, quantities)[quantity] for quantity in quantities]
+    return _sized(max(found, key=lambda budget: abs(budget.value_um)))
+
+
+def _size_of_pair(pair: MeasuredPair, figure: CircleFigure, upr: int) -> Size:
+    one, other = (refiltered(each, Filter(upr)) for each in (pair.analysis.one, pair.analysis.other))
+    quantity = {
+        CircleFigure.BIDIRECTIONAL_CIRCULAR_DEVIATION: BudgetQuantity.G_BOTH_LS,
+        CircleFigure.MEAN_BIDIRECTIONAL_RADIAL_DEVIATION: BudgetQuantity.D,
+        CircleFigure.CIRCULAR_HYSTERESIS: BudgetQuantity.H,
+    }[figure]
+    return _sized(pair_budgets(analyse_pair(one, other), pair.one.known)[quantity])
+
+
+def _sized(budget: Budget) -> Size:
+    return Size(abs(budget.value_um), budget.u_um, budget.why_not, budget.known_um)
 
 
 TOLERATED = Filter.UPR_30
@@ -109,6 +181,11 @@ def _off_centre(x: Budget, y: Budget) -> Size:
     return Size(value, u_value, "", u_value)
 
 
+def filter_words(tolerance: Tolerance) -> str | None:
+    """Return the filter of a tolerance's figure in words; None of a figure that no filter acts on."""
+    return Filter(tolerance.upr).words if tolerance.figure in FILTERED else None
+
+
 def held_against(
     tolerances: Sequence[Tolerance], circles: Sequence[ToleratedCircle], coverage_factor: float
 ) -> tuple[Held, ...]:
@@ -117,15 +194,20 @@ def held_against(
 
 
 def _held(tolerance: Tolerance, circles: Sequence[ToleratedCircle], coverage_factor: float) -> Held:
-    of = [one for one in circles if tolerance.holds_for(one.test, one.direction)]
-    verdicts = [conformity(one.sizes[tolerance.figure], tolerance.largest_um, coverage_factor) for one in of]
-    worst = max(of, key=lambda one: one.sizes[tolerance.figure].um, default=None)
+    sized = [
+        (one, size)
+        for one in circles
+        if tolerance.holds_for(one.test, one.direction) and (size := one.size(tolerance)) is not None
+    ]
+    verdicts = [conformity(size, tolerance.largest_um, coverage_factor) for _, size in sized]
+    worst, worst_size = max(sized, key=lambda pair: pair[1].um, default=(None, None))
     order = (Conformity.EXCEEDED, Conformity.UNDECIDED, Conformity.WITHIN)
     return Held(
         tolerance=tolerance,
         conformity=next((each for each in order if each in verdicts), None),
         worst=worst,
+        size=worst_size,
         exceeded=verdicts.count(Conformity.EXCEEDED),
         undecided=verdicts.count(Conformity.UNDECIDED),
-        circles=len(of),
+        circles=len(sized),
     )

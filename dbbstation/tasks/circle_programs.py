@@ -12,7 +12,7 @@ from dbbstation.files.own_dialects import dialect_given
 from dbbstation.nc.circle_program import Approach
 from dbbstation.nc.export import circle_programs
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
-from dbbstation.results.prediction import unknown_cause_notes
+from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.programs import programs_result
 from dbbstation.tasks.chosen import chosen_of
 from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
@@ -103,7 +103,8 @@ def write_circle_programs(
             prefer=prefer,
             accept_chord_um=accept_chord_um,
         )
-        telling.note(*unknown_cause_notes(inverse.model))
+    warnings = () if inverse is None or inverse.identified is None else model_warnings(inverse.identified)
+    telling.note(*warnings)
     programs = circle_programs(
         plan,
         machine,
@@ -120,4 +121,6 @@ def write_circle_programs(
     write_folder(folder, {each.name: each.text for each in programs}, force=force)
     written = [(str(folder / each.name), each) for each in programs]
     digest = None if model is None else sha256_of(model)
-    return programs_result(written, written_in, None if inverse is None else machine, digest, tuple(telling.notes))
+    return programs_result(
+        written, written_in, None if inverse is None else machine, digest, tuple(telling.notes), warnings
+    )

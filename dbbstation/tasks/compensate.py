@@ -14,7 +14,7 @@ from dbbstation.nc.compensate import CHORD_MM
 from dbbstation.nc.export import compensated_program
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.registry import dialect_of_file
-from dbbstation.results.prediction import unknown_cause_notes
+from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.programs import ProgramsResult, programs_result
 from dbbstation.tasks.programs import inverse_of, origin_of, program_text, sha256_of
 from dbbstation.tasks.provenance import from_python
@@ -96,12 +96,13 @@ def compensate(
         accept_chord_um=accept_chord_um,
     )
     telling = Telling(say=say)
-    telling.note(*unknown_cause_notes(inverse.model))
+    warnings = () if inverse.identified is None else model_warnings(inverse.identified)
+    telling.note(*warnings)
     origin = origin_of({"program file": source}, inverse, provenance())
     done = compensated_program(path, writer, inverse, chord_mm=chord_um / 1e3, origin=origin)
     if out is not None:
         write_text(Path(out), done.text, force=force)
     digest = sha256_of(Path(model)) if isinstance(model, str | PathLike) else None
     return programs_result(
-        [(str(out or done.name), done)], writer, inverse.model.machine, digest, notes=tuple(telling.notes)
+        [(str(out or done.name), done)], writer, inverse.model.machine, digest, tuple(telling.notes), warnings
     )

@@ -6,16 +6,20 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from dbbstation.calibration.fit.calibrate import default_sources
 from dbbstation.calibration.reporting.evaluation import evaluate
 from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.diagnosis import diagnose as search
 from dbbstation.diagnosis.diagnose import usable_sources
+from dbbstation.diagnosis.effects import effects_of
 from dbbstation.diagnosis.unexplained_model import keep_unexplained as keeping
 from dbbstation.errors import ModelError
 from dbbstation.files.own_sources import every_source
+from dbbstation.results.effects import effect_results
 from dbbstation.results.of_calibration import calibration_figures, report_of
-from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result
+from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result, kept_of
 from dbbstation.results.serialise import plain
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.load import loaded
@@ -39,6 +43,7 @@ STAGES = {
     "verdicts": 75,
     "held-out tests": 77,
     "next test": 80,
+    "effects of causes": 95,
 }
 """Stages of a diagnosis once runs are read, and the share of its time that has passed by then [%]; joint fits are none or several."""
 
@@ -149,11 +154,17 @@ def diagnose(
     found = diagnosed.diagnosis
     unnamed = _kept(found, telling) if keep_unexplained else None
     fit = found.after if unnamed is None else unnamed.fit
-    report = report_of(calibration_figures(fit, evaluate(fit.model, fit.observations)))
+    figures = diagnosis_figures(found, diagnosed.lacking)
+    report = report_of(calibration_figures(fit, evaluate(fit.model, fit.observations)), diagnosis=kept_of(figures))
     of_sessions = diagnosed.recorded.sessions
     model = identified_model(fit, report, of_sessions) if unnamed is None else unnamed.identified(report, of_sessions)
+    telling.stage("effects of causes")
+    names = fit.layout.names
+    covariance = fit.solution.covariance + np.diag(fit.layout.formula_variance(fit.x))
+    effects = effects_of(fit.model, fit.observations, names, covariance, fit.null_space)
     return diagnosis_result(
-        diagnosis_figures(found, diagnosed.lacking),
+        figures,
+        effects=effect_results(effects, {one.name: one.verdict for one in figures.sources}),
         model=model,
         drawing=partial(_drawn, found),
         notes=tuple(telling.notes),

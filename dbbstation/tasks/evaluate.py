@@ -10,6 +10,7 @@ from dbbstation.calibration.reporting.evaluation import plane_figures, plane_unc
 from dbbstation.calibration.reporting.prediction import predicted_circles
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.results.evaluation import EvaluationResult, LowPassedCircularity
+from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.of_evaluation import evaluated_runs, evaluated_tolerances
 from dbbstation.tasks.load import loaded
 from dbbstation.tasks.models import model_of
@@ -64,6 +65,7 @@ def evaluate(
     """
     telling = Telling(progress, stop, say)
     identified = model_of(model, known)
+    telling.note(*model_warnings(identified))
     recorded = loaded(sessions, tests, exclude, telling)
     check_model_is_of(recorded.machine, identified.model.machine)
     found = evaluation.evaluate(identified.model, recorded.observations)

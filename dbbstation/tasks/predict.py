@@ -13,6 +13,7 @@ from dbbstation.files.formats.pose_table import PoseTable, read_poses, write_pos
 from dbbstation.files.provenance import refuse_existing_table
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.uncertainty import predicted_poses
+from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.prediction import PredictionResult, prediction_result
 from dbbstation.tasks.models import model_of
 from dbbstation.tasks.provenance import from_python
@@ -88,6 +89,7 @@ def predict(
             table.others,
             provenance(),
             why_unknown=identified.why_unknown,
+            warning="; ".join(model_warnings(identified)),
             force=force,
         )
     return prediction_result(identified, table.poses, actual, uncertainty_mm, None if out is None else str(out))

@@ -11,7 +11,7 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse
-from dbbstation.results.prediction import unknown_causes
+from dbbstation.results.model_warnings import model_warnings, unknown_causes
 from dbbstation.tasks.models import model_of
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def inverse_of(
     identified = model_of(model, known)
     origin = {"model file": hashed(Path(model))} if isinstance(model, str | PathLike) else {}
     origin |= {f"cause unknown {k}": name for k, name in enumerate(unknown_causes(identified.model), start=1)}
+    origin |= {f"model warning {k}": text for k, text in enumerate(model_warnings(identified), start=1)}
     origin |= {f"session {name}": f"sha256 {digest}" for name, digest in identified.sessions.items()}
     keeping = None if prefer is None else Prefer(prefer)
     return Inverse(identified.model, origin, time_s, identified, largest_mm, keeping, accept_chord_um)

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.diagnosis.effects import effects_of
+from dbbstation.diagnosis.thinned import thinned
 from dbbstation.errors import StationError
 from dbbstation.files.atomic import refuse_outputs, write_bytes
 from dbbstation.machine.difference import check_model_is_of
-from dbbstation.report.content import Modelled, Reported, content_of, numbers_of
+from dbbstation.report.causes_part import Ranked
+from dbbstation.report.content import Modelled, Reported, certified_of, content_of, numbers_of
 from dbbstation.report.html import report_html
 from dbbstation.report.pdf import chromium, printed
+from dbbstation.results.model_warnings import lacks_physics
 from dbbstation.results.serialise import plain
 from dbbstation.results.tolerances import TOLERATED
 from dbbstation.tasks.circles import load_circles
 from dbbstation.tasks.evaluate import evaluate
-from dbbstation.tasks.load import paths_of
+from dbbstation.tasks.load import loaded, paths_of
 from dbbstation.tasks.models import model_of
 from dbbstation.tasks.provenance import from_python
 from dbbstation.tasks.telling import StoppedError, Telling, never, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
     from os import PathLike
 
     from dbbstation.files.formats.settings import Settings
@@ -33,7 +38,15 @@ if TYPE_CHECKING:
     from dbbstation.tasks.models import Model
     from dbbstation.tasks.telling import Progress
 
-STAGES = {"circles": 0, "circles before": 40, "reading runs": 60, "predicting runs": 75, "writing": 90, "printing": 95}
+STAGES = {
+    "circles": 0,
+    "circles before": 40,
+    "reading runs": 60,
+    "predicting runs": 75,
+    "effects of causes": 82,
+    "writing": 90,
+    "printing": 95,
+}
 """Stages of a report, and the share of its time that has passed by then [%]."""
 
 USUAL_COVERAGE = 2.0
@@ -62,6 +75,8 @@ def report(
     before: str | PathLike[str] | None = None,
     model: Model | None = None,
     job: str = "",
+    place: str = "",
+    certificate: bool = False,
     pdf: str | PathLike[str] | None = None,
     coverage_factor: float = USUAL_COVERAGE,
     tests: Sequence[str] = (),
@@ -81,6 +96,8 @@ def report(
         before: session that was measured before, to put beside.
         model: a model, a file of one, or the result of `calibrate` or `diagnose`, to put beside.
         job: what was measured for, where the session does not say it or says something else.
+        place: where it was measured.
+        certificate: refuse a report that lacks what a certificate needs.
         pdf: file to print to, by an installed Chromium; None: none.
         coverage_factor: k of U = k u.
         tests: names of tests to take; empty for all.
@@ -95,6 +112,7 @@ def report(
         InputError: faults of files.
         OutputError: a file exists and `force` is not given; no browser prints.
         ModelError: the model is of another machine.
+        StationError: `certificate`, and something is lacking; nothing was written.
         StoppedError: `stop` returned True; nothing was written.
     """
     page, paper = Path(out), None if pdf is None else Path(pdf)
@@ -109,12 +127,21 @@ def report(
     former = None
     if before is not None:
         former = load_circles([Path(before)], TOLERATED, progress=telling.counted("circles before"))
-    modelled = None
+    modelled = ranked = None
     if identified is not None:
         for session in found.sessions:
             check_model_is_of(session.machine, identified.model.machine)
         modelled = _modelled(paths, identified, (tests, exclude), telling)
-    reported = Reported(found, TOLERATED, settings, coverage_factor, former, modelled, job)
+        ranked = _ranked(paths if before is None else [Path(before)], identified, (tests, exclude), telling)
+    reported = Reported(found, TOLERATED, settings, coverage_factor, former, modelled, job, ranked, place)
+    lacking = certified_of(reported).lacking
+    if certificate and lacking:
+        what = f"this is no certificate: {', '.join(lacking)}"
+        remedy = (
+            "note them when it is measured (`measure --help` has the options), give --place and --job, write tolerances into the settings; or "
+            "leave --certificate out"
+        )
+        raise StationError(what, where=", ".join(session.name for session in found.sessions), remedy=remedy)
     numbers = numbers_of(reported)
     telling.stage("writing")
     html = report_html(content_of(reported, numbers, provenance()))
@@ -144,3 +171,41 @@ def _modelled(
     except StationError as error:
         return Modelled(identified, {}, str(error))
     return Modelled(identified, {key: value for key, value in plain(found).items() if key != "tolerances"})
+
+
+def _ranked(
+    paths: Sequence[Path], identified: IdentifiedModel, chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
+) -> Ranked:
+    """Return what each cause of a model contributes to circles under nominal programs; a session that it cannot take has none, and says so.
+
+    Args:
+        paths: of the sessions: those before, where there are some.
+        identified: the model.
+        chosen: tests to take, and to leave out.
+        telling: told each stage.
+    """
+    telling.stage("effects of causes")
+    if lacks_physics(identified.report):
+        return Ranked(
+            why_not="Physics is missing from the model: its causes cannot be ranked. `dbbstation diagnose` looks for what it lacks."
+        )
+    try:
+        recorded = loaded(paths, *chosen, telling)
+        if any(one.commanded is not None for one in recorded.observations):
+            return Ranked(
+                why_not="The circles ran under compensated programs, in which the model's causes are taken out already: `--before` ranks them on the "
+                "circles before."
+            )
+        runs = [thinned(one) for one in recorded.observations]
+        found = effects_of(
+            identified.model, runs, identified.covariance_rows, identified.covariance, identified.null_space
+        )
+    except StoppedError:
+        raise
+    except StationError as error:
+        return Ranked(why_not=f"What the model's causes contribute could not be worked out: {error}")
+    if not found:
+        return Ranked(why_not="The model has no cause that acts on these circles.")
+    said = identified.report.get("diagnosis")
+    verdicts = said.get("verdicts", {}) if isinstance(said, Mapping) else {}
+    return Ranked(", ".join(dict.fromkeys(path.name for path in paths)), found, verdicts)

@@ -316,6 +316,10 @@ FIGURE_NAMES: Mapping[str, str] = {
     "circular-deviation": "circular deviation",
     "centre-deviation": "centre deviation",
     "mean-radial-error": "mean radial error",
+    "radial-deviation": "radial deviation F",
+    "bidirectional-circular-deviation": "G(b)",
+    "mean-bidirectional-radial-deviation": "D",
+    "circular-hysteresis": "hysteresis H",
 }
 FORMER_TITLE = "Hold this session against which one before? Arrow keys, Enter; Esc goes back."
 FORMER = "{name:20} {when}  {by}"

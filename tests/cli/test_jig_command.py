@@ -158,3 +158,75 @@ def test_bad_words_and_tables_of_mountings_are_answered(run, tmp_path):
         "--force" in run("jig", "holders", table, "--holder", "short", "--jig", PLATE, "--out", tmp_path / "n.yaml").err
     )
     assert run("jig", "sheet", CMM / "plate.dmo", "--jig", PLATE, "--out", tmp_path / "n.yaml").code == FAILED
+
+
+def long_sheet(tmp_path, text, name="plate_chr.txt"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+CALYPSO = (
+    "planid\tpartnb\tid\ttype\tidsymbol\tactual\tnominal\tuppertol\tfeatureid\tunit\n"
+    "Plate\t1\tX_9\txValue\tX\t0.0254\t0.0\t0.1\t9-short\tmm\n"
+    "Plate\t1\tY_9\tyValue\tY\t-14.3\t0.0\t0.1\t9-short\tµm\n"
+    "Plate\t1\tZ_9\tzValue\tZ\t0.0069\t0.0\t0.1\t9-short\tmm\n"
+    "Plate\t1\tD_9\tdiameter\tD\t25.0\t25.0\t0.1\t9-short\tmm\n"
+    "Plate\t1\tX_4\txValue\tX\t-100.0441\t0.0\t0.1\t4-short\tmm\n"
+    "Plate\t1\tY_4\tyValue\tY\t-100.0024\t0.0\t0.1\t4-short\tmm\n"
+    "Plate\t1\tZ_4\tzValue\tZ\t0.0273\t0.0\t0.1\t4-short\tmm\n"
+    "END\n"
+)
+
+
+def test_a_sheet_with_a_row_per_coordinate(run, tmp_path):
+    done = sheet(run, long_sheet(tmp_path, CALYPSO), tmp_path / "new.yaml", "--u-um", "0.8")
+    assert done.code == DONE, done.err
+    balls = read_jig(tmp_path / "new.yaml").balls
+    assert balls["9-short"].centre_mm == pytest.approx((0.0254, -0.0143, 0.0069), abs=1e-9)
+    assert balls["4-short"].centre_mm == pytest.approx((-100.0441, -100.0024, 0.0273), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        ("zValue\tZ\t0.0069", "diameter\tD\t0.0069", "9-short has no z"),
+        ("Y\t-100.0024", "X\t-100.0024", "x of 4-short comes a second time"),
+        ("-100.0441", "abc", "plate_chr.txt:6:6: actual of 4-short x is `abc`"),
+        ("4-short\tmm\nEND", "4-short\tfoot\nEND", "plate_chr.txt:8:10: `foot` is no unit"),
+    ],
+)
+def test_faults_of_such_a_sheet_have_line_and_column(run, tmp_path, old, new, what):
+    assert old in CALYPSO
+    done = sheet(run, long_sheet(tmp_path, CALYPSO.replace(old, new)), tmp_path / "new.yaml", "--u-um", "0.8")
+    assert done.code == FAILED
+    assert what in done.err
+
+
+@pytest.mark.parametrize(
+    ("head", "more"),
+    [
+        ("ball,x,y,z,U", ["--u-unit", "µm"]),
+        ("ball,x,y,z,U [µm]", []),
+        ("ball,x_mm,y_mm,z_mm,U_um", []),
+        ("ball,x,y,z,U\n,mm,mm,mm,µm", []),
+    ],
+)
+def test_uncertainties_have_a_unit_of_their_own(run, tmp_path, head, more):
+    """A U of 1.6 µm (k = 2) beside coordinates in mm is a u of 0.8 µm, not 800."""
+    table = tmp_path / "cmm.csv"
+    table.write_text(f"{head}\n9-short,0,0,0,1.6\n4-short,-100,-100,0,1.6\n", encoding="utf-8")
+    column = head.splitlines()[0].split(",")[-1]
+    words = ["--column", f"u={column}", "--k", "2"]
+    done = sheet(run, table, tmp_path / "new.yaml", *words, *more)
+    assert done.code == DONE, done.err
+    assert [one.uncertainty_um for one in read_jig(tmp_path / "new.yaml").balls.values()] == pytest.approx([0.8, 0.8])
+
+
+def test_a_unit_of_uncertainties_that_nobody_says_is_refused_where_no_cmm_has_it(run, tmp_path):
+    table = tmp_path / "cmm.csv"
+    table.write_text("ball,x,y,z,U\n9-short,0,0,0,1.6\n4-short,-100,-100,0,1.6\n", encoding="utf-8")
+    done = sheet(run, table, tmp_path / "new.yaml", "--column", "u=U", "--k", "2")
+    assert done.code == FAILED
+    assert "cmm.csv:2" in done.err
+    assert "--u-unit" in done.err

@@ -50,7 +50,9 @@ def of_user(shop, text):
 def test_the_example_has_every_key():
     found = read_settings([EVERY_KEY])
     assert set(found.values) == set(built_in())
-    assert [one.figure for one in found.tolerances] == [CircleFigure.CIRCULAR_DEVIATION, CircleFigure.CENTRE_DEVIATION]
+    figures = [CircleFigure.CIRCULAR_DEVIATION, CircleFigure.CENTRE_DEVIATION, CircleFigure.CIRCULAR_HYSTERESIS]
+    assert [one.figure for one in found.tolerances] == figures
+    assert [one.upr for one in found.tolerances] == [30, 30, 50]
     assert found.tolerances[1].largest_um == 20.0  # 0.02 mm
     assert load_yaml(EVERY_KEY, []).data.keys() == SettingsFile.model_fields.keys()
 

@@ -146,6 +146,8 @@ class _Walk:
         self._check_on(before.pose, self.tool[place - 1], PRINTED * (1.0 + before.unit_mm), f"begin of move {index}")
         way = _Arc(before, event) if event.kind == "ARC" else _Line(before, event)
         slack = PRINTED * (1.0 + event.unit_mm) + PRINTED * before.unit_mm
+        if event.kind == "ARC":  # its centre is printed, and the far side is off by twice as much
+            slack += PRINTED * event.unit_mm
         for end in range(place, len(self.done)):
             for pose, name in ((self.middle[end], "middle"), (self.tool[end], "end")):
                 there = way.nearest(pose)

@@ -79,6 +79,11 @@ def predicted_circles(
 
 def smooth_circularity_um(raw: RawCircle, length_mm: NDArray[np.float64]) -> float:
     """Circularity up to 30 undulations per revolution of lengths, shape (n,) [mm], at a circle's angles [µm]."""
+    return figures(raw, smooth_lengths_mm(raw, length_mm)).circularity_um
+
+
+def smooth_lengths_mm(raw: RawCircle, length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lengths up to 30 undulations per revolution, shape (n,) [mm]."""
     highest = min(UNDULATIONS, max(len(length_mm) // SAMPLES_PER_UNDULATION, 2))
     bar_mm = raw.circle.bar_mm
-    return figures(raw, bar_mm + smooth(length_mm - bar_mm, np.radians(raw.phi_deg), highest)).circularity_um
+    return bar_mm + smooth(length_mm - bar_mm, np.radians(raw.phi_deg), highest)

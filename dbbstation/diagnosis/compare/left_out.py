@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.chosen_anew import LEAST_PARTS, ChosenAnew, chosen_anew
-from dbbstation.inference.folds import FOLDS as GROUPS
+from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn
 from dbbstation.inference.held_out import held_out
 from dbbstation.inference.hypotheses import search
 from dbbstation.inference.jackknife import refits_without
@@ -25,13 +25,10 @@ if TYPE_CHECKING:
     from dbbstation.inference.model_comparison import Member, ModelComparison
     from dbbstation.inference.settled import Settled
 
-FOLDS = 5
-"""Groups of tests that are held out in turn for the error of the prediction."""
-
 
 def tried_without_tests(sides: Sides, settled: Settled) -> Trial:
     """Hold back groups of tests in turn; nothing is said where nothing was found, or there are fewer than `LEAST_PARTS` groups."""
-    groups = _groups(sides, GROUPS)
+    groups = in_turn([pair.test for pair in sides.pairs], FOLDS)
     parts = []
     for group in range(max(groups) + 1):
         rows = np.zeros(len(settled.channel.residual), dtype=bool)
@@ -65,7 +62,7 @@ def predicted(sides: Sides, settled: Settled) -> tuple[HeldOut, HeldOut]:
     prior = np.concatenate([base.prior, *(member.sd for member in members)])
     # Amplitudes of causes come from the tests that are kept; only the set-up of a held-out test may settle there.
     known = Columns(prior, prior, np.arange(len(prior)) < len(base.prior))
-    groups = _groups(sides, FOLDS)
+    groups = in_turn([pair.test for pair in sides.pairs], FOLDS_OF_AN_ERROR)
     every = np.arange(len(prior))
     blocks = [compress(every, columns[rows], bank.target[rows]) for rows in sides.blocks]
     noise = settled.noise.innovation
@@ -74,9 +71,3 @@ def predicted(sides: Sides, settled: Settled) -> tuple[HeldOut, HeldOut]:
         for used in (len(base.prior), len(prior))
     )
     return without, having
-
-
-def _groups(sides: Sides, count: int) -> list[int]:
-    """Group of the test of each pair."""
-    tests = list(dict.fromkeys(pair.test for pair in sides.pairs))
-    return [tests.index(pair.test) % min(count, len(tests)) for pair in sides.pairs]

@@ -1,8 +1,9 @@
-"""`dbb-mapping/1`: what the columns of a recording made elsewhere mean, written once and used for every file of its kind."""
+"""`dbb-mapping/2`, which has all of `/1`: what the columns of a recording made elsewhere mean, written once and used for every file of its kind."""
 
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -13,7 +14,7 @@ from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.number_language import PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
+from dbbstation.files.yaml.schema import Schema, format_for, read_document, validate
 from dbbstation.trace import columns
 from dbbstation.trace.columns import ColumnKind
 
@@ -33,9 +34,10 @@ _OFFSETS = {"degF": -160.0 / 9.0, "K": -273.15}
 
 TIME, ANGLE, LENGTH, DEVIATION = "time", "angle", "length", "deviation"
 TEST, DIRECTION, REPEAT, MOUNTING, STATE, STARTED = "test", "direction", "repeat", "mounting", "state", "started"
+RUN = "run"
 IGNORED = "ignored"
 
-OF_RUNS = (TEST, DIRECTION, REPEAT, MOUNTING, STATE, STARTED)
+OF_RUNS = (TEST, DIRECTION, REPEAT, MOUNTING, STATE, STARTED, RUN)
 """Meanings of columns that say which run a row belongs to, the same in all rows of a run."""
 
 _OF_KIND = {ColumnKind.TEMPERATURE: _TEMPERATURES, ColumnKind.CURRENT: _CURRENTS}
@@ -70,12 +72,20 @@ def _meaning(text: str) -> str:
     return text
 
 
+def _zone(text: str) -> str:
+    if not re.fullmatch(r"[+-]\d{2}:\d{2}|UTC|[A-Za-z]+(?:/[A-Za-z_+-]+)+", text):
+        raise PydanticCustomError(
+            "zone", "`{text}` is no time zone: write such as +01:00 or Europe/Berlin", {"text": text}
+        )
+    return text
+
+
 class ColumnSchema(Schema):
     """One column of the files."""
 
     means: Annotated[str, AfterValidator(_meaning)]
     """`time`, `angle`, `length` (between the ball centres), `deviation` (of the length from `zero_mm`, longer positive), `test`,
-    `direction`, `repeat`, `mounting`, `state`, `started`, `status`, a further column of run files such as `bar_temp_c`, or `ignored`."""
+    `direction`, `repeat`, `mounting`, `state`, `started`, `run` (the same in all rows of a run, whatever stands there), `status`, a further column of run files such as `bar_temp_c`, or `ignored`."""
     unit: str | None = None
     """Unit of its numbers; absent where the column is a text, a count or ignored."""
 
@@ -105,7 +115,7 @@ class AngleSchema(Schema):
 class MappingFile(Schema):
     """What the columns of recordings made elsewhere mean."""
 
-    format: Literal["dbb-mapping/1"]
+    format: Literal["dbb-mapping/1", "dbb-mapping/2"]
     """Name and version of this format."""
     name: Annotated[str, Field(min_length=1)] | None = None
     """What people call the program that wrote the files."""
@@ -127,6 +137,11 @@ class MappingFile(Schema):
     """What the names of files say, such as `{test}_{direction}` or `{test}-{direction}-{repeat}`; without the ending."""
     words: dict[str, Literal["ccw", "cw"]] = Field(default_factory=dict)
     """Directions as the files write them."""
+    split: Literal["column", "gaps", "direction"] | None = None
+    """Of files with several runs: parted by a `column` that is `run`, by `gaps` (pauses, times that begin anew, empty lines), or where the
+    angles change their `direction`; absent: by columns that say test, direction and repeat, else a file is one run."""
+    zone: Annotated[str, AfterValidator(_zone)] | None = None
+    """Time zone of dates that have none, such as `+01:00` or `Europe/Berlin`; absent: that of the computer that imports."""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -147,9 +162,16 @@ class MappingFile(Schema):
             raise PydanticCustomError("zero", "a column is a deviation: `zero_mm` has to say from which length", {})
         if ANGLE not in meanings and self.trace is None:
             raise PydanticCustomError("trace", "there are no angles: `trace` has to be `whole` or `turn`", {})
+        self._split_has_what_it_needs(meanings)
         if self.separator == "comma" and self.decimal == ",":
             raise PydanticCustomError("alike", "decimal sign and separator are both a comma", {})
         return self
+
+    def _split_has_what_it_needs(self, meanings: list[str]) -> None:
+        if (self.split == "column") != (RUN in meanings):
+            raise PydanticCustomError("split", "`split: column` and a column that is `run` belong together", {})
+        if self.split == "direction" and ANGLE not in meanings:
+            raise PydanticCustomError("split", "`split: direction` needs a column that is an angle", {})
 
     @property
     def numbers(self) -> NumberLanguage | None:
@@ -187,7 +209,7 @@ def read_mapping(path: Path) -> MappingFile:
 def mapping_text(mapping: MappingFile) -> str:
     """Return the text of a mapping's file."""
     data = mapping.model_dump(exclude_none=True, exclude_defaults=True)
-    return yaml_text({"format": format_of(MappingFile), **data})
+    return yaml_text({**data, "format": format_for(MappingFile, data)})
 
 
 def write_mapping(path: Path, mapping: MappingFile) -> None:

@@ -23,6 +23,8 @@ POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 UNCERTAINTY_COLUMNS = ("u_x_mm", "u_y_mm", "u_z_mm")
 REASON_COLUMN = "u_not_known_because"
 """Why the cell of an uncertainty is empty; empty itself where all three are known."""
+WARNING_COLUMN = "model_warning"
+"""What speaks against the model, the same in all rows; there only where something does."""
 MOST_FAULTS = 20
 ELSE = "other tables need --decimal and --separator, or `numbers` in the settings"
 
@@ -100,6 +102,7 @@ def write_poses(
     provenance: Provenance,
     *,
     why_unknown: str = "",
+    warning: str = "",
     force: bool = False,
 ) -> None:
     """Write poses with their standard uncertainties and further columns, and beside the table where it comes from.
@@ -111,17 +114,18 @@ def write_poses(
         others: texts of further columns by name.
         provenance: where the table comes from.
         why_unknown: why an uncertainty is not known, for the rows where one is not.
+        warning: what speaks against the model; empty for nothing.
         force: overwrite.
 
     Raises:
         OutputError: the file exists and `force` is not given, or it cannot be written.
     """
-    own = (*UNCERTAINTY_COLUMNS, REASON_COLUMN)
-    kept = {name: cells for name, cells in others.items() if name not in own}
+    own = (*UNCERTAINTY_COLUMNS, REASON_COLUMN, *([WARNING_COLUMN] if warning else []))
+    kept = {name: cells for name, cells in others.items() if name not in {*own, WARNING_COLUMN}}
     rows: list[list[str]] = [[*POSE_COLUMNS, *own, *kept]]
     for k, (pose, uncertainty) in enumerate(zip(poses, uncertainty_mm, strict=True)):
         numbers = [f"{value:.9f}" for value in pose]
         numbers += ["" if np.isnan(value) else f"{value:.7f}" for value in uncertainty]
         reason = why_unknown if np.isnan(uncertainty).any() else ""
-        rows.append([*numbers, reason, *(cells[k] for cells in kept.values())])
+        rows.append([*numbers, reason, *([warning] if warning else []), *(cells[k] for cells in kept.values())])
     write_table(path, csv_text(rows), provenance, force=force)

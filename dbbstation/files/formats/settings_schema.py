@@ -1,4 +1,4 @@
-"""`dbb-settings/2`, which has all of `/1`: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
+"""`dbb-settings/3`, which has all of `/1` and `/2`: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
 
 from typing import Annotated, Literal
 
@@ -9,7 +9,7 @@ from dbbstation.files.formats.quantities import Quantity, TemperatureDegc
 from dbbstation.files.yaml.schema import Schema
 from dbbstation.nc.limits import LARGEST_ALLOWED_MM
 from dbbstation.plan.circle import Direction
-from dbbstation.plan.tolerance import CircleFigure, Tolerance
+from dbbstation.plan.tolerance import FILTERED, OF_BOTH_DIRECTIONS, USUAL_UPR, CircleFigure, Tolerance
 
 _UM_PER = {"µm": 1.0, "mm": 1e3}
 
@@ -80,23 +80,36 @@ class ToleranceSettings(Schema):
     tests: tuple[_Word, ...] = ()
     """Tests that it holds for; absent: all."""
     directions: tuple[Literal["ccw", "cw"], ...] = ()
-    """Senses of travel that it holds for; absent: both."""
+    """Senses of travel that it holds for; absent: both. Figures of both directions take none."""
+    filter: Literal["none", 15, 30, 50, 150] | None = None
+    """Filter of G, F, G(b) and H: `none`, or its cut-off in undulations per revolution, Gaussian but for 30, which is cut off sharply;
+    absent: 30."""
 
     @model_validator(mode="after")
     def _plausible(self) -> "ToleranceSettings":
+        figure = CircleFigure(self.quantity)
+        if self.directions and figure in OF_BOTH_DIRECTIONS:
+            raise PydanticCustomError(
+                "both", "{figure} is of both directions: leave `directions` out", {"figure": self.quantity}
+            )
+        if self.filter is not None and figure not in FILTERED:
+            raise PydanticCustomError(
+                "filter", "no filter acts on {figure}: leave `filter` out", {"figure": self.quantity}
+            )
         Quantity("µm", 0.01, 5_000).check(self.largest * _UM_PER[self.unit])
         return self
 
     def to_domain(self) -> Tolerance:
         """Return the tolerance in micrometres."""
         directions = tuple(map(Direction, self.directions))
-        return Tolerance(CircleFigure(self.quantity), self.largest * _UM_PER[self.unit], self.tests, directions)
+        upr = USUAL_UPR if self.filter is None else 0 if self.filter == "none" else self.filter
+        return Tolerance(CircleFigure(self.quantity), self.largest * _UM_PER[self.unit], self.tests, directions, upr)
 
 
 class SettingsFile(Schema):
     """What holds in a shop where the command line says nothing else; every key but the format may be absent."""
 
-    format: Literal["dbb-settings/1", "dbb-settings/2"]
+    format: Literal["dbb-settings/1", "dbb-settings/2", "dbb-settings/3"]
     """Name and version of this format."""
     instrument: _Word | None = None
     """Name of an instrument, or path of a protocol file from this file's folder."""

@@ -12,6 +12,7 @@ import numpy as np
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.jig import JigFile, checked_jig, jig_text
 from dbbstation.files.formats.mapping import LENGTH, UNITS
+from dbbstation.files.recordings.cmm_long import is_long, wide
 from dbbstation.files.recordings.dmis import read_dmis
 from dbbstation.files.recordings.foreign_csv import read_foreign
 from dbbstation.files.recordings.table_csv import missing_column
@@ -49,24 +50,43 @@ class Measured:
 
 
 def read_sheet(
-    path: Path, columns: Mapping[str, str], unit: str, coverage: float | None, *, of_one_holder: bool = False
+    path: Path,
+    columns: Mapping[str, str],
+    unit: str | None,
+    coverage: float | None,
+    *,
+    of_one_holder: bool = False,
+    u_unit: str | None = None,
 ) -> list[Measured]:
     """Read a sheet; DMIS by the ending of its name, else a table.
 
     Args:
         path: of the file.
-        columns: names of columns by what they are: `ball`, `bore`, `holder`, `x`, `y`, `z`, `u` or `ux`, `uy`, `uz`; others by name.
-        unit: of coordinates and uncertainties of a table.
+        columns: names of columns by what they are: `ball`, `bore`, `holder`, `x`, `y`, `z`, `u` or `ux`, `uy`, `uz`; of a sheet with a
+            row per coordinate also `axis`, `value` and `unit`; others by name.
+        unit: of a table's coordinates; None: as the sheet says, else mm.
         coverage: k of the uncertainties U of a table; None where it has none.
         of_one_holder: a bore alone says which ball a row is.
+        u_unit: of its uncertainties; None: as the sheet says, else that of coordinates.
 
     Raises:
         InputError: every fault of the file.
     """
     if path.suffix.lower() in DMIS_ENDINGS:
         return [Measured(one.name, None, "", one.centre_mm, None, one.line) for one in read_dmis(path)]
-    table = read_foreign(path).table
+    foreign = read_foreign(path)
+    table = foreign.table
+    given = columns.get("u") or columns.get("ux")
+    u_said = u_unit or ("" if given is None else _said_unit(given, foreign.units))
+    if is_long(table, columns):
+        unit = unit or "mm"
+        table, columns = wide(table, columns, unit)
     found = {**{key: name for key in _KEYS if (name := _usual(key, table)) is not None}, **columns}
+    said = _said_unit(found.get("x", ""), foreign.units)
+    if unit is not None and said and said != unit:
+        what = f"the sheet says that {found['x']} is in {said}, and --unit says {unit}"
+        raise InputError([Problem(str(path), table.header, 0, what, "leave --unit out, or correct the sheet")])
+    unit = unit or said or "mm"
     missing = [key for key in ("x", "y") if key not in found]
     faults = [
         missing_column(name, table.names, str(path), table.header) for name in found.values() if name not in table.names
@@ -88,7 +108,13 @@ def read_sheet(
         faults += [fault for key in (*AXES, *of_u) if key in found for fault in _bad_cells(table, found[key])]
     if faults:
         raise InputError(faults)
-    return [_row(table, k, found, UNITS[LENGTH][unit], coverage) for k in range(len(table))]
+    factors = UNITS[LENGTH][unit], UNITS[LENGTH][u_said or unit]
+    rows = [_row(table, k, found, factors, coverage) for k in range(len(table))]
+    if not u_said:
+        faults += [_unlike_a_cmm(one, str(path), unit) for one in rows if not _is_like_a_cmm(one)]
+    if faults:
+        raise InputError(faults)
+    return rows
 
 
 def jig_of_sheet(
@@ -175,12 +201,41 @@ def _bad_cells(table: TableFile, name: str) -> list[Problem]:
     ]
 
 
-def _row(table: TableFile, k: int, found: Mapping[str, str], factor: float, coverage: float | None) -> Measured:
+LIKE_A_CMM_UM = (0.01, 100.0)
+"""Standard uncertainties of a ball's centre that a CMM can have [µm]: outside, the unit that nobody stated is another one."""
+
+
+def _is_like_a_cmm(one: Measured) -> bool:
+    low, high = LIKE_A_CMM_UM
+    return not one.uncertainty_um or low <= one.uncertainty_um <= high
+
+
+def _unlike_a_cmm(one: Measured, file: str, unit: str) -> Problem:
+    what = f"the standard uncertainty of {one.name or one.bore} would be {one.uncertainty_um:.3g} µm, if it were in {unit} like its coordinates"
+    return Problem(file, one.line, 0, what, "say the unit of uncertainties: --u-unit µm")
+
+
+def _said_unit(name: str, units: Mapping[str, str]) -> str:
+    """Unit of a column: below its name, in brackets, or at its end; empty where nothing says it."""
+    for text in (units.get(name, ""), *re.findall(r"[\[(]\s*([^\])]*?)\s*[\])]", name), name.rpartition("_")[2]):
+        plain = text.strip(" []()").lower().replace("μ", "µ")
+        known = {"um": "µm", "in": "inch", "uinch": "µinch", "uin": "µinch"}.get(plain, plain)
+        if known in UNITS[LENGTH]:
+            return known
+    return ""
+
+
+def _row(
+    table: TableFile, k: int, found: Mapping[str, str], factors: tuple[float, float], coverage: float | None
+) -> Measured:
+    factor, u_factor = factors
+
     def text(key: str) -> str:
         return table.cells[found[key]][k] if key in found else ""
 
     def number(key: str) -> float:
-        return factor * float(table.values[found[key]][k]) if key in found else math.nan
+        each = u_factor if key.startswith("u") else factor
+        return each * float(table.values[found[key]][k]) if key in found else math.nan
 
     of_axes = [number(key) for key in ("ux", "uy", "uz") if key in found] or [number("u")]
     u_mm = math.sqrt(sum(one**2 for one in of_axes) / len(of_axes))

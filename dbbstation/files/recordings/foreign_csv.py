@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,6 +53,7 @@ class ForeignTable:
         units: what stands below the names of columns, by name; empty where nothing does.
         comments: `key: value` lines above the names, by key in small letters.
         data: the whole file.
+        comment_lines: number of the line of each comment, by key.
     """
 
     table: TableFile
@@ -60,6 +61,7 @@ class ForeignTable:
     units: Mapping[str, str]
     comments: Mapping[str, str]
     data: bytes
+    comment_lines: Mapping[str, int] = field(default_factory=dict)
 
 
 def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: str = "utf-8") -> ForeignTable:
@@ -78,7 +80,7 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
     text = None if data is None else _text(data, str(path), encoding, faults)
     if data is None or text is None:
         raise InputError(faults)
-    lines = text.splitlines()
+    lines = _without_end(text.splitlines())
     chosen = language or _language(lines, str(path))
     stated = "" if language is None else f"; {_STATED}"
     rows = [_cells(line, chosen, str(path), number) for number, line in enumerate(lines[:_LOOKED_AT], start=1)]
@@ -105,7 +107,15 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
         body = [line.rstrip().removesuffix(chosen.separator) for line in body]
     table = parse_table("\n".join(body), str(path), numbers=chosen)
     units = dict(zip(table.names, rows[near[-1]], strict=False)) if has_units else {}
-    return ForeignTable(table, chosen, units, _comments(lines[:names]), data)
+    comments = _comments(lines[:names])
+    said = {key: text for key, (_, text) in comments.items()}
+    return ForeignTable(table, chosen, units, said, data, {key: line for key, (line, _) in comments.items()})
+
+
+def _without_end(lines: list[str]) -> list[str]:
+    """Lines without a last one that only says that the file ends, as Calypso writes it."""
+    last = next((k for k in range(len(lines) - 1, -1, -1) if lines[k].strip()), None)
+    return lines if last is None or not re.fullmatch(r"\s*(END|EOF|ENDE)\s*", lines[last]) else lines[:last]
 
 
 def _text(data: bytes, file: str, encoding: str, faults: list[Problem]) -> str | None:
@@ -166,11 +176,11 @@ def _is_comment(line: str) -> bool:
     return line.lstrip("\ufeff ").startswith("#")
 
 
-def _comments(lines: list[str]) -> dict[str, str]:
-    """What lines `key: value`, `key = value` or `key;value` above the table say."""
+def _comments(lines: list[str]) -> dict[str, tuple[int, str]]:
+    """Line and text of what lines `key: value`, `key = value` or `key;value` above the table say."""
     found = {}
-    for line in lines:
+    for number, line in enumerate(lines, start=1):
         told = re.match(r"[\ufeff# ]*([^:=;\t,]{1,40}?)\s*[:=;\t,]\s*(.+)$", line)
         if told:
-            found[told[1].strip().lower()] = told[2].strip(' ";\t,')
+            found[told[1].strip().lower()] = (number, told[2].strip(' ";\t,'))
     return found

@@ -68,7 +68,9 @@ SINCE: dict[str, dict[str, int]] = {
         **dict.fromkeys(_OF_BARS, 3),
     },
     "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},
-    "dbb-settings": {"largest_bar_age_h": 2, "profile": 2},
+    "dbb-settings": {"largest_bar_age_h": 2, "profile": 2, "filter": 3},
+    "dbb-job": {"filter": 2},
+    "dbb-mapping": {"split": 2, "zone": 2},
     "dbb-machine": {**_OF_MACHINES, "acceleration_mm_s2": 3},
     "dbb-model": {
         **_OF_MACHINES,

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
@@ -19,6 +18,7 @@ from dbbstation.files.formats.mapping import (
     MOUNTING,
     OF_RUNS,
     REPEAT,
+    RUN,
     STARTED,
     STATE,
     TEST,
@@ -30,6 +30,11 @@ from dbbstation.files.recordings.entries import RunState, count_in
 from dbbstation.files.recordings.new_session import FinishedRun
 from dbbstation.files.recordings.table_csv import MOST_FAULTS
 from dbbstation.plan.circle import Circle, Direction
+from dbbstation.tasks.importing.gaps import held_over_gaps, samples_of
+from dbbstation.tasks.importing.moments import UnclearMomentError, moment_of
+from dbbstation.tasks.importing.names import WORDS, RunName, named_by, run_name
+from dbbstation.tasks.importing.plausible import check_units
+from dbbstation.tasks.importing.splitting import longest_pause_s, parts_by_direction, parts_by_gaps
 from dbbstation.tasks.importing.travel import (
     UnusableTravelError,
     check_span,
@@ -48,27 +53,6 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.recordings.foreign_csv import ForeignTable
     from dbbstation.plan.plan import Plan
-
-WORDS = {
-    **dict.fromkeys(("ccw", "anticlockwise", "counterclockwise", "counter-clockwise", "+"), Direction.CCW),
-    **dict.fromkeys(("cw", "clockwise", "-"), Direction.CW),
-}
-"""Directions as people write them."""
-
-
-@dataclass(frozen=True)
-class RunName:
-    """Which run a file is, as far as somebody said it.
-
-    Attributes:
-        test: of the plan; empty where not said.
-        direction: None where not said.
-        repeat: None: the next.
-    """
-
-    test: str = ""
-    direction: Direction | None = None
-    repeat: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,22 +84,26 @@ class Reader:
     Args:
         mapping: what the columns mean.
         plan: whose circles were run.
+        started: when the first run of a file was taken, by the file, where somebody says so.
+        trusted: what is taken although it does not look like what it is said to be: `unit`.
         faults: grows.
         left_out: grows: runs that are not taken, and why.
     """
 
     mapping: MappingFile
     plan: Plan
+    started: Mapping[str, datetime] = field(default_factory=dict)
+    trusted: frozenset[str] = frozenset()
     faults: list[Problem] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     _taken: set[tuple[str, Direction, int]] = field(default_factory=set)
 
-    def read(self, table: ForeignTable, told: RunName) -> list[ImportedRun]:
+    def read(self, table: ForeignTable, told: Sequence[RunName]) -> list[ImportedRun]:
         """Return the runs of a table.
 
         Args:
             table: one file.
-            told: which run it is where its rows do not say that.
+            told: which runs it has where its rows do not say that, in order; one for all where it is a test alone.
         """
         file = table.table.file
         unmapped = [name for name in table.table.names if name not in self.mapping.columns]
@@ -127,13 +115,20 @@ class Reader:
             self._fault(file, table.table.header, what, f"columns here: {', '.join(table.table.names)}")
         if unmapped or missing:
             return []
-        found = []
-        for rows, said in self._groups(table):
+        found: list[ImportedRun] = []
+        groups = self._groups(table)
+        names = told if len(told) > 1 else [*told, RunName()][:1] * len(groups)
+        if len(names) != len(groups):
+            what = f"the file has {len(groups)} runs, and {len(names)} are named"
+            begins = ", ".join(str(int(table.table.lines[rows[0]])) for rows, _ in groups)
+            self._fault(file, table.table.header, what, f"they begin at lines {begins}: name as many with --run")
+            return []
+        for (rows, said), one in zip(groups, names, strict=True):
             if said.get(STATE) == RunState.RECORDING:
-                name = "-".join(said.get(key, "") for key in (TEST, DIRECTION, REPEAT))
-                self.left_out.append(f"run {name} was broken off where it was measured and is left out")
+                broken = "-".join(said.get(key, "") for key in (TEST, DIRECTION, REPEAT))
+                self.left_out.append(f"run {broken} was broken off where it was measured and is left out")
                 continue
-            run = self._run(table, rows, said, told)
+            run = self._run(table, rows, said, one)
             if run is not None:
                 found.append(run)
         return found
@@ -150,24 +145,76 @@ class Reader:
     def _groups(self, table: ForeignTable) -> list[tuple[NDArray[np.int64], dict[str, str]]]:
         """Rows of each run, with what its columns say of it."""
         of_runs = {m: name for m in OF_RUNS if (name := self.mapping.column(m)) is not None}
+        clock = of_runs.pop(STARTED, None)  # may be another one in each row: the first of a run counts
         cells = [table.table.cells[name] for name in of_runs.values()]
         if not cells:
-            return [(np.arange(len(table.table)), {})]
+            said = {} if clock is None else {STARTED: clock}
+            return [
+                (rows, {key: table.table.cells[name][int(rows[0])] for key, name in said.items()})
+                for rows in self._split(table)
+            ]
         keys = list(zip(*cells, strict=True))
         rows: dict[tuple[str, ...], list[int]] = {}
         for k, key in enumerate(keys):
             rows.setdefault(key, []).append(k)
-        return [(np.array(each), dict(zip(of_runs, key, strict=True))) for key, each in rows.items()]
+        return [
+            (
+                np.array(each),
+                {
+                    **dict(zip(of_runs, key, strict=True)),
+                    **({} if clock is None else {STARTED: table.table.cells[clock][each[0]]}),
+                },
+            )
+            for key, each in rows.items()
+        ]
+
+    def _split(self, table: ForeignTable) -> list[NDArray[np.int64]]:
+        """Rows of each run of a table whose columns do not say it."""
+
+        def numbers(means: str) -> NDArray[np.float64] | None:
+            name = self.mapping.column(means)
+            if name is None or name not in table.table.values:
+                return None
+            factor, offset = in_run_units(means, self.mapping.columns[name].unit or "")
+            found: NDArray[np.float64] = table.table.values[name] * factor + offset
+            return found
+
+        every = np.arange(len(table.table))
+        if self.mapping.split == "gaps":
+            t_s = numbers(TIME)
+            known = every if t_s is None else every[np.isfinite(t_s)]
+            circles = [test.run(direction) for test in self.plan.tests.values() for direction in test.directions]
+            timed = None if t_s is None else t_s[known]
+            parts = parts_by_gaps(timed, table.table.lines[known], longest_pause_s(circles))
+            return [known[part] for part in parts]
+        angle = numbers(ANGLE)
+        if angle is None:
+            return [every]
+        known = every[np.isfinite(angle)]
+        parts = [known[part] for part in parts_by_direction(angle[known])] if len(known) else [every]
+        if self.mapping.split == "direction":
+            return parts
+        if len(parts) > 1:
+            line = int(table.table.lines[parts[1][0]])
+            what = (
+                f"the angles turn round {'once' if len(parts) == 2 else f'{len(parts) - 1} times'}: more than one run"  # noqa: PLR2004
+            )
+            self._fault(table.table.file, line, what, "say --split direction, or give each run a file of its own")
+            return []
+        return [every]
 
     def _run(
         self, table: ForeignTable, rows: NDArray[np.int64], said: Mapping[str, str], told: RunName
     ) -> ImportedRun | None:
         file, line = table.table.file, int(table.table.lines[rows[0]])
         before = len(self.faults)
-        values = self._values(table, rows)
+        rows, gaps = samples_of(table, rows, self.mapping, self.faults)
+        values, held = self._values(table, rows)
+        if not len(rows) and len(self.faults) == before:
+            self._fault(file, line, "no row of this run has a reading", "check the columns of the mapping")
         if len(self.faults) > before:
             return None
-        computed: list[str] = []
+        computed: list[str] = [*gaps, *held]
         name = self._named(table, said, told, line)
         angle = values.pop(ANGLE, None)
         if name.test not in self.plan.tests:
@@ -190,6 +237,8 @@ class Reader:
             return None
         circle = planned.run(direction)
         try:
+            if "unit" not in self.trusted:
+                check_units(self.mapping, table.table, rows, values | ({} if angle is None else {ANGLE: angle}), circle)
             said_angle = self.mapping.angle
             theta = None if angle is None or said_angle is None else machine_angles(angle, said_angle, circle)
             if theta is not None and said_angle is not None:
@@ -213,7 +262,7 @@ class Reader:
             columns=kept,
             repeat=self._repeat(name, direction, file, line),
             mounting=count_in(said.get(MOUNTING, "")) or None,
-            started=self._moment(said.get(STARTED, ""), file, line),
+            started=self._started(table, rows, said, computed),
             state=state,
             reason="rejected where it was measured" if state is RunState.REJECTED else "",
             texts=texts,
@@ -221,25 +270,21 @@ class Reader:
         )
         return ImportedRun(file, run, circle, (*computed, *travelled.computed))
 
-    def _values(self, table: ForeignTable, rows: NDArray[np.int64]) -> dict[str, NDArray[np.float64]]:
-        """Numbers in units of a run file by meaning, shape (n,); a column that is empty in all rows of the run is left out."""
-        found = {}
+    def _values(
+        self, table: ForeignTable, rows: NDArray[np.int64]
+    ) -> tuple[dict[str, NDArray[np.float64]], tuple[str, ...]]:
+        """Numbers in units of a run file by meaning, shape (n,), and what is to be said; a column without any number is left out."""
+        found, said = {}, list[str]()
         for name, column in self.mapping.columns.items():
             if column.means not in UNITS or column.unit is None:
                 continue
-            numbers = table.table.values[name][rows]
-            bad = np.flatnonzero(~np.isfinite(numbers))
-            needed = column.means in {LENGTH, DEVIATION}
-            if len(bad) == len(rows) and not needed and not any(table.table.cells[name][k] for k in rows.tolist()):
+            numbers, held = held_over_gaps(table, rows, name, self.faults)
+            if not np.isfinite(numbers).any():
                 continue
-            for k in rows[bad][:MOST_FAULTS].tolist():
-                what = f"{name} is `{table.table.cells[name][k]}`, not a finite number"
-                self._fault(
-                    table.table.file, int(table.table.lines[k]), what, f"correct the cell; {table.language.text}"
-                )
+            said += held
             factor, offset = in_run_units(column.means, column.unit)
             found[column.means] = numbers if factor == 1.0 and offset == 0.0 else numbers * factor + offset
-        return found
+        return found, tuple(said)
 
     def _named(self, table: ForeignTable, said: Mapping[str, str], told: RunName, line: int) -> RunName:
         """Which run it is: as the command line says, else columns, lines above the table, the file's name."""
@@ -259,7 +304,10 @@ class Reader:
         if direction is None and word:
             what = f"`{word}` is no direction that is known"
             self._fault(table.table.file, line, what, "say in the mapping: `words: {" + word + ": ccw}`, or cw")
-        return RunName(told.test or first(TEST), direction, told.repeat or count_in(first(REPEAT)))
+        in_column = run_name(said.get(RUN, ""), list(self.plan.tests)) or RunName()
+        test = told.test or first(TEST) or in_column.test
+        repeat = told.repeat or count_in(first(REPEAT)) or in_column.repeat
+        return RunName(test, direction or in_column.direction, repeat)
 
     def asked_span_deg(self, table: ForeignTable) -> float | None:
         """Return the span of a file's angles that is surely not the plan's: that of none of its circles; None where it may be [deg].
@@ -316,55 +364,37 @@ class Reader:
             self._fault(file, line, f"`{text}` is no state of a run", f"use one of {', '.join(_STATES)}")
         return RunState(text) if text in _STATES else RunState.ACCEPTED
 
-    def _moment(self, text: str, file: str, line: int) -> datetime | None:
-        if not text:
-            return None
+    def _started(
+        self, table: ForeignTable, rows: NDArray[np.int64], said: Mapping[str, str], computed: list[str]
+    ) -> datetime | None:
+        """When a run was taken: as the command line says, else a column, lines above the table, the file's name; None where none does."""
+        later = timedelta(seconds=self._later_s(table, rows))
+        if table.table.file in self.started:
+            return self.started[table.table.file] + later
+        in_column = said.get(STARTED, "")
+        lines = {**table.comment_lines, "": int(table.table.lines[rows[0]])}
         try:
-            moment = datetime.fromisoformat(text)
-        except ValueError:
-            moment = None
-        if moment is None or moment.tzinfo is None:
-            what = f"`{text}` is no time with its zone"
-            self._fault(file, line, what, "expected such as 2026-11-20T08:04:11Z, or ignore the column")
+            found = moment_of(in_column, table.comments, PurePath(table.table.file).stem, self.mapping.zone)
+        except UnclearMomentError as error:
+            remedy = "say --started FILE=2026-11-20T08:04:11+01:00, or ignore the column"
+            self._fault(table.table.file, lines.get(error.key, 0), error.what, remedy)
             return None
-        return moment
+        if found is None:
+            return None
+        computed += found.assumed
+        return found.at if in_column else found.at + later
+
+    def _later_s(self, table: ForeignTable, rows: NDArray[np.int64]) -> float:
+        """How much later than the file's first sample a run began, by its times [s]; 0 where they do not say it."""
+        name = self.mapping.column(TIME)
+        if name is None:
+            return 0.0
+        t = table.table.values[name]
+        later = float(t[rows[0]] - t[np.isfinite(t)][0]) * in_run_units(TIME, self.mapping.columns[name].unit or "s")[0]
+        return later if np.isfinite(later) and later > 0.0 else 0.0
 
     def _fault(self, file: str, line: int, what: str, remedy: str) -> None:
         self.faults.append(Problem(file, line, 0, what, remedy))
-
-
-def named_by(pattern: str, stem: str) -> dict[str, str]:
-    """Return what the name of a file says under a pattern such as `{test}_{direction}`; empty where it does not fit."""
-    parts = re.split(r"\{(test|direction|repeat)\}", pattern)
-    fields = {
-        TEST: r"(?P<test>[A-Za-z0-9][A-Za-z0-9.]*?)",
-        DIRECTION: r"(?P<direction>[^\W\d_]+)",
-        REPEAT: r"(?P<repeat>\d+)",
-    }
-    expression = "".join(fields[part] if k % 2 else re.escape(part) for k, part in enumerate(parts))
-    try:
-        found = re.fullmatch(expression, stem)
-    except re.error:  # one field twice
-        found = None
-    return {} if found is None else found.groupdict()
-
-
-def run_name(text: str, known: Sequence[str]) -> RunName | None:
-    """Return which run `a`, `a-ccw` or `a-ccw-2` is; None where it is none.
-
-    Args:
-        text: as typed.
-        known: tests of the plan, whose names may have hyphens.
-    """
-    test = max((name for name in known if text == name or text.startswith(f"{name}-")), key=len, default=None)
-    if test is None:
-        return None
-    direction, _, repeat = text.removeprefix(test).removeprefix("-").partition("-")
-    if not direction:
-        return RunName(test)
-    if direction not in set(Direction) or (repeat and not count_in(repeat)):
-        return None
-    return RunName(test, Direction(direction), count_in(repeat))
 
 
 _STATES = (RunState.ACCEPTED, RunState.REJECTED, RunState.COMPLETE)

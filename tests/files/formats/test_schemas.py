@@ -18,10 +18,10 @@ SESSIONS = FIXTURES / "sessions"
 EXAMPLES = {
     "dbb-machine/3": [FIXTURES / "machines" / "every-key.yaml"],
     "dbb-jig/1": [FIXTURES / "jigs" / "reference-plate.yaml"],
-    "dbb-job/1": [FIXTURES / "jobs" / name for name in ("daily-check.yaml", "virtual.yaml")],
+    "dbb-job/2": [FIXTURES / "jobs" / name for name in ("daily-check.yaml", "virtual.yaml")],
     "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
-    "dbb-settings/2": [FIXTURES / "settings" / "every-key.yaml"],
-    "dbb-mapping/1": [FIXTURES / "mappings" / "every-key.yaml"],
+    "dbb-settings/3": [FIXTURES / "settings" / "every-key.yaml"],
+    "dbb-mapping/2": [FIXTURES / "mappings" / "every-key.yaml"],
     "dbb-simulator/1": [FIXTURES / "simulators" / "pendulum.yaml"],
     "dbb-bar/1": [FIXTURES / "bars" / "zerodur.yaml"],
     "dbb-model/4": [FIXTURES / "models" / name for name in ("null-space.yaml", "acceleration.yaml")],

@@ -1,0 +1,338 @@
+"""What each cause of a model does to the circles and over the workspace, and the circles as they would be if it were cured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES
+from dbbstation.calibration.reporting.prediction import smooth_circularity_um
+from dbbstation.computing.threads import with_one_thread
+from dbbstation.diagnosis.workspace import workspace
+from dbbstation.errors import KinematicsError
+from dbbstation.machine.kinematics import position_responses
+from dbbstation.model.identified import known_u
+from dbbstation.model.machine_model import by_parameters
+from dbbstation.sources.contract import Motion, Need, Owner
+from dbbstation.trace.analysis import figures
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.model.identified import Row
+    from dbbstation.model.machine_model import BarReading, MachineModel
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import Fitted
+    from dbbstation.trace.circle import RawCircle
+
+GEOMETRY = "geometry"
+"""Name of the kinematic parameters as one cause: one calibration finds them, one compensation cures them."""
+
+
+@dataclass(frozen=True, eq=False)
+class CuredCircle:
+    """One run with and without a cause.
+
+    Attributes:
+        test: name.
+        direction: `ccw` or `cw`.
+        repeat: of the test and direction.
+        g_um: circular deviation that the cause would make by itself, up to 30 undulations per revolution [µm].
+        centre_um: how far it moves the centre, X and Y, shape (2,) [µm].
+        measured_g_um: circular deviation as measured, by the same figure [µm].
+        cured_g_um: the same if the cause were cured [µm].
+        measured_centre_um: centre less the commanded one as measured, shape (2,) [µm].
+        cured_centre_um: the same if it were cured, shape (2,) [µm].
+        raw: the run as measured.
+        effect_mm: what the cause does to its readings, shape (n,) [mm].
+    """
+
+    test: str
+    direction: str
+    repeat: int
+    g_um: float
+    centre_um: NDArray[np.float64]
+    measured_g_um: float
+    cured_g_um: float
+    measured_centre_um: NDArray[np.float64]
+    cured_centre_um: NDArray[np.float64]
+    raw: RawCircle
+    effect_mm: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CauseEffect:
+    """What one cause contributes.
+
+    Attributes:
+        name: of the source; `geometry` for all kinematic parameters together.
+        sources: names of the sources that would go with it.
+        g_um: mean over the runs of the circular deviation that it would make by itself [µm].
+        g_u_um: standard uncertainty of that; None where the covariance of its parameters is not known.
+        centre_um: mean distance by which it moves the centres [µm].
+        centre_u_um: standard uncertainty of that; None likewise.
+        workspace_um: root mean square distance over the workspace by which it moves the tool, about a common shift [µm]; None where it
+            follows more than the pose.
+        workspace_u_um: standard uncertainty of that; None likewise.
+        cure: how to cure it.
+        confirm: how to confirm it.
+        circles: run by run.
+    """
+
+    name: str
+    sources: tuple[str, ...]
+    g_um: float
+    g_u_um: float | None
+    centre_um: float
+    centre_u_um: float | None
+    workspace_um: float | None
+    workspace_u_um: float | None
+    cure: str
+    confirm: str
+    circles: tuple[CuredCircle, ...]
+
+
+COMPENSATION = "compensate programs with the model (`dbbstation program`, `dbbstation compensate`), or enter the geometry into the control"
+REMEASURE = (
+    "measure the same circles under compensated programs: their centres and G come down to what is left of other causes"
+)
+
+
+@with_one_thread
+def effects_of(
+    model: MachineModel,
+    observations: Sequence[Observation],
+    rows: Sequence[Row] = (),
+    covariance: NDArray[np.float64] | None = None,
+    unseen: NDArray[np.float64] | None = None,
+) -> tuple[CauseEffect, ...]:
+    """Return what each cause of a model contributes to the circles, the greatest circular deviation first.
+
+    A cause's effect is what the model reads with it less what it reads without it, all other causes at work. To first order effects
+    add up; their circular deviations need not, since causes may act against each other.
+
+    Args:
+        model: with its sources, those of the measurement too.
+        observations: runs.
+        rows: source, set and parameter of each row of the covariance.
+        covariance: of these, in the products of their units, shape (k, k); None where it is not known.
+        unseen: combinations of these that the recordings did not determine, each at its plausible size, shape (h, k). Circles do not show
+            them; over the workspace the uncertainty is not known where they are its greater part.
+
+    Raises:
+        ModelError: a source needs what the runs do not give.
+        TraceError: a run that is no circle.
+    """
+    lengths = [model.bar(observation.motion()) for observation in observations]
+    found = []
+    for name, group in _groups(model):
+        without = replace(model, sources=tuple(f for f in model.sources if f not in group))
+        effects = [
+            whole.length_mm - without.bar(observation.motion()).length_mm
+            for whole, observation in zip(lengths, observations, strict=True)
+        ]
+        if not any(np.abs(effect).max(initial=0.0) > ROUNDING_MM for effect in effects):
+            continue
+        places = _places(group, model, rows)
+        roots = None if covariance is None or places is None else _parted(group, _root(covariance, places))
+        hidden = None if unseen is None or places is None else _parted(group, unseen[:, places].T)
+        spread = [_answers(observation, lengths[k], group, roots) for k, observation in enumerate(observations)]
+        circles = tuple(_circle(o, effect) for o, effect in zip(observations, effects, strict=True))
+        centres = [circle.centre_um for circle in circles]
+        texts = group[0].source.texts
+        space, space_u = _over_the_workspace(model, without, group, (roots, hidden))
+        found.append(
+            CauseEffect(
+                name=name,
+                sources=tuple(dict.fromkeys(f.source.name for f in group)),
+                g_um=float(np.mean([circle.g_um for circle in circles])),
+                g_u_um=_u_of_mean_g(observations, effects, spread, circles),
+                centre_um=float(np.mean([np.hypot(*centre) for centre in centres])),
+                centre_u_um=_u_of_centres(observations, effects, spread, centres),
+                workspace_um=space,
+                workspace_u_um=space_u,
+                cure=COMPENSATION if name == GEOMETRY else texts.cure,
+                confirm=REMEASURE if name == GEOMETRY else texts.confirm,
+                circles=circles,
+            )
+        )
+    return tuple(sorted(found, key=lambda one: -one.g_um))
+
+
+ROUNDING_MM = 1e-9
+"""Effects that are rounding [mm]."""
+
+
+def _groups(model: MachineModel) -> Iterator[tuple[str, tuple[Fitted, ...]]]:
+    """Causes with their sources: the geometry as one, all sets of a source as one; random effects of a session are none."""
+    geometry = tuple(f for f in model.sources if f.source.name in KINEMATIC_SOURCES)
+    if geometry:
+        yield GEOMETRY, geometry
+    names = dict.fromkeys(
+        f.source.name
+        for f in model.sources
+        if f.source.name not in {*KINEMATIC_SOURCES, *MEASUREMENT_SOURCES} and not f.source.of_currents
+    )
+    for name in names:
+        own = tuple(f for f in model.sources if f.source.name == name)
+        if any(f.source.found_compliance(model.machine, f.values) is not None for f in own):
+            # Without elastic struts nothing that loads them bends them.
+            own = (*own, *(f for f in model.sources if f.source.loads_struts and f not in own))
+        yield name, own
+
+
+def _places(group: Sequence[Fitted], model: MachineModel, rows: Sequence[Row]) -> list[int] | None:
+    """Rows of the covariance that are a cause's parameters; None where one of them has none."""
+    place = {row: k for k, row in enumerate(rows)}
+    names = [
+        (f.source.name, f.shared, parameter.name) for f in group for parameter in f.source.parameters(model.machine)
+    ]
+    return [place[name] for name in names] if all(name in place for name in names) else None
+
+
+def _root(covariance: NDArray[np.float64], places: Sequence[int]) -> NDArray[np.float64]:
+    """Square root of the covariance of some rows, shape (p, r)."""
+    values, vectors = np.linalg.eigh(covariance[np.ix_(places, places)])
+    kept = values > 0.0
+    root: NDArray[np.float64] = vectors[:, kept] * np.sqrt(values[kept])
+    return root
+
+
+def _parted(group: Sequence[Fitted], changes: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """Changes of all parameters of a cause, shape (p, r), source by source."""
+    ends = np.cumsum([len(f.values) for f in group])
+    return tuple(np.split(changes, ends[:-1]))
+
+
+def _answers(
+    observation: Observation,
+    reading: BarReading,
+    group: Sequence[Fitted],
+    roots: tuple[NDArray[np.float64], ...] | None,
+) -> NDArray[np.float64] | None:
+    """Change of a run's readings by one standard deviation along each independent direction of the cause, shape (n, r) [mm]."""
+    if roots is None:
+        return None
+    total = np.zeros((len(reading.length_mm), roots[0].shape[1] if roots else 0))
+    motion = observation.motion()
+    for fitted, root in zip(group, roots, strict=True):
+        if fitted.shared == fitted.source.shared_by(motion):
+            total += reading.by_fitted(fitted) @ root
+    return total
+
+
+def _circle(observation: Observation, effect_mm: NDArray[np.float64]) -> CuredCircle:
+    raw = observation.raw
+    measured, cured = raw.length_mm, raw.length_mm - effect_mm
+    was, would = figures(raw, measured), figures(raw, cured)
+    before, after = (1e3 * np.asarray(one.centre_mm) for one in (was, would))
+    return CuredCircle(
+        test=observation.test,
+        direction=str(raw.circle.direction),
+        repeat=observation.repeat,
+        g_um=_own_g_um(raw, effect_mm),
+        centre_um=before - after,
+        measured_g_um=smooth_circularity_um(raw, measured),
+        cured_g_um=smooth_circularity_um(raw, cured),
+        measured_centre_um=before,
+        cured_centre_um=after,
+        raw=raw,
+        effect_mm=effect_mm,
+    )
+
+
+def _own_g_um(raw: RawCircle, effect_mm: NDArray[np.float64]) -> float:
+    return smooth_circularity_um(raw, raw.circle.bar_mm + effect_mm)
+
+
+def _u_of_mean_g(
+    observations: Sequence[Observation],
+    effects: Sequence[NDArray[np.float64]],
+    spread: Sequence[NDArray[np.float64] | None],
+    circles: Sequence[CuredCircle],
+) -> float | None:
+    """Standard uncertainty of the mean circular deviation, each direction of the covariance changed by one standard deviation."""
+    changes = []
+    for observation, effect, answers, circle in zip(observations, effects, spread, circles, strict=True):
+        if answers is None:
+            return None
+        changes.append([_own_g_um(observation.raw, effect + change) - circle.g_um for change in answers.T])
+    return _norm_of_mean(np.array(changes))
+
+
+def _u_of_centres(
+    observations: Sequence[Observation],
+    effects: Sequence[NDArray[np.float64]],
+    spread: Sequence[NDArray[np.float64] | None],
+    centres: Sequence[NDArray[np.float64]],
+) -> float | None:
+    """Standard uncertainty of the mean distance, likewise; the first harmonic of a change is what it moves the centre by."""
+    changes = []
+    for observation, effect, answers, centre in zip(observations, effects, spread, centres, strict=True):
+        if answers is None:
+            return None
+        raw = observation.raw
+        own = figures(raw, raw.circle.bar_mm + effect).centre_mm
+        moved = [
+            float(
+                np.hypot(
+                    *(centre + 1e3 * (np.asarray(figures(raw, raw.circle.bar_mm + effect + change).centre_mm) - own))
+                )
+            )
+            for change in answers.T
+        ]
+        changes.append([one - float(np.hypot(*centre)) for one in moved])
+    return _norm_of_mean(np.array(changes))
+
+
+def _norm_of_mean(changes: NDArray[np.float64]) -> float:
+    """Norm over directions of the mean over runs, of changes of shape (runs, r)."""
+    return float(np.linalg.norm(changes.mean(axis=0))) if changes.size else 0.0
+
+
+def _over_the_workspace(
+    model: MachineModel,
+    without: MachineModel,
+    group: Sequence[Fitted],
+    changes: tuple[tuple[NDArray[np.float64], ...] | None, tuple[NDArray[np.float64], ...] | None],
+) -> tuple[float | None, float | None]:
+    """Root mean square distance by which a cause moves the tool, about a common shift, and its standard uncertainty [µm]; None: not known."""
+    if any(f.source.belongs_to is not Owner.MACHINE or not f.source.needs <= {Need.POSE} for f in group):
+        return None, None
+    motion = Motion(workspace(model.machine))
+    if len(motion.poses) == 0:
+        return None, None
+    try:
+        here = model.anywhere().actual(motion)
+        moved = (here.tool_frames().position_mm - without.anywhere().actual(motion).tool_frames().position_mm).T
+    except KinematicsError:
+        return None, None
+    rms_um = _rms_about_mean_um(moved)
+    responses = position_responses(here.hexapod, here.frames)
+
+    def spread(roots: tuple[NDArray[np.float64], ...]) -> float:
+        answers = np.zeros((3, len(motion.poses), roots[0].shape[1]))
+        for fitted, root in zip(group, roots, strict=True):
+            derivative = here.derivative(fitted)
+            each = [
+                np.broadcast_to(by_parameters(derivative, one, motion.kept), (len(motion.poses), len(fitted.values)))
+                for one in responses
+            ]
+            answers += np.array(each) @ root
+        off = [_rms_about_mean_um(moved + answers[:, :, k]) - rms_um for k in range(answers.shape[2])]
+        return float(np.linalg.norm(off))
+
+    known, hidden = changes
+    if known is None:
+        return rms_um, None
+    u = known_u(np.array([spread(known) ** 2]), np.array([0.0 if hidden is None else spread(hidden) ** 2]))[0]
+    return rms_um, None if np.isnan(u) else float(u)
+
+
+def _rms_about_mean_um(moved_mm: NDArray[np.float64]) -> float:
+    """Root mean square length of vectors, shape (3, n) [mm], about their mean [µm]."""
+    return 1e3 * float(np.sqrt(np.mean(np.sum((moved_mm - moved_mm.mean(axis=1, keepdims=True)) ** 2, axis=0))))

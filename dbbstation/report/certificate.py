@@ -1,0 +1,78 @@
+"""Whether a report is a certificate: what one needs, and what of it the sessions do not say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.files.recordings.entries import RunState
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.files.recordings.session import SessionFolder
+
+MOST_NAMED = 3
+"""What is lacking that the title names; the first page names all."""
+
+
+@dataclass(frozen=True)
+class Certified:
+    """What a report is.
+
+    Attributes:
+        lacking: what a certificate needs and this report has not, in few words each; empty where it is one.
+        place: where it was measured; empty where nobody says.
+    """
+
+    lacking: tuple[str, ...]
+    place: str
+
+    @property
+    def title(self) -> str:
+        """What stands at the top: `Certificate of circular tests`, or `Not a certificate: operator unknown, ...`."""
+        if not self.lacking:
+            return "Certificate of circular tests"
+        more = len(self.lacking) - MOST_NAMED
+        named = ", ".join(self.lacking[:MOST_NAMED])
+        return f"Not a certificate: {named}{f' and {more} more' if more > 0 else ''}"
+
+
+def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolerances: bool) -> Certified:
+    """Return what a report of some sessions lacks to be a certificate.
+
+    Args:
+        sessions: whose circles it shows.
+        job: what was measured for, as typed for this report; empty: as the sessions say.
+        place: where it was measured; empty where nobody says.
+        tolerances: whether circles are held against any.
+    """
+    lacking = dict.fromkeys(text for session in sessions for text in _lacking(session, job))
+    if not place:
+        lacking["place unknown"] = None
+    if not tolerances:
+        lacking["no tolerance"] = None
+    return Certified(tuple(lacking), place)
+
+
+def _lacking(session: SessionFolder, job: str) -> list[str]:
+    bar = session.bar
+    accepted = session.in_state(RunState.ACCEPTED)
+    checks = (
+        (session.virtual, "virtual machine"),
+        (not session.serial_number, "serial number of the machine unknown"),
+        (session.ambient_temp_c is None, "temperature unknown"),
+        (bar is None, "bar unknown"),
+        (bar is not None and not bar.serial_number, "serial number of the bar unknown"),
+        (bar is not None and bar.calibrated is None, "calibration date of the bar unknown"),
+        (
+            bar is not None and bar.expansion_um_m_k != 0.0 and (bar.temp_c is None or bar.expansion_um_m_k is None),
+            "temperature or expansion of the bar unknown",
+        ),
+        (bool(session.bar_waiver), "bar not freshly calibrated"),
+        (not session.operator, "operator unknown"),
+        (not (job or session.job), "job unknown"),
+        (any(run.started is None for run in accepted), "dates unknown"),
+        (session.seal is None, "not sealed"),
+    )
+    return [text for lacks, text in checks if lacks]

@@ -1,0 +1,120 @@
+"""What each cause of a model contributes to the circles, and what they would be without it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from dbbstation.diagnosis.effects import CauseEffect, CuredCircle
+
+
+@dataclass(frozen=True, kw_only=True)
+class CuredRun:
+    """One run with and without a cause; G up to 30 undulations per revolution.
+
+    Attributes:
+        test: name.
+        direction: `ccw` or `cw`.
+        repeat: of the test and direction.
+        g_um: circular deviation that the cause would make by itself [µm].
+        centre_um: how far it moves the centre, X and Y [µm].
+        measured_g_um: circular deviation as measured [µm].
+        cured_g_um: if the cause were cured [µm].
+        measured_centre_um: centre less the commanded one, X and Y [µm].
+        cured_centre_um: if the cause were cured [µm].
+    """
+
+    test: str
+    direction: str
+    repeat: int
+    g_um: float
+    centre_um: tuple[float, ...]
+    measured_g_um: float
+    cured_g_um: float
+    measured_centre_um: tuple[float, ...]
+    cured_centre_um: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EffectResult:
+    """What one cause contributes, over all runs.
+
+    Attributes:
+        cause: name of the source; `geometry` for all kinematic parameters together.
+        sources: that would go with it.
+        verdict: of the diagnosis; empty of the geometry, and where no diagnosis was made.
+        g_um: mean circular deviation that it would make by itself [µm].
+        g_u_um: standard uncertainty of that; None where not known.
+        centre_um: mean distance by which it moves the centres [µm].
+        centre_u_um: standard uncertainty of that; None where not known.
+        workspace_um: root mean square distance over the workspace by which it moves the tool, about a common shift [µm]; None where it
+            follows more than the pose.
+        workspace_u_um: standard uncertainty of that; None where not known.
+        measured_g_um: mean circular deviation as measured [µm].
+        cured_g_um: the same if the cause were cured [µm].
+        cure: how to cure it.
+        confirm: how to confirm it.
+        runs: one by one.
+    """
+
+    cause: str
+    sources: tuple[str, ...]
+    verdict: str
+    g_um: float
+    g_u_um: float | None
+    centre_um: float
+    centre_u_um: float | None
+    workspace_um: float | None
+    workspace_u_um: float | None
+    measured_g_um: float
+    cured_g_um: float
+    cure: str
+    confirm: str
+    runs: tuple[CuredRun, ...]
+
+
+def effect_results(effects: Sequence[CauseEffect], verdicts: Mapping[str, str]) -> tuple[EffectResult, ...]:
+    """Return causes in the order of what they contribute.
+
+    Args:
+        effects: the greatest first.
+        verdicts: of a diagnosis, by cause.
+    """
+    return tuple(_result(one, verdicts.get(one.name, "")) for one in effects)
+
+
+def _result(one: CauseEffect, verdict: str) -> EffectResult:
+    count = len(one.circles)
+    return EffectResult(
+        cause=one.name,
+        sources=one.sources,
+        verdict=verdict,
+        g_um=one.g_um,
+        g_u_um=one.g_u_um,
+        centre_um=one.centre_um,
+        centre_u_um=one.centre_u_um,
+        workspace_um=one.workspace_um,
+        workspace_u_um=one.workspace_u_um,
+        measured_g_um=sum(circle.measured_g_um for circle in one.circles) / count,
+        cured_g_um=sum(circle.cured_g_um for circle in one.circles) / count,
+        cure=one.cure,
+        confirm=one.confirm,
+        runs=tuple(_run(circle) for circle in one.circles),
+    )
+
+
+def _run(circle: CuredCircle) -> CuredRun:
+    return CuredRun(
+        test=circle.test,
+        direction=circle.direction,
+        repeat=circle.repeat,
+        g_um=circle.g_um,
+        centre_um=tuple(circle.centre_um.tolist()),
+        measured_g_um=circle.measured_g_um,
+        cured_g_um=circle.cured_g_um,
+        measured_centre_um=tuple(circle.measured_centre_um.tolist()),
+        cured_centre_um=tuple(circle.cured_centre_um.tolist()),
+    )

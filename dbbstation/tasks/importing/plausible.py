@@ -1,0 +1,236 @@
+"""Whether imported numbers can be what they are said to be: units by what bars and circles can be, centres by what the plan says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.files.formats.mapping import ANGLE, DEVIATION, LENGTH, TIME, UNITS
+from dbbstation.plan.circle import FULL_TURN_DEG, USUAL_STROKE_MM
+from dbbstation.tasks.importing.travel import UnusableTravelError
+from dbbstation.trace.columns import LENGTH as COLUMN_OF_LENGTH
+from dbbstation.trace.columns import THETA
+from dbbstation.trace.cut import LARGEST_JUMP_MM
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.files.formats.mapping import MappingFile
+    from dbbstation.files.recordings.table_csv import TableFile
+    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Ball, Plan
+    from dbbstation.tasks.importing.runs import ImportedRun
+
+LEAST_RANGE_MM = 2e-4
+"""Readings of a whole turn that differ by less are none of a bar: bars resolve 0.1 µm, and their noise alone spans more [mm]."""
+
+LIKE_A_UNIT = 0.1
+"""Share by which a ratio may differ from that of two units and still be taken for it."""
+
+MOST_TURNS = 2.0
+"""Turns that the angles of one run span at the most, its overshoot included."""
+
+CHANCE = 1e-3
+"""Probability by chance below which centres lie nearer to zero than balls can be put up."""
+
+
+@dataclass(frozen=True)
+class Implausible:
+    """Numbers that cannot be what they are said to be.
+
+    Attributes:
+        what: is wrong, in words.
+        means: column that it is about.
+        others: meanings with units that would be plausible, such as `deviation:mm`.
+    """
+
+    what: str
+    means: str
+    others: tuple[str, ...]
+
+
+def unlike_a_bar(
+    numbers: NDArray[np.float64], means: str, unit: str, zero_mm: float, circle: Circle, feed_in_mm: float | None = None
+) -> Implausible | None:
+    """Return why readings of a turn cannot be in their unit, where another unit would do; None where they can.
+
+    Args:
+        numbers: as the file has them, shape (n,).
+        means: `length` or `deviation`.
+        unit: that they are said to be in.
+        zero_mm: length at which a deviation is 0 [mm].
+        circle: of the run.
+        feed_in_mm: that the readings span too [mm]; None of a turn alone.
+    """
+    least_mm = LEAST_RANGE_MM if feed_in_mm is None else max(LEAST_RANGE_MM, 0.5 * feed_in_mm)
+
+    def fits(one: str, meant: str = means) -> bool:
+        lengths = numbers * UNITS[means][one] + (zero_mm if meant == DEVIATION else 0.0)
+        off = float(np.max(np.abs(lengths - circle.bar_mm)))
+        jump = float(np.max(np.abs(np.diff(lengths)), initial=0.0))
+        return float(np.ptp(lengths)) >= least_mm and off <= USUAL_STROKE_MM and jump <= LARGEST_JUMP_MM
+
+    if len(numbers) == 0 or fits(unit):
+        return None
+    swapped = LENGTH if means == DEVIATION else DEVIATION
+    if zero_mm and fits(unit, swapped):
+        others: tuple[str, ...] = (f"{swapped}:{unit}",)
+    else:
+        others = tuple(f"{means}:{one}" for one in UNITS[means] if one != unit and fits(one))
+    if not others:
+        return None
+    low, high = float(numbers.min()), float(numbers.max())
+    said = "lengths" if means == LENGTH else "deviations"
+    what = f"{said} from {low:.6g} to {high:.6g} {unit} are none of a ball bar of {circle.bar_mm:g} mm"
+    return Implausible(what, means, others)
+
+
+def unlike_a_turn(theta_deg: NDArray[np.float64], unit: str) -> Implausible | None:
+    """Return why angles cannot be in their unit, where another unit makes a turn of them; None where they can.
+
+    Args:
+        theta_deg: in degrees, as the unit says, in order of time, shape (n,).
+        unit: that they are said to be in.
+    """
+    span = float(np.ptp(theta_deg)) / UNITS[ANGLE][unit]
+    turns = [
+        f"{ANGLE}:{one}"
+        for one, degrees in UNITS[ANGLE].items()
+        if one != unit and 1.0 - LIKE_A_UNIT <= span * degrees / FULL_TURN_DEG <= MOST_TURNS
+    ]
+    if span * UNITS[ANGLE][unit] >= (1.0 - LIKE_A_UNIT) * FULL_TURN_DEG or not turns:
+        return None
+    return Implausible(f"angles span {span:.4g} {unit}, which is no turn", ANGLE, tuple(turns))
+
+
+def unlike_the_feed(
+    t_s: NDArray[np.float64], theta_deg: NDArray[np.float64], unit: str, circle: Circle
+) -> Implausible | None:
+    """Return why times cannot be in their unit: times and angles make the plan's feed in another unit; None where they can.
+
+    Args:
+        t_s: in seconds, as the unit says, shape (n,).
+        theta_deg: in order of time, shape (n,) [deg].
+        unit: that they are said to be in.
+        circle: of the run.
+    """
+    turned = float(np.sum(np.abs(np.diff(np.unwrap(theta_deg, period=FULL_TURN_DEG)))))
+    took = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
+    if took <= 0.0 or turned <= 0.0:
+        return None
+    ratio = turned / circle.turning_deg_s / took  # what the time should be over what it is
+    own = UNITS[TIME][unit]
+    others = tuple(
+        f"{TIME}:{one}"
+        for one, seconds in UNITS[TIME].items()
+        if one != unit and abs(ratio * own / seconds - 1.0) <= LIKE_A_UNIT
+    )
+    if not others:
+        return None
+    feed = circle.feed_mm_min * ratio
+    return Implausible(
+        f"times and angles make a feed of {feed:.4g} mm/min, the plan has {circle.feed_mm_min:g}", TIME, others
+    )
+
+
+def check_units(
+    mapping: MappingFile,
+    table: TableFile,
+    rows: NDArray[np.int64],
+    values: Mapping[str, NDArray[np.float64]],
+    circle: Circle,
+) -> None:
+    """Refuse numbers that cannot be in the unit that they are said to be in, where another unit would do.
+
+    Args:
+        mapping: what columns mean, with their units.
+        table: the file.
+        rows: of the run.
+        values: numbers of the run by meaning, in units of run files, shape (n,).
+        circle: of the run.
+
+    Raises:
+        UnusableTravelError: with the units that would.
+    """
+    means = LENGTH if LENGTH in values else DEVIATION
+    named = {one: name for one in (means, ANGLE, TIME) if (name := mapping.column(one)) is not None}
+    units = {one: mapping.columns[name].unit or "" for one, name in named.items()}
+    whole = ANGLE not in values and mapping.trace == "whole"
+    found = unlike_a_bar(
+        table.values[named[means]][rows],
+        means,
+        units[means],
+        float(mapping.zero_mm or 0.0),
+        circle,
+        circle.feed_in_mm if whole else None,
+    )
+    if found is None and ANGLE in values:
+        found = unlike_a_turn(values[ANGLE], units[ANGLE])
+        if found is None and TIME in values:
+            found = unlike_the_feed(values[TIME], values[ANGLE], units[TIME], circle)
+    if found is None:
+        return
+    name = named[found.means]
+    meant = " or ".join(one.replace(":", " in ") for one in found.others)
+    say = " or ".join(f"--column '{name}={one}'" for one in found.others)
+    raise UnusableTravelError(
+        f"column {table.names.index(name) + 1}, {name}: {found.what}",
+        f"it may be {meant}: say {say}, or correct the mapping; --trust unit takes the numbers as they are",
+    )
+
+
+def centre_mm(length_mm: NDArray[np.float64], theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the least-squares centre of readings, shape (2,) [mm]: X and Y of the first harmonic.
+
+    Args:
+        length_mm: shape (n,) [mm].
+        theta_deg: from +X towards +Y, shape (n,) [deg].
+    """
+    angle = np.radians(theta_deg)
+    columns = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
+    found: NDArray[np.float64] = np.linalg.lstsq(columns, length_mm, rcond=None)[0][1:]
+    return found
+
+
+def chance_of_runs(runs: Sequence[ImportedRun], plan: Plan) -> float | None:
+    """Return the probability that runs lie as near to their commanded centres as they do by chance; None where nobody can say.
+
+    Args:
+        runs: as they will be written; those without angles are not looked at.
+        plan: whose circles they are.
+    """
+    centres: dict[tuple[str, int | None], list[NDArray[np.float64]]] = {}
+    for one in runs:
+        columns_of = one.run.columns
+        if THETA in columns_of:
+            found = centre_mm(columns_of[COLUMN_OF_LENGTH], columns_of[THETA])
+            centres.setdefault((one.run.test, one.run.mounting), []).append(found)
+    return chance_of_centres((plan.tests[test].ball, found) for (test, _), found in centres.items())
+
+
+def chance_of_centres(centres: Iterable[tuple[Ball, Sequence[NDArray[np.float64]]]]) -> float | None:
+    """Return the probability that raw circles lie as near to their commanded centres as these by chance; None where nobody can say.
+
+    A ball lies where CMM and holder leave it: each axis of the centre has at least that standard deviation, and what the machine and noise
+    do comes on top. So a distance r from zero, or less, has a probability of 1 - exp(-r² / (2 sigma²)) at the most. Balls are independent:
+    their probabilities are put together by Fisher's method.
+
+    Args:
+        centres: of each ball with a known place, the centres of its runs, shape (2,) each [mm].
+    """
+    logs = []
+    for ball, found in centres:
+        variance = ball.uncertainty_mm**2 + ball.repeatability_mm**2
+        if not ball.place_known or variance <= 0.0 or not found:
+            continue
+        distance2 = float(np.sum(np.mean(found, axis=0) ** 2))
+        logs.append(np.log(max(-np.expm1(-distance2 / (2.0 * variance)), np.finfo(float).tiny)))
+    if not logs:
+        return None
+    from scipy.stats import chi2  # noqa: PLC0415 - a third of a second for who imports nothing
+
+    return float(chi2.sf(-2.0 * sum(logs), 2 * len(logs)))

@@ -1,0 +1,78 @@
+"""Several runs in one file: where one ends and the next begins."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.trace.cut import LARGEST_GAP_DEG
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.plan.circle import Circle
+
+SMALLEST_RUN_DEG = 90.0
+"""Angles that turn back by less are no new run: an axis that settles, an overshoot, a reading that jitters [deg]."""
+
+
+def longest_pause_s(circles: Sequence[Circle]) -> float:
+    """Return the longest time without a sample that a run may have: a longer one parts two runs [s].
+
+    Args:
+        circles: of the plan; the slowest decides.
+    """
+    return max(LARGEST_GAP_DEG / circle.turning_deg_s for circle in circles)
+
+
+def parts_by_gaps(t_s: NDArray[np.float64] | None, lines: NDArray[np.int64], pause_s: float) -> list[NDArray[np.int64]]:
+    """Return the rows of each run of a file whose runs are parted by pauses, by times that begin anew, or by empty lines.
+
+    Args:
+        t_s: times, shape (n,) [s]; None where the file has none.
+        lines: number of the line of each row, shape (n,).
+        pause_s: as `longest_pause_s` has it.
+    """
+    begins = np.diff(lines) > 1
+    if t_s is not None:
+        steps = np.diff(t_s)
+        begins |= (steps > pause_s) | (steps < 0.0)
+    return _parts(len(lines), np.flatnonzero(begins) + 1)
+
+
+def parts_by_direction(angle_deg: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+    """Return the rows of each run of a file whose angles turn round between its runs.
+
+    A turn back is one of 90 degrees or more; the run ends where the angle is farthest.
+
+    Args:
+        angle_deg: in order of time, shape (n,) [deg].
+    """
+    travelled = np.unwrap(angle_deg, period=FULL_TURN_DEG)
+    ends: list[int] = []
+    low = high = 0
+    sense = 0
+    for k, value in enumerate(travelled.tolist()):
+        high = k if value > travelled[high] else high
+        low = k if value < travelled[low] else low
+        if sense >= 0 and value <= travelled[high] - SMALLEST_RUN_DEG:
+            if sense > 0:
+                ends.append(high)
+            sense, low = -1, k
+        elif sense <= 0 and value >= travelled[low] + SMALLEST_RUN_DEG:
+            if sense < 0:
+                ends.append(low)
+            sense, high = 1, k
+        if sense > 0:
+            low = k
+        elif sense < 0:
+            high = k
+    return _parts(len(travelled), np.array(ends, dtype=np.int64) + 1)
+
+
+def _parts(n: int, begins: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    return [rows for rows in np.split(np.arange(n), begins) if len(rows)]

@@ -10,13 +10,13 @@ from dbbstation.text.digits import with_uncertainty
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.effects import EffectResult
+    from dbbstation.results.effects import CauseContribution
 
 MOST_CAUSES = 4
 """Causes whose circles are listed beside the measured ones; the JSON has all."""
 
 
-def print_effects(effects: Sequence[EffectResult]) -> None:
+def print_effects(effects: Sequence[CauseContribution]) -> None:
     """Print the causes, the greatest first, their cures, and G of every circle as measured and as it would be without each."""
     if not effects:
         echo("\nno cause contributes to these circles")

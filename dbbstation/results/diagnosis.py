@@ -10,7 +10,7 @@ from pydantic import Field
 
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.calibration import OutlierResult
-from dbbstation.results.effects import EffectResult
+from dbbstation.results.effects import CauseContribution
 from dbbstation.results.frame import Framed
 from dbbstation.results.inference import HeldOutGains
 from dbbstation.results.serialise import Absent, AsItIs, Kept, Quantified
@@ -341,5 +341,5 @@ class DiagnosisResult(DiagnosisFigures):
         model: the joint model, to predict and compensate with, or to write to a file.
     """
 
-    effects: tuple[EffectResult, ...]
+    effects: tuple[CauseContribution, ...]
     model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)

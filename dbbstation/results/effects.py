@@ -39,7 +39,7 @@ class CuredRun:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EffectResult:
+class CauseContribution:
     """What one cause contributes, over all runs.
 
     Attributes:
@@ -76,7 +76,7 @@ class EffectResult:
     runs: tuple[CuredRun, ...]
 
 
-def effect_results(effects: Sequence[CauseEffect], verdicts: Mapping[str, str]) -> tuple[EffectResult, ...]:
+def effect_results(effects: Sequence[CauseEffect], verdicts: Mapping[str, str]) -> tuple[CauseContribution, ...]:
     """Return causes in the order of what they contribute.
 
     Args:
@@ -86,9 +86,9 @@ def effect_results(effects: Sequence[CauseEffect], verdicts: Mapping[str, str]) 
     return tuple(_result(one, verdicts.get(one.name, "")) for one in effects)
 
 
-def _result(one: CauseEffect, verdict: str) -> EffectResult:
+def _result(one: CauseEffect, verdict: str) -> CauseContribution:
     count = len(one.circles)
-    return EffectResult(
+    return CauseContribution(
         cause=one.name,
         sources=one.sources,
         verdict=verdict,

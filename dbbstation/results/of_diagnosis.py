@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.findings import Curve, Diagnosis, Location, NextTest, SourceFinding
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.results.effects import EffectResult
+    from dbbstation.results.effects import CauseContribution
 
 
 def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> DiagnosisFigures:
@@ -91,7 +91,7 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
 def diagnosis_result(
     figures: DiagnosisFigures,
     *,
-    effects: tuple[EffectResult, ...],
+    effects: tuple[CauseContribution, ...],
     model: IdentifiedModel,
     drawing: Callable[[object], bytes],
     notes: tuple[str, ...],

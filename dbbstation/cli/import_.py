@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.mapping_options import mapping_options
+from dbbstation.cli.mapping_options import MappingOptions, mapping_options
 from dbbstation.cli.output import echo
 from dbbstation.cli.session_options import noted_options, session_details
 from dbbstation.text.printable import printable
@@ -96,7 +96,6 @@ def import_(
         --ambient-temp-c 20.4 --operator Mori --not-known job --not-known bar --dry-run
     """
     from dbbstation.cli.asking import Asker
-    from dbbstation.cli.mapping_options import MAPPING_OPTIONS
     from dbbstation.errors import OutputError
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.mapping import write_mapping
@@ -104,8 +103,8 @@ def import_(
 
     if out.exists():
         raise OutputError("the session folder exists already", where=str(out), remedy="choose another name")
-    of_mapping = {name: options.pop(name) for name in MAPPING_OPTIONS}
-    remembered: Path | None = of_mapping["mapping_file"]
+    of_mapping = MappingOptions.taken_from(options)
+    remembered = of_mapping.mapping_file
     if remembered is not None and remembered.exists():
         remembered = None
     elif remembered is not None:
@@ -157,7 +156,7 @@ class _Import:
 def _read(
     asker: Asker,
     files: Sequence[Path],
-    of_mapping: Mapping[str, Any],
+    of_mapping: MappingOptions,
     paths: tuple[Path | None, Path | None],
     said: _Told,
     options: dict[str, Any],

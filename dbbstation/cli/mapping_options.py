@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -79,22 +80,40 @@ _OPTIONS = (
     ),
 )
 
-MAPPING_OPTIONS = (
-    "mapping_file",
-    "columns",
-    "angle_zero_deg",
-    "angle_grows",
-    "angle_span_deg",
-    "trace",
-    "split",
-    "zone",
-    "zero_mm",
-    "file_name",
-    "decimal",
-    "separator",
-    "encoding",
-)
-"""Names of the parameters that they fill."""
+
+@dataclass(frozen=True, kw_only=True)
+class MappingOptions:
+    """What was given of these options; None or nothing where an option was not given."""
+
+    mapping_file: Path | None
+    columns: tuple[str, ...]
+    angle_zero_deg: float | None
+    angle_grows: str | None
+    angle_span_deg: float | None
+    trace: str | None
+    split: str | None
+    zone: str | None
+    zero_mm: float | None
+    file_name: str | None
+    decimal: str | None
+    separator: str | None
+    encoding: str | None
+
+    @classmethod
+    def taken_from(cls, options: dict[str, Any]) -> MappingOptions:
+        """Take these options out of all that a command was given."""
+        return cls(**{one.name: options.pop(one.name) for one in fields(cls)})
+
+    @property
+    def kept(self) -> Path | None:
+        """File of the mapping; None where there is none yet."""
+        return self.mapping_file if self.mapping_file is not None and self.mapping_file.exists() else None
+
+    @property
+    def said(self) -> list[str]:
+        """Names of the options that say what a mapping says too, as they are typed."""
+        given = [one.name for one in fields(self)[1:] if getattr(self, one.name) not in (None, ())]
+        return ["--" + ("column" if name == "columns" else name.replace("_", "-")) for name in given]
 
 
 def mapping_options(function: _Function) -> _Function:
@@ -104,7 +123,7 @@ def mapping_options(function: _Function) -> _Function:
     return function
 
 
-def read_tables(files: Sequence[Path], options: Mapping[str, Any]) -> dict[Path, ForeignTable]:
+def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, ForeignTable]:
     """Read all files: as the mapping says where it says how numbers are written, else as the options, else as the shop's settings.
 
     Where nobody says it, it is found by looking. So it is with tables that this program exported, whatever the shop writes.
@@ -116,15 +135,14 @@ def read_tables(files: Sequence[Path], options: Mapping[str, Any]) -> dict[Path,
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.formats.mapping import read_mapping
 
-    decimal, separator = options["decimal"], options["separator"]
+    decimal, separator = options.decimal, options.separator
     language = number_language(decimal, separator) if decimal or separator else None
-    encoding = options["encoding"] or "utf-8"
-    kept = _kept(options)
+    encoding = options.encoding or "utf-8"
+    kept = options.kept
     if kept is not None:
-        also = [name for name in MAPPING_OPTIONS[1:] if options[name] not in (None, ())]
-        if also:
-            said = ", ".join("--" + ("column" if name == "columns" else name.replace("_", "-")) for name in also)
-            raise click.UsageError(f"{options['mapping_file']} says what columns mean: edit it, or leave out {said}")
+        if options.said:
+            also = ", ".join(options.said)
+            raise click.UsageError(f"{options.mapping_file} says what columns mean: edit it, or leave out {also}")
         mapping = read_mapping(kept)
         language, encoding = mapping.numbers, mapping.encoding
     shops = shops_numbers() if language is None else None
@@ -154,9 +172,7 @@ def _read(path: Path, stated: NumberLanguage | None, shops: NumberLanguage | Non
     return read_foreign(path, stated or shops, encoding)
 
 
-def chosen_mapping(
-    tables: Sequence[ForeignTable], options: Mapping[str, Any], asker: Asker
-) -> Callable[[], MappingFile]:
+def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, asker: Asker) -> Callable[[], MappingFile]:
     """Return what gives the mapping once everything was answered: from its file, or from names, options and answers.
 
     Args:
@@ -167,11 +183,11 @@ def chosen_mapping(
     from dbbstation.files.formats.mapping import ANGLE, DEVIATION, UNITS, read_mapping
     from dbbstation.tasks.importing.proposal import EXPORTED, Proposed
 
-    kept = _kept(options)
+    kept = options.kept
     if kept is not None:
         return lambda: read_mapping(kept)
     table = tables[0]
-    columns = _columns(table, options["columns"])
+    columns = _columns(table, options.columns)
     for name, one in columns.items():
         if not one.complete:
             units = list(UNITS[one.means])
@@ -181,26 +197,25 @@ def chosen_mapping(
             columns[name] = Proposed(one.means, unit)
     means = {one.means for one in columns.values()}
     own = set(table.table.names) >= EXPORTED
-    data: dict[str, Any] = {"columns": columns, "trace": options["trace"], "file_name": options["file_name"]}
-    data |= {"split": "column" if "run" in means else options["split"], "zone": options["zone"]}
-    if ANGLE in means:
-        data["angle"] = {"zero_deg": 0.0, "grows": "ccw"} if own else _angle(options, asker)
-        data["angle"] |= {"span_deg": options["angle_span_deg"]}
-    elif not own and options["trace"] is None:
+    trace = options.trace
+    if ANGLE not in means and not own and trace is None:
         question = "the files have no angles: are they the whole run with feed-in and feed-out, or the turn alone"
-        data["trace"] = asker.text(question, "--trace", ["whole", "turn"])
-    if own and options["trace"] is None:
-        data["trace"] = "whole"
-    data["zero_mm"] = options["zero_mm"]
-    if DEVIATION in means and options["zero_mm"] is None:
-        data["zero_mm"] = asker.number("length of the bar at which the deviation is 0 [mm]", "--zero-mm", needed=True)
-    data["encoding"] = options["encoding"]
-    return lambda: _mapping(table, data)
-
-
-def _kept(options: Mapping[str, Any]) -> Path | None:
-    path: Path | None = options["mapping_file"]
-    return path if path is not None and path.exists() else None
+        trace = asker.text(question, "--trace", ["whole", "turn"])
+    angle = _angle(options, asker, own=own) if ANGLE in means else None
+    zero_mm = options.zero_mm
+    if DEVIATION in means and zero_mm is None:
+        zero_mm = asker.number("length of the bar at which the deviation is 0 [mm]", "--zero-mm", needed=True)
+    told = {
+        "columns": columns,
+        "trace": "whole" if own and trace is None else trace,
+        "file_name": options.file_name,
+        "split": "column" if "run" in means else options.split,
+        "zone": options.zone,
+        "angle": angle,
+        "zero_mm": zero_mm,
+        "encoding": options.encoding,
+    }
+    return lambda: _mapping(table, told)
 
 
 def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
@@ -228,16 +243,18 @@ def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
     return {name: told.get(name) or left[name] for name in table.table.names}
 
 
-def _angle(options: Mapping[str, Any], asker: Asker) -> dict[str, Any]:
-    grows = options["angle_grows"] or asker.text(
+def _angle(options: MappingOptions, asker: Asker, *, own: bool) -> dict[str, object]:
+    """Zero, sense and span of the angles; tables that this program exported have angles in the machine."""
+    grows = "ccw" if own else options.angle_grows
+    grows = grows or asker.text(
         "sense in which the files' angles grow, seen from +Z", "--angle-grows", ["ccw", "cw", "travel"]
     )
-    zero = options["angle_zero_deg"]
+    zero = 0.0 if own else options.angle_zero_deg
     if zero is None and grows != "travel":
         zero = asker.number(
             "angle in the machine, from +X to +Y, where the files have 0 [deg]", "--angle-zero-deg", needed=True
         )
-    return {"grows": grows, "zero_deg": zero}
+    return {"grows": grows, "zero_deg": zero, "span_deg": options.angle_span_deg}
 
 
 def _mapping(table: ForeignTable, data: Mapping[str, Any]) -> MappingFile:

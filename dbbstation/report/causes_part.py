@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 from dbbstation.calibration.reporting.prediction import smooth_lengths_mm
 from dbbstation.report.polar import Drawn, polar_of
@@ -58,8 +58,29 @@ def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:
     return tuple(told)
 
 
-def cause_rows(ranked: Ranked, coverage_factor: float) -> list[dict[str, Any]]:
-    """Return the rows of the table of causes, as texts."""
+class CauseRow(NamedTuple):
+    """A row of the table of causes, as texts; pairs are a contribution and its expanded uncertainty."""
+
+    cause: str
+    verdict: str
+    g: tuple[str, str]
+    centre: tuple[str, str]
+    workspace: tuple[str, str]
+    measured: str
+    cured: str
+    cure: str
+    confirm: str
+
+
+class CuredPolar(NamedTuple):
+    """A circle as measured and as it would be without a cause."""
+
+    title: str
+    drawing: Polar
+
+
+def cause_rows(ranked: Ranked, coverage_factor: float) -> list[CauseRow]:
+    """Return the rows of the table of causes."""
     rows = []
     for one in ranked.effects:
         count = len(one.circles)
@@ -72,22 +93,22 @@ def cause_rows(ranked: Ranked, coverage_factor: float) -> list[dict[str, Any]]:
             )
         )
         rows.append(
-            {
-                "cause": one.name,
-                "verdict": (ranked.verdicts or {}).get(one.name, ""),
-                "g": g,
-                "centre": centre,
-                "workspace": space,
-                "measured": f"{sum(c.measured_g_um for c in one.circles) / count:.1f}",
-                "cured": f"{sum(c.cured_g_um for c in one.circles) / count:.1f}",
-                "cure": one.cure,
-                "confirm": one.confirm,
-            }
+            CauseRow(
+                cause=one.name,
+                verdict=(ranked.verdicts or {}).get(one.name, ""),
+                g=g,
+                centre=centre,
+                workspace=space,
+                measured=f"{sum(c.measured_g_um for c in one.circles) / count:.1f}",
+                cured=f"{sum(c.cured_g_um for c in one.circles) / count:.1f}",
+                cure=one.cure,
+                confirm=one.confirm,
+            )
         )
     return rows
 
 
-def cured_polars(ranked: Ranked) -> list[dict[str, Any]]:
+def cured_polars(ranked: Ranked) -> list[CuredPolar]:
     """Return drawings of the circles as measured and as they would be if the first cause were cured."""
     if not ranked.effects:
         return []
@@ -97,10 +118,10 @@ def cured_polars(ranked: Ranked) -> list[dict[str, Any]]:
         of.setdefault(circle.test, circle)
     chosen = sorted(list(of.values())[:MOST_DRAWN], key=lambda one: one.test)
     return [
-        {
-            "title": f"test {one.test} {one.direction.upper()}: G {one.measured_g_um:.1f}, without it {one.cured_g_um:.1f} µm",
-            "drawing": _drawn(one),
-        }
+        CuredPolar(
+            f"test {one.test} {one.direction.upper()}: G {one.measured_g_um:.1f}, without it {one.cured_g_um:.1f} µm",
+            _drawn(one),
+        )
         for one in chosen
     ]
 

@@ -217,7 +217,7 @@ def _once(sessions: Iterator[_Named], telling: Telling) -> list[_Named]:
     return kept
 
 
-def _plain(options: FleetOptions) -> dict[str, Any]:
+def _plain(options: FleetOptions) -> dict[str, object]:
     """Return options as what decides results: files by their content, which stands beside, and settings by their tolerances."""
     data = {key: value for key, value in vars(options).items() if key not in {"source_files", "settings"}}
     return {**data, "tolerances": [asdict(one) for one in options.settings.tolerances]}

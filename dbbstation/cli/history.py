@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,9 +13,7 @@ from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from dbbstation.tasks.history import Historied
+    from dbbstation.results.history import HistoryResult, MachineHistoryResult, QuantityHistory
 
 MOST_NOTES = 12
 """Notes that the terminal shows; `--json` and `--html` have all."""
@@ -65,99 +63,94 @@ def history(
       dbbstation history sessions --html history.html --csv history.csv
       dbbstation history sessions --test a,f --false-alarms 0.0001 --json
     """
-    from dbbstation.cli.output import COVERAGE_FACTOR, print_json, say
+    from dbbstation.cli.output import COVERAGE_FACTOR, print_result, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.shop import shop_settings
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.files.recordings.table_csv import table_csv
-    from dbbstation.history.summary import TIDY, history_summary, tidy_rows
     from dbbstation.history.trend import TrendOptions
-    from dbbstation.tasks.history import load_history
+    from dbbstation.tasks.history import history as history_of
 
     refuse_outputs([page, out], force=force)
     if out is not None:
         refuse_existing_table(out, force=force)
     settings = shop_settings()
     asked = TrendOptions(COVERAGE_FACTOR, settings.tolerances, false_alarms, tests, exclude)
-    with count_bar("sessions") as progress:
-        found = load_history(folder, asked, source_files, rebuild=rebuild, progress=progress)
+    with count_bar("sessions") as counted:
+        found = history_of(
+            folder, asked, source_files, rebuild=rebuild, progress=lambda _text, done=0, of=0: counted(done, of)
+        )
     _say(found)
-    summary = {
-        **history_summary(found.machines, asked),
-        "left_out": [{"name": name, "problem": problem} for name, problem in found.left_out],
-        "notes": list(found.notes),
-    }
     if page is not None:
         from dbbstation.report.history_page import history_html
 
-        write_bytes(page, history_html(summary, provenance(), settings.tolerances_from), force=force)
+        write_bytes(page, history_html(found, provenance(), settings.tolerances_from), force=force)
         say(f"page written to {page}")
     if out is not None:
-        rows = tidy_rows(summary)
-        write_table(out, table_csv(TIDY, list(zip(*rows, strict=True))), provenance(), force=force)
+        rows = found.rows()
+        columns = [["" if row[name] is None else row[name] for row in rows] for name in rows[0]]
+        write_table(out, table_csv(list(rows[0]), columns), provenance(), force=force)
         say(f"table written to {out}")
     if as_json:
-        print_json(summary)
+        print_result(found)
         return
-    for machine in summary["machines"]:
-        _print(machine, summary)
+    for machine in found.machines:
+        _print(machine, found)
 
 
-def _say(found: Historied) -> None:
+def _say(found: HistoryResult) -> None:
     from dbbstation.cli.output import say
 
-    for name, problem in found.left_out:
-        say(f"left out: {name}: {problem}")
-    for note in found.notes[:MOST_NOTES]:
+    for one in found.left_out:
+        say(f"left out: {one.name}: {one.problem}")
+    for note in found.remarks[:MOST_NOTES]:
         say(f"note: {note}")
-    if len(found.notes) > MOST_NOTES:
-        say(f"and {len(found.notes) - MOST_NOTES} more notes, in --json and --html")
+    if len(found.remarks) > MOST_NOTES:
+        say(f"and {len(found.remarks) - MOST_NOTES} more notes, in --json and --html")
 
 
-def _print(machine: Mapping[str, Any], summary: Mapping[str, Any]) -> None:
+def _print(machine: MachineHistoryResult, found: HistoryResult) -> None:
     from dbbstation.cli.output import EXPANDED, print_table
-    from dbbstation.history.words import changes_in_words, headline
+    from dbbstation.report.history_words import changes_in_words, headline
 
-    sessions = machine["sessions"]
-    first, last = (sessions[k]["started"][:10] for k in (0, -1))
-    echo(f"machine {machine['machine']}: {len(sessions)} session{'s' if len(sessions) > 1 else ''}, {first} to {last}")
-    if machine["watched_quantities"]:
-        rate = summary["false_alarms_per_session"]
+    sessions = machine.sessions
+    count = f"{len(sessions)} session{'s' if len(sessions) > 1 else ''}"
+    echo(f"machine {machine.machine}: {count}, {sessions[0].date} to {sessions[-1].date}")
+    if machine.watched_quantities:
         echo(
-            f"{machine['watched_quantities']} quantities are watched; all together they give {rate:g} false alarms per session, "
-            f"{machine['false_alarms_expected']:.2g} over this history"
+            f"{machine.watched_quantities} quantities are watched; all together they give {found.false_alarms_per_session:g} false alarms "
+            f"per session, {machine.false_alarms_expected:.2g} over this history"
         )
-    k = summary["coverage_factor"]
     echo(headline(machine))
-    for line in changes_in_words(machine, k):
+    for line in changes_in_words(machine, found.coverage_factor):
         echo(f"  {line}")
     echo(f"\n{EXPANDED}; level: since the last change")
     titles = ["quantity", "unit", "n", "last", "U", "limit", "", "level", "U", "verdict", "since", "by", "U"]
-    print_table(titles, [_row(one, k) for one in machine["quantities"]])
+    print_table(titles, [_row(one, found.coverage_factor) for one in machine.quantities])
 
 
-def _row(one: Mapping[str, Any], k: float) -> list[object]:
-    from dbbstation.history.words import verdict_in_words
+def _row(one: QuantityHistory, k: float) -> list[object]:
+    from dbbstation.report.history_words import verdict_in_words
 
-    last, event = one["values"][-1], one["events"][-1] if one["events"] else None
+    last, event = one.values[-1], one.events[-1] if one.events else None
     return [
-        one["quantity"],
-        one["unit"],
-        len(one["values"]),
-        *_pair(last["value"], last["u"], k),
-        "-" if one["limit"] is None else f"{one['limit']:g}",
-        one["conformity"] or "",
-        *_pair(one["level"], one["u_level"], k),
+        one.quantity,
+        one.unit,
+        len(one.values),
+        *_pair(last.value, last.u, k),
+        "-" if one.limit is None else f"{one.limit:g}",
+        one.conformity or "",
+        *_pair(one.level, one.u_level, k),
         verdict_in_words(one),
-        "" if event is None else event["since"],
-        *(("", "") if event is None else _pair(event["difference"], event["u_difference"], k)),
+        "" if event is None else event.since,
+        *(("", "") if event is None else _pair(event.difference, event.u_difference, k)),
     ]
 
 
 def _pair(value: float | None, u: float | None, k: float) -> tuple[str, str]:
     """Return a value and its U."""
-    from dbbstation.history.words import rounded
+    from dbbstation.report.history_words import rounded
 
     return rounded(value, u, k), rounded(None if u is None else k * u, u, k)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from dbbstation.history.words import changes_in_words, difference_in_words, headline, verdict_in_words
+from dbbstation.report.history_words import changes_in_words, difference_in_words, headline, verdict_in_words
 from dbbstation.report.html import environment
 from dbbstation.report.polar import step_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from dbbstation.files.provenance import Provenance
+    from dbbstation.results.history import HistoryEvent, HistoryResult, HistoryValue, QuantityHistory
 
 WIDTH, HEIGHT = 560, 190
 """Size of a drawing in its own units."""
@@ -79,30 +80,31 @@ class Drawing:
     words: str
 
 
-def history_html(summary: Mapping[str, Any], provenance: Provenance, tolerances_from: str = "") -> bytes:
+def history_html(history: HistoryResult, provenance: Provenance, tolerances_from: str = "") -> bytes:
     """Return histories as HTML: one file without script that refers to nothing outside it, the same for the same content.
 
     Args:
-        summary: what `history_summary` returns, with `left_out` and `notes`.
+        history: of all machines.
         provenance: where it comes from.
         tolerances_from: file with the shop's tolerances; empty where there is none.
     """
-    k = summary["coverage_factor"]
+    k = history.coverage_factor
     machines = [
         {
-            **machine,
+            "history": machine,
             "ident": f"m{number}",
             "headline": headline(machine),
             "words": list(changes_in_words(machine, k)),
-            "quantities": [{**one, "verdict_words": verdict_in_words(one)} for one in machine["quantities"]],
-            "drawings": [
-                draw(one, f"m{number}q{place}", k) for place, one in enumerate(machine["quantities"], start=1)
+            "rows": [
+                (one, verdict_in_words(one), draw(one, f"m{number}q{place}", k))
+                for place, one in enumerate(machine.quantities, start=1)
             ],
         }
-        for number, machine in enumerate(summary["machines"], start=1)
+        for number, machine in enumerate(history.machines, start=1)
     ]
     content = {
-        **summary,
+        "history": history,
+        "coverage_factor": k,
         "machines": machines,
         "provenance": provenance,
         "tolerances_from": tolerances_from.replace("\\", "/").rpartition("/")[2],
@@ -112,42 +114,41 @@ def history_html(summary: Mapping[str, Any], provenance: Provenance, tolerances_
     return environment().get_template("history.html").render(content).encode()
 
 
-def draw(one: Mapping[str, Any], ident: str, coverage_factor: float) -> Drawing:
+def draw(one: QuantityHistory, ident: str, coverage_factor: float) -> Drawing:
     """Return the drawing of one quantity.
 
     Args:
-        one: a quantity of `history_summary`.
+        one: the quantity, with at least one value.
         ident: of the drawing in the page.
         coverage_factor: k of U = k u.
     """
-    values = one["values"]
-    days = [datetime.fromisoformat(value["started"]).timestamp() / _DAY_S for value in values]
+    values = one.values
+    days = [datetime.fromisoformat(value.started or "").timestamp() / _DAY_S for value in values]
     x = _scale(min(days), max(days), LEFT + 6.0, WIDTH - RIGHT - 6.0)
-    low, high = _reach(values, coverage_factor, one["limit"])
+    low, high = _reach(values, coverage_factor, one.limit)
     y = _scale(low, high, HEIGHT - BOTTOM, TOP)
-    at = {value["session"]: (x(day), y(value["value"])) for day, value in zip(days, values, strict=True)}
+    at = {value.session: (x(day), y(value.value)) for day, value in zip(days, values, strict=True)}
     places = list(at.values())
-    spread = [coverage_factor * (value["u"] or 0.0) for value in values]
-    limit = one["limit"]
-    events = [_event(event, at[event["found"]], one["unit"], coverage_factor) for event in one["events"]]
+    spread = [coverage_factor * (value.u or 0.0) for value in values]
+    limit = one.limit
     return Drawing(
-        name=one["quantity"],
+        name=one.quantity,
         ident=ident,
         points=" ".join(f"M{px:.1f} {py:.1f}h0" for px, py in places),
         bars=" ".join(
-            f"M{px:.1f} {y(v['value'] - s):.1f}V{y(v['value'] + s):.1f}"
+            f"M{px:.1f} {y(v.value - s):.1f}V{y(v.value + s):.1f}"
             for (px, _), v, s in zip(places, values, spread, strict=True)
         ),
-        levels=" ".join(_levels(one, at, y)),
+        levels=" ".join(_levels(values, at, y)),
         limits=tuple(round(y(side), 1) for side in (() if limit is None else (limit, -limit)) if low <= side <= high),
         dates=tuple(_dates(values, days, x)),
         heights=tuple(_heights(low, high, y)),
-        events=tuple(events),
-        words=f"{one['quantity']} over {len(values)} sessions: {one['verdict']}",
+        events=tuple(_event(event, at[event.found], one.unit, coverage_factor) for event in one.events),
+        words=f"{one.quantity} over {len(values)} sessions: {one.verdict}",
     )
 
 
-def _scale(low: float, high: float, start: float, end: float) -> Any:  # noqa: ANN401 - a function of one number
+def _scale(low: float, high: float, start: float, end: float) -> Callable[[float], float]:
     span = high - low
 
     def place(value: float) -> float:
@@ -156,10 +157,10 @@ def _scale(low: float, high: float, start: float, end: float) -> Any:  # noqa: A
     return place
 
 
-def _reach(values: Sequence[Mapping[str, Any]], k: float, limit: float | None) -> tuple[float, float]:
+def _reach(values: Sequence[HistoryValue], k: float, limit: float | None) -> tuple[float, float]:
     """Return lowest and highest value of a field: all values with their U, and a limit that is not far from them."""
-    low = min(value["value"] - k * (value["u"] or 0.0) for value in values)
-    high = max(value["value"] + k * (value["u"] or 0.0) for value in values)
+    low = min(value.value - k * (value.u or 0.0) for value in values)
+    high = max(value.value + k * (value.u or 0.0) for value in values)
     span = (high - low) or abs(high) or 1.0
     for side in () if limit is None else (limit, -limit):
         if low - span <= side <= high + span:
@@ -168,32 +169,34 @@ def _reach(values: Sequence[Mapping[str, Any]], k: float, limit: float | None) -
     return low - room, high + room
 
 
-def _levels(one: Mapping[str, Any], at: Mapping[str, tuple[float, float]], y: Any) -> Iterable[str]:  # noqa: ANN401 - as above
+def _levels(
+    values: Sequence[HistoryValue], at: Mapping[str, tuple[float, float]], y: Callable[[float], float]
+) -> Iterable[str]:
     """Yield a stroke for each stretch with one level."""
     stretch: list[tuple[float, float]] = []
-    for value in (*one["values"], {"session": "", "level": None}):
-        level = value["level"]
+    for session, level in (*((value.session, value.level) for value in values), ("", None)):
         if stretch and (level is None or level != stretch[0][1]):
             yield f"M{stretch[0][0] - 3:.1f} {y(stretch[0][1]):.1f}H{stretch[-1][0] + 3:.1f}"
             stretch = []
         if level is not None:
-            stretch.append((at[value["session"]][0], level))
+            stretch.append((at[session][0], level))
 
 
-def _dates(values: Sequence[Mapping[str, Any]], days: Sequence[float], x: Any) -> Iterable[TrendMark]:  # noqa: ANN401 - as above
-    first, last = values[0]["started"][:10], values[-1]["started"][:10]
+def _dates(values: Sequence[HistoryValue], days: Sequence[float], x: Callable[[float], float]) -> Iterable[TrendMark]:
+    begins = values[0].started or ""
+    first, last = begins[:10], (values[-1].started or "")[:10]
     if days[-1] - days[0] < _FEW_DAYS:
         yield TrendMark(round(x(days[0]), 1), first)
         if last != first:
             yield TrendMark(round(x(days[-1]), 1), last)
         return
-    zone = datetime.fromisoformat(values[0]["started"]).tzinfo
+    zone = datetime.fromisoformat(begins).tzinfo
     years = range(int(first[:4]) + 1, int(last[:4]) + 1)
     for year in years[:: 1 + len(years) // _MOST_YEARS]:
         yield TrendMark(round(x(datetime(year, 1, 1, tzinfo=zone).timestamp() / _DAY_S), 1), str(year))
 
 
-def _heights(low: float, high: float, y: Any) -> Iterable[TrendMark]:  # noqa: ANN401 - as above
+def _heights(low: float, high: float, y: Callable[[float], float]) -> Iterable[TrendMark]:
     span = high - low
     step = step_of(span / _DIVISIONS) if span > 0.01 else span / 2.0 or 1.0  # noqa: PLR2004 - what `step_of` tells apart
     tick = -(-low // step) * step
@@ -202,7 +205,7 @@ def _heights(low: float, high: float, y: Any) -> Iterable[TrendMark]:  # noqa: A
         tick += step
 
 
-def _event(event: Mapping[str, Any], at: tuple[float, float], unit: str, coverage_factor: float) -> TrendMark:
-    difference = difference_in_words({**event, "unit": unit}, coverage_factor)
-    words = f"{event['verdict']} since {event['since']}, seen in {event['found']}: {difference}"
-    return TrendMark(round(at[0], 1), words, event["verdict"].split()[0], round(at[1], 1))
+def _event(event: HistoryEvent, at: tuple[float, float], unit: str, coverage_factor: float) -> TrendMark:
+    difference = difference_in_words(event.difference, event.u_difference, unit, coverage_factor)
+    words = f"{event.verdict} since {event.since}, seen in {event.found}: {difference}"
+    return TrendMark(round(at[0], 1), words, event.verdict.split()[0], round(at[1], 1))

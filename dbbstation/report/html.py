@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import jinja2
 
-from dbbstation.history.words import DASH, rounded
+from dbbstation.report.history_words import DASH, rounded
 from dbbstation.text.digits import with_uncertainty
 
 if TYPE_CHECKING:

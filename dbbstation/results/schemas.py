@@ -11,6 +11,7 @@ from dbbstation.results.diagnosis import DiagnosisResult
 from dbbstation.results.drive import DriveResult
 from dbbstation.results.evaluation import EvaluationResult
 from dbbstation.results.fleet import FleetResult
+from dbbstation.results.history import HistoryResult
 from dbbstation.results.mismatch import MismatchResult
 from dbbstation.results.prediction import PredictionResult
 from dbbstation.results.programs import ProgramsResult
@@ -24,8 +25,9 @@ RESULTS: dict[str, type] = {
     "diagnose": DiagnosisResult,
     "drive": DriveResult,
     "evaluate": EvaluationResult,
-    "mismatch": MismatchResult,
     "fleet": FleetResult,
+    "history": HistoryResult,
+    "mismatch": MismatchResult,
     "predict": PredictionResult,
     "program": ProgramsResult,
 }

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,8 @@ class Quantified:
     unit: str
 
 
+_Kind = TypeVar("_Kind")
+
 _ADAPTERS: dict[Any, TypeAdapter[Any]] = {}
 """Made once for each class: that takes milliseconds."""
 
@@ -90,3 +92,17 @@ def json_of(result: object, indent: int | None = 1) -> str:
 def schema_of(kind: type) -> dict[str, Any]:
     """Return the JSON Schema of a result's class."""
     return _adapter(kind).json_schema(mode="serialization", by_alias=True)
+
+
+def read_json(kind: type[_Kind], text: str | bytes) -> _Kind:
+    """Return what `json_of` wrote of a frozen dataclass whose keys are its fields' names.
+
+    Args:
+        kind: the class.
+        text: JSON.
+
+    Raises:
+        ValueError: the text is no JSON, or not of this class.
+    """
+    found: _Kind = _adapter(kind).validate_json(text)
+    return found

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.computing.processes import each
 from dbbstation.errors import InputError, Problem, StationError
@@ -19,42 +19,34 @@ from dbbstation.files.recordings.anchors import SHORTEST, links_of
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.history.order import date_faults
-from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
+from dbbstation.history.record import ModelFigures, SessionFigures
 from dbbstation.history.trend import histories
+from dbbstation.results.of_history import history_result
+from dbbstation.results.serialise import json_of, read_json
+from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
-    from pathlib import Path
+    from os import PathLike
 
-    from dbbstation.history.trend import MachineHistory, TrendOptions
+    from dbbstation.history.trend import TrendOptions
+    from dbbstation.results.history import HistoryResult
+    from dbbstation.tasks.telling import Progress
 
-
-@dataclass(frozen=True)
-class Historied:
-    """Histories of a folder.
-
-    Attributes:
-        machines: one for each machine.
-        left_out: sessions and models that could not be read, by name, with the reason.
-        notes: remarks on sessions.
-        worked_out: sessions and models that were read now; the others came from the index.
-    """
-
-    machines: tuple[MachineHistory, ...]
-    left_out: tuple[tuple[str, str], ...]
-    notes: tuple[str, ...]
-    worked_out: int
+READING = "reading sessions"
+"""The stage that is counted."""
 
 
-def load_history(
-    folder: Path,
+def history(
+    folder: str | PathLike[str],
     asked: TrendOptions,
     source_files: Sequence[Path] = (),
     *,
     rebuild: bool = False,
     now: datetime | None = None,
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
-) -> Historied:
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+) -> HistoryResult:
     """Return the histories of all machines whose sessions lie in a folder, at most four folders deep.
 
     A session is read where its session file has another time or size than in the index, and another content than any that is
@@ -66,22 +58,30 @@ def load_history(
         source_files: with error sources of models.
         rebuild: read everything anew.
         now: the time; None: the clock's.
-        progress: called with how many of how many files are done.
+        progress: told how many of how many files are done.
+        stop: asked after each file whether to stop.
 
     Raises:
         InputError: there is no session in it, or none that can be used; a test that none of them has.
+        StoppedError: `stop` returned True; what was read until then is in the index.
     """
+    folder = Path(folder)
+    counted = Telling(progress, stop).counted(READING)
     found = files_of(folder)
     with Kept(folder, begin_anew=rebuild) as kept:
-        reading = _Reading(kept, progress, len(found.sessions) + len(found.models))
-        sessions = reading.every(found.sessions, _session_of, _session_data, _processes_for)
-        models = reading.every(found.models, model_from, partial(_model_data, source_files=tuple(source_files)))
+        reading = _Reading(kept, counted, len(found.sessions) + len(found.models))
+        sessions = [
+            replace(one, name=_called(name))
+            for name, one in reading.every(found.sessions, SessionFigures, _session_data, _processes_for).items()
+        ]
+        work = partial(_model_data, source_files=tuple(source_files))
+        models = [replace(one, file=name) for name, one in reading.every(found.models, ModelFigures, work).items()]
         kept.drop_others([*found.sessions, *found.models])
         moment = now or datetime.now(UTC)
         folders = {_called(name): path.parent for name, path in found.sessions.items()}
         seals = [note for one in sessions if (note := _seal_note(kept, folders[one.name], one, moment))]
         notes = [*([kept.problem] if kept.problem else []), *seals]
-    progress(reading.of, reading.of)
+    counted(reading.of, reading.of)
     sessions, alike = _once(sessions)
     dated = [one for one in sessions if one.started is not None]
     left_out = [*found.closed, *reading.left_out] + [
@@ -100,7 +100,7 @@ def load_history(
     for machine in machines:
         notes += date_faults(machine.sessions, now or datetime.now(UTC))
         notes += _gathered(machine.sessions)
-    return Historied(machines, tuple(left_out), tuple(notes), reading.worked_out)
+    return history_result(machines, asked, left_out, notes, reading.worked_out)
 
 
 def _seal_note(kept: Kept, folder: Path, one: SessionFigures, moment: datetime) -> str:
@@ -130,6 +130,13 @@ class _File:
     stamp: Stamp
 
 
+@dataclass(frozen=True)
+class _Unreadable:
+    """Why a file cannot be read."""
+
+    reason: str
+
+
 class _Reading:
     """Reads sessions and models, from the index where it knows them.
 
@@ -150,16 +157,16 @@ class _Reading:
     def every(
         self,
         files: Mapping[str, Path],
-        taken: Callable[[dict[str, Any], str], _Kind],
-        work: Callable[[Path], dict[str, Any] | str],
+        kind: type[_Kind],
+        work: Callable[[Path], _Kind | _Unreadable],
         processes: Callable[[Sequence[Path]], int] = lambda _paths: 1,
-    ) -> list[_Kind]:
-        """Return the figures of all files that can be read, in their order.
+    ) -> dict[str, _Kind]:
+        """Return the figures of all files that can be read by their names, in their order; the name in them may be another.
 
         Args:
             files: by name.
-            taken: makes figures of what is kept, and of a file's name.
-            work: works out what is kept, or says why it cannot.
+            kind: class of the figures.
+            work: works them out, or says why it cannot.
             processes: how many to work such files out with.
         """
         found: dict[str, _Kind] = {}
@@ -168,11 +175,11 @@ class _Reading:
         for name, path in files.items():
             try:
                 file = _File(name, path, stamp_of(path))
-                one = _understood(self._kept.of(name, file.stamp), taken, name)
+                one = _understood(kind, self._kept.of(name, file.stamp))
                 if one is None:
                     digest = digest_of(path)
                     text = self._kept.of_content(digest)
-                    one = _understood(text, taken, name)
+                    one = _understood(kind, text)
                     if text is None or one is None:
                         unknown.setdefault(digest, []).append(file)
                         continue
@@ -187,17 +194,16 @@ class _Reading:
                 digest = digests[place]
                 self.worked_out += 1
                 for file in unknown[digest]:
-                    if isinstance(outcome, str):
-                        reasons[file.name] = outcome
+                    if isinstance(outcome, _Unreadable):
+                        reasons[file.name] = outcome.reason
                     else:
-                        text = json.dumps({**outcome, "sha256": digest}, allow_nan=False)
-                        found[file.name] = taken(json.loads(text), file.name)
-                        self._kept.keep(file.name, file.stamp, digest, text)
+                        found[file.name] = replace(outcome, sha256=digest)
+                        self._kept.keep(file.name, file.stamp, digest, json_of(found[file.name], indent=None))
                     self._count()
         self.left_out += [(_called(name), reasons[name]) for name in files if name in reasons]
         for name in (name for name in files if name in found):
             note_known(files[name], found[name].sha256)
-        return [found[name] for name in files if name in found]
+        return {name: found[name] for name in files if name in found}
 
     def _count(self) -> None:
         self._done += 1
@@ -214,26 +220,24 @@ def _processes_for(sessions: Sequence[Path]) -> int:
     return min(os.cpu_count() or 1, len(sessions)) if runs >= RUNS_WORTH_PROCESSES else 1
 
 
-def _session_data(path: Path) -> dict[str, Any] | str:
+def _session_data(path: Path) -> SessionFigures | _Unreadable:
     """Return what is kept of a session, or why it cannot be read."""
     from dbbstation.tasks.session_figures import session_figures  # noqa: PLC0415 - whoever opens an index does not wait for the compiler
 
     try:
-        data = asdict(session_figures(path.parent))
+        return session_figures(path.parent)
     except (StationError, OSError) as error:
-        return _why(error)
-    data["started"] = None if data["started"] is None else data["started"].isoformat()
-    return data
+        return _Unreadable(_why(error))
 
 
-def _model_data(path: Path, source_files: Sequence[Path]) -> dict[str, Any] | str:
+def _model_data(path: Path, source_files: Sequence[Path]) -> ModelFigures | _Unreadable:
     """Return what is kept of a model, or why it cannot be read."""
     from dbbstation.tasks.session_figures import model_figures  # noqa: PLC0415 - the same
 
     try:
-        return asdict(model_figures(path, source_files))
+        return model_figures(path, source_files)
     except (StationError, OSError) as error:
-        return _why(error)
+        return _Unreadable(_why(error))
 
 
 def _why(error: StationError | OSError) -> str:
@@ -245,15 +249,11 @@ def _called(name: str) -> str:
     return name.removesuffix(f"/{SESSION_FILE}")
 
 
-def _session_of(data: dict[str, Any], name: str) -> SessionFigures:
-    return session_from(data, _called(name))
-
-
-def _understood(text: str | None, taken: Callable[[dict[str, Any], str], _Kind], name: str) -> _Kind | None:
+def _understood(kind: type[_Kind], text: str | None) -> _Kind | None:
     """Return what a kept text says; None where there is none, or where somebody else wrote it."""
     try:
-        return None if text is None else taken(json.loads(text), name)
-    except (AttributeError, KeyError, TypeError, ValueError):
+        return None if text is None else read_json(kind, text)
+    except ValueError:
         return None
 
 
@@ -261,36 +261,6 @@ def _first_of(error: StationError) -> str:
     """Return what is wrong on one line; of many faults the first, and how many more there are."""
     lines = str(error).splitlines()
     return lines[0] + (f" (and {len(lines) - 1} more)" if len(lines) > 1 else "")
-
-
-def session_from(data: dict[str, Any], folder: str) -> SessionFigures:
-    """Return a session as the index keeps it, under the name that it has now.
-
-    Raises:
-        KeyError, TypeError, ValueError: it is none.
-    """
-    return SessionFigures(
-        name=folder,
-        sha256=data["sha256"],
-        machine=data["machine"],
-        started=None if data["started"] is None else datetime.fromisoformat(data["started"]),
-        runs=tuple(
-            RunFigures(
-                run["test"], run["direction"], run["circle"], tuple(Figure(**figure) for figure in run["figures"])
-            )
-            for run in data["runs"]
-        ),
-        bar=data["bar"],
-        programs=data["programs"],
-        notes=tuple(data["notes"]),
-        anchor=data["anchor"],
-    )
-
-
-def model_from(data: dict[str, Any], name: str) -> ModelFigures:
-    """Return a model as the index keeps it, under the name that it has now; errors as of `session_from`."""
-    parameters = tuple(ModelParameter(**parameter) for parameter in data["parameters"])
-    return ModelFigures(name, data["sha256"], dict(data["sessions"]), parameters)
 
 
 MOST_NAMED = 3

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
+from dbbstation.results.schemas import RESULTS
 from tests.cli.golden_json import GOLDEN, keys_of, lines_of, without_place
+from tests.cli.json_schema import faults
 
 
 @pytest.fixture(scope="module")
@@ -21,6 +25,13 @@ def test_every_command_prints_the_keys_that_others_rely_on(printed):
     assert sorted(found) == sorted(path.stem for path in GOLDEN.glob("*.txt"))
     for name, keys in found.items():
         assert keys.splitlines() == (GOLDEN / f"{name}.txt").read_text(encoding="utf-8").splitlines(), name
+
+
+@pytest.mark.slow
+def test_every_command_prints_what_its_schema_says(printed, run):
+    schemas = {name: json.loads(run("check", "--schema", name).out) for name in sorted(set(RESULTS) & set(printed))}
+    found = {name: faults(printed[name].data, schema, schema.get("$defs", {})) for name, schema in schemas.items()}
+    assert found == {name: [] for name in schemas}
 
 
 def test_a_key_that_is_renamed_is_noticed():

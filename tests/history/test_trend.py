@@ -8,10 +8,10 @@ import pytest
 
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.history.run_length import average_run_length
-from dbbstation.history.summary import history_summary, tidy_rows
 from dbbstation.history.trend import TrendOptions, histories
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
+from dbbstation.results.of_history import history_result
 
 ASKED = TrendOptions(2.0)
 
@@ -89,8 +89,8 @@ def test_the_smallest_limit_that_holds_counts():
     sessions = [session(0, run(), run(direction="cw"), run(test="b", g=11.0))]
     (machine,) = histories(sessions, {}, TrendOptions(2.0, tolerances))
     assert [trend(machine, f"G {name}").limit for name in ("a ccw", "a cw", "b ccw")] == [12.5, 20.0, 20.0]
-    summary = history_summary([machine], TrendOptions(2.0, tolerances))
-    said = {one["quantity"]: one["conformity"] for one in summary["machines"][0]["quantities"]}
+    result = history_result([machine], TrendOptions(2.0, tolerances))
+    said = {one.quantity: one.conformity for one in result.machines[0].quantities}
     assert (said["G a ccw"], said["X a ccw"]) == ("within", None)
 
 
@@ -100,14 +100,14 @@ def test_what_else_is_new_stands_beside_a_change():
         session(k, run(g=10.0 + scatter[k] + 9.0 * (k >= 20)), bar="old" if k < 20 else "new", programs="p" * (k >= 20))
         for k in range(30)
     ]
-    summary = history_summary(histories(sessions, {}, ASKED), ASKED)
-    (change,) = summary["machines"][0]["changes"]
-    assert change["since"]["name"] == "w20"
-    assert change["beside"] == ["another bar, new after old", "compensated programs from here"]
-    assert [one["quantity"] for one in change["quantities"]] == ["G a ccw"]
-    rows = tidy_rows(summary)
+    result = history_result(histories(sessions, {}, ASKED), ASKED)
+    (change,) = result.machines[0].changes
+    assert change.since.name == "w20"
+    assert change.beside == ("another bar, new after old", "compensated programs from here")
+    assert [one.quantity for one in change.quantities] == ["G a ccw"]
+    rows = result.rows()
     assert len(rows) == 90
-    assert [row[7] for row in rows if row[-1] == "changed"] == [change["found"]["name"]]
+    assert [row["session"] for row in rows if row["event"] == "changed"] == [change.found.name]
 
 
 def test_tests_can_be_chosen():

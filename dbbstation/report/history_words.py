@@ -1,0 +1,99 @@
+"""What terminal and page say of a history."""
+
+from __future__ import annotations
+
+from collections import Counter
+from math import floor, log10
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dbbstation.results.history import ChangedQuantity, MachineHistoryResult, QuantityHistory
+
+MOST_NAMED = 5
+"""Quantities of one change that are named in words; the table has all."""
+
+_COARSE = 0.1
+"""U from which on one decimal is enough: the micrometre's tenth, as in every other table."""
+
+DASH = "–"
+"""Stands where there is no number."""
+
+
+def rounded(value: float | None, u: float | None, coverage_factor: float) -> str:
+    """Return a number with as many decimals as its uncertainty gives a meaning: one, or two digits of a smaller U.
+
+    Args:
+        value: the number.
+        u: its standard uncertainty; None where not known.
+        coverage_factor: k of U = k u.
+    """
+    if value is None:
+        return DASH
+    if not u:
+        return f"{value:.4g}"
+    expanded = coverage_factor * u
+    decimals = 1 if expanded >= _COARSE else 1 - floor(log10(expanded))
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+
+
+def verdict_in_words(one: QuantityHistory) -> str:
+    """Return the verdict of a quantity, with what it lacks."""
+    if one.why_not:
+        return one.why_not if one.limit is not None or one.figure == "C" else f"{one.verdict}: {one.why_not}"
+    lacking = one.sessions_lacking
+    if not one.watched_sessions:
+        more = (lacking or 0) + 1
+        return f"{one.verdict}: needs {more} more session{'s' if more > 1 else ''}"
+    by = ", by stated U" if one.decided_by == "stated-uncertainty" else ""
+    return one.verdict + by + (f", watched again after {lacking} more" if lacking else "")
+
+
+def headline(machine: MachineHistoryResult) -> str:
+    """Return how many changes a machine shows, in one line."""
+    if not machine.changes:
+        if any(one.watched_sessions for one in machine.quantities):
+            return "Nothing changed beyond scatter and uncertainty"
+        return "Cannot tell whether anything changed: there is one session of each quantity"
+    counts = Counter(change.verdict for change in machine.changes)
+    changed, single = counts["changed"], counts["stands out"]
+    counted = [f"{changed} change{'s' if changed > 1 else ''}"] if changed else []
+    counted += [f"{single} session{'s stand' if single > 1 else ' stands'} out"] if single else []
+    return ", ".join(counted)
+
+
+def changes_in_words(machine: MachineHistoryResult, coverage_factor: float) -> Iterator[str]:
+    """Yield what changed on a machine: one line for each session that showed something, with its largest quantities.
+
+    Args:
+        machine: its history.
+        coverage_factor: k of U = k u.
+    """
+    for change in machine.changes:
+        found, since = change.found, change.since
+        when = f"{found.name} ({found.date})"
+        where = "" if since.name == found.name else f", since {since.name} ({since.date})"
+        beside = f"; {', '.join(change.beside)}" if change.beside else ""
+        sizes = [f"{one.quantity} {changed_in_words(one, coverage_factor)}" for one in change.quantities[:MOST_NAMED]]
+        more = len(change.quantities) - MOST_NAMED
+        yield f"{change.verdict}: {when}{where}{beside}: {', '.join(sizes)}" + (f" and {more} more" if more > 0 else "")
+
+
+def changed_in_words(one: ChangedQuantity, coverage_factor: float) -> str:
+    """Return a difference with its sign, U and unit."""
+    return difference_in_words(one.difference, one.u_difference, one.unit, coverage_factor)
+
+
+def difference_in_words(difference: float, u: float, unit: str, coverage_factor: float) -> str:
+    """Return a difference with its sign, U and unit.
+
+    Args:
+        difference: in `unit`.
+        u: its standard uncertainty.
+        unit: of both.
+        coverage_factor: k of U = k u.
+    """
+    value = rounded(difference, u, coverage_factor)
+    sign = "" if value.startswith("-") else "+"
+    return f"{sign}{value} {unit} (U {rounded(coverage_factor * u, u, coverage_factor)})"

@@ -1,0 +1,188 @@
+"""From worked-out histories to their result."""
+
+from __future__ import annotations
+
+from collections import Counter
+from math import isfinite
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.history.standardised import BASELINE
+from dbbstation.quality.conformity import Size, conformity
+from dbbstation.results.history import (
+    ChangedQuantity,
+    HistoryChange,
+    HistoryEvent,
+    HistoryResult,
+    HistorySession,
+    HistoryValue,
+    LeftOut,
+    MachineHistoryResult,
+    QuantityHistory,
+    WatchLimits,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.history.record import SessionFigures
+    from dbbstation.history.trend import MachineHistory, Trend, TrendOptions
+    from dbbstation.history.watch import TrendEvent, TrendVerdict
+
+FIGURES = {
+    "G": "circular deviation, readings up to 30 undulations per revolution [ISO 230-4]",
+    "X": "centre less the commanded one, along X",
+    "Y": "centre less the commanded one, along Y",
+    "R": "mean length of the bar less its nominal one",
+    "C": "distance of the centre from the commanded one",
+}
+"""What the figures of circles mean."""
+
+
+DECIDED_BY = {True: "stated-uncertainty", False: "control-chart"}
+"""What a verdict rests on: the stated uncertainties alone, or a chart that knows how the sessions scatter."""
+
+
+def history_result(
+    machines: Sequence[MachineHistory],
+    asked: TrendOptions,
+    left_out: Sequence[tuple[str, str]] = (),
+    remarks: Sequence[str] = (),
+    worked_out: int = 0,
+) -> HistoryResult:
+    """Return histories as a result.
+
+    Args:
+        machines: their histories.
+        asked: how they were worked out.
+        left_out: sessions and models that could not be used, by name, with the reason.
+        remarks: on sessions.
+        worked_out: sessions and models that were read now.
+    """
+    return HistoryResult(
+        coverage_factor=asked.coverage_factor,
+        false_alarms_per_session=asked.false_alarms,
+        baseline_sessions=BASELINE,
+        figures=FIGURES,
+        machines=tuple(_machine(one, asked.coverage_factor) for one in machines),
+        left_out=tuple(LeftOut(name, problem) for name, problem in left_out),
+        remarks=tuple(remarks),
+        worked_out=worked_out,
+    )
+
+
+def _machine(one: MachineHistory, coverage_factor: float) -> MachineHistoryResult:
+    sessions = [_session(session) for session in one.sessions]
+    chart = one.chart
+    return MachineHistoryResult(
+        machine=one.machine,
+        sessions=tuple(sessions),
+        watched_quantities=sum(trend.watched is not None for trend in one.trends),
+        chart=None if chart is None else WatchLimits(chart.reference, chart.interval, chart.single),
+        false_alarms_expected=one.expected,
+        verdicts={str(verdict): count for verdict, count in sorted(Counter(t.verdict for t in one.trends).items())},
+        changes=tuple(_changes(one, sessions)),
+        quantities=tuple(_quantity(trend, sessions, coverage_factor) for trend in one.trends),
+    )
+
+
+def _session(session: SessionFigures) -> HistorySession:
+    started = None if session.started is None else session.started.isoformat()
+    return HistorySession(session.name, started, session.sha256)
+
+
+def _changes(one: MachineHistory, sessions: Sequence[HistorySession]) -> Iterator[HistoryChange]:
+    """Yield what changed, by the session that showed it and the one from which it is so."""
+    found: dict[tuple[int, int, TrendVerdict], list[tuple[Trend, TrendEvent]]] = {}
+    for trend in one.trends:
+        for event in () if trend.watched is None else trend.watched.events:
+            key = (int(trend.at[event.found]), int(trend.at[event.since]), event.verdict)
+            found.setdefault(key, []).append((trend, event))
+    for (shown, since, verdict), events in sorted(found.items()):
+        sizes = sorted(events, key=lambda pair: -abs(pair[1].difference) / pair[1].u_difference)
+        yield HistoryChange(
+            verdict=str(verdict),
+            since=sessions[since],
+            found=sessions[shown],
+            beside=tuple(_beside(one.sessions, since)),
+            quantities=tuple(
+                ChangedQuantity(trend.label, event.difference, event.u_difference, trend.subject.unit)
+                for trend, event in sizes
+            ),
+        )
+
+
+def _beside(sessions: Sequence[SessionFigures], since: int) -> Iterator[str]:
+    """Yield what else is new in a session, where it may be why something changed."""
+    if not since:
+        return
+    before, after = sessions[since - 1], sessions[since]
+    if before.bar != after.bar:
+        yield f"another bar, {after.bar or 'not noted'} after {before.bar or 'not noted'}"
+    if before.programs != after.programs:
+        yield (
+            "other programs"
+            if after.programs and before.programs
+            else ("compensated programs from here" if after.programs else "programs of the plan from here")
+        )
+
+
+def _quantity(trend: Trend, sessions: Sequence[HistorySession], coverage_factor: float) -> QuantityHistory:
+    watched, limit = trend.watched, trend.limit
+    last = Size(abs(float(trend.values[-1])), float(np.nan_to_num(trend.u[-1])))
+    beyond = np.abs(trend.values) - coverage_factor * np.nan_to_num(trend.u)
+    return QuantityHistory(
+        quantity=trend.label,
+        figure=trend.subject.figure,
+        test=trend.subject.test or None,
+        direction=trend.subject.direction or None,
+        of=trend.subject.of,
+        unit=trend.subject.unit,
+        verdict=str(trend.verdict),
+        why_not=trend.why_not or None,
+        limit=limit,
+        conformity=None if limit is None else str(conformity(last, limit, coverage_factor)),
+        exceeded_sessions=None if limit is None else int(np.sum(beyond > limit)),
+        level=None if watched is None else _number(watched.level[-1]),
+        u_level=None if watched is None else _number(watched.u_level[-1]),
+        scatter_in_u=None if watched is None else _number(watched.scatter),
+        sessions_lacking=None if watched is None else watched.lacking,
+        decided_by=None if watched is None or not watched.watched else DECIDED_BY[watched.by_stated],
+        watched_sessions=0 if watched is None else watched.watched,
+        events=() if watched is None else tuple(_event(event, trend, sessions) for event in watched.events),
+        values=tuple(_values(trend, sessions)),
+    )
+
+
+def _event(event: TrendEvent, trend: Trend, sessions: Sequence[HistorySession]) -> HistoryEvent:
+    return HistoryEvent(
+        verdict=str(event.verdict),
+        since=sessions[trend.at[event.since]].name,
+        found=sessions[trend.at[event.found]].name,
+        difference=event.difference,
+        u_difference=event.u_difference,
+        decided_by=DECIDED_BY[event.by_stated],
+    )
+
+
+def _values(trend: Trend, sessions: Sequence[HistorySession]) -> Iterator[HistoryValue]:
+    """Yield every value of a trend with what the chart made of it."""
+    watched = trend.watched
+    none: list[float | None] = [None] * len(trend.at)
+    charted = (
+        [none] * 4 if watched is None else [_numbers(c) for c in (watched.level, watched.z, watched.high, watched.low)]
+    )
+    columns = (trend.at.tolist(), trend.values.tolist(), _numbers(trend.u), *charted)
+    for k, value, u, level, z, high, low in zip(*columns, strict=True):
+        yield HistoryValue(sessions[k].name, sessions[k].started, value, u, level, z, high, low)
+
+
+def _numbers(values: NDArray[np.float64]) -> list[float | None]:
+    return [value if isfinite(value) else None for value in values.tolist()]
+
+
+def _number(value: float) -> float | None:
+    return float(value) if isfinite(value) else None

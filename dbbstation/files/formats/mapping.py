@@ -141,7 +141,7 @@ class MappingFile(Schema):
     """Of files with several runs: parted by a `column` that is `run`, by `gaps` (pauses, times that begin anew, empty lines), or where the
     angles change their `direction`; absent: by columns that say test, direction and repeat, else a file is one run."""
     zone: Annotated[str, AfterValidator(_zone)] | None = None
-    """Time zone of dates that have none, such as `+01:00` or `Europe/Berlin`; absent: that of the computer that imports."""
+    """Time zone of dates that have none, such as `Europe/Berlin` or hours and minutes from UTC. Where it is absent, that of the computer that imports."""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -48,6 +48,25 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
     )
 
 
+def identity(session: SessionFolder) -> tuple[tuple[str, str], ...]:
+    """Return in a few words what a first page has to say of a session: machine, operator, bar, temperature, seal."""
+    bar = session.bar
+    when = bar is not None and bar.calibrated is not None
+    calibrated = f", calibrated {bar.calibrated:%Y-%m-%d}" if bar is not None and bar.calibrated is not None else ""
+    at = f" at {_degc(bar.temp_c)}" if when and bar is not None and bar.temp_c is not None else ""
+    return (
+        ("machine no.", session.serial_number or _NOT_NOTED),
+        ("operator", session.operator or _NOT_NOTED),
+        ("bar", _NOT_NOTED if bar is None else f"{bar.serial_number or 'without number'}{calibrated}{at}"),
+        ("shop", _shop(session)),
+        ("seal", "none" if session.seal is None else f"anchor {(anchor_of(session.seal) or 'none')[:ANCHOR_SHOWN]}"),
+    )
+
+
+ANCHOR_SHOWN = 16
+"""Digits of an anchor on the first page; the conditions have all."""
+
+
 def when_measured(runs: Iterable[RunEntry]) -> str:
     """Return the starts of the first and the last of some runs, in words."""
     moments = [run.started for run in runs if run.started is not None]

@@ -10,7 +10,7 @@ from dbbstation.plan.tolerance import OF_A_MODEL
 from dbbstation.quality.conformity import Conformity
 from dbbstation.report.causes_part import cause_rows, cured_polars
 from dbbstation.report.certificate import certified
-from dbbstation.report.conditions import conditions, when_measured
+from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.model_part import not_visible, parameters, quality_of_fit
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from dbbstation.report.certificate import Certified
     from dbbstation.results.circles import Circled
     from dbbstation.results.tolerances import Held, ToleratedCircle
+
+
+REASONS_SHOWN = 3
+"""Reasons of a verdict on the first page, the table of tolerances has all: U and the room for a signature have to fit the page too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +161,7 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
             {
                 "name": session.name,
                 "measured": when_measured(c.entry for c in found.circles if c.session == session.name),
+                "identity": identity(session),
                 "conditions": conditions(
                     session, [c for c in found.circles if c.session == session.name], reported.job
                 ),
@@ -166,6 +171,7 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
             for session in found.sessions
             if any(c.session == session.name for c in found.circles)
         ],
+        "reasons_shown": REASONS_SHOWN,
         "map_width": WIDTH,
         "polar_size": SIZE,
         "polar_radius": CIRCLE,

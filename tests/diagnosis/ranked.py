@@ -138,21 +138,44 @@ def scored(session, seed, folder, candidates=None):
     return Scored(session, truth, found)
 
 
+def missed(every):
+    """Causes that are there and in no model, with what they make by themselves [µm]."""
+    return [(one.session, name, one.truth[name]) for one in every for name in one.truth if name not in one.found]
+
+
+def invented(every):
+    """Causes that a model has and the machine has not, with what the model says of them [µm]."""
+    return [(one.session, name, *one.found[name]) for one in every for name in one.found if name not in one.truth]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sessions", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0, help="number of the first session")
     parser.add_argument("--seed", type=int, default=35)
     parser.add_argument("--every-source", action="store_true", help="all causes compete, not only those that are drawn")
     arguments = parser.parse_args()
-    _began, every = time.process_time(), []
-    for session in range(arguments.sessions):
+    began, every = time.process_time(), []
+    for session in range(arguments.first, arguments.first + arguments.sessions):
         with tempfile.TemporaryDirectory() as folder:
             one = scored(session, arguments.seed, Path(folder), None if arguments.every_source else CANDIDATES)
         every.append(one)
-    [value for one in every for value in one.deviations.values()]
-    [right for one in every for right in one.orders]
-    sum(len(set(one.truth) - set(one.found)) for one in every)
-    sum(len(set(one.found) - set(one.truth)) for one in every)
+        for name in dict.fromkeys([*one.truth, *one.found]):
+            true, (g, u) = one.truth.get(name, 0.0), one.found.get(name, (np.nan, np.nan))
+            print(
+                f"{session:3d}  {name:16s} true {true:7.2f}  found {g:7.2f}  u {u:5.2f}  {(g - true) / u:+5.1f}",
+                flush=True,
+            )
+    deviations = np.array([value for one in every for value in one.deviations.values()])
+    orders = [right for one in every for right in one.orders]
+    print(f"{len(every)} sessions, seed {arguments.seed}, {time.process_time() - began:.0f} s of processor time")
+    print(f"pairs that differ by more than their u: {len(orders)}, in the right order {sum(orders)}")
+    print(
+        f"contributions: {len(deviations)}, within 2 u {np.mean(np.abs(deviations) < 2.0):.0%}, "
+        f"farthest {np.abs(deviations).max():.1f} u, root mean square {np.sqrt(np.mean(deviations**2)):.2f} u"
+    )
+    print("missed:", *missed(every), "none" if not missed(every) else "")
+    print("not there:", *invented(every), "none" if not invented(every) else "")
 
 
 if __name__ == "__main__":

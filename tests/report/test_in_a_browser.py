@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 
 import pytest
 
@@ -43,7 +44,10 @@ def browser():
 
 
 def _report(folder):
-    """Every part: before and now, a tolerance that is kept, one that is not, one that cannot be told, a model, findings."""
+    """Every part: before and now, a tolerance that is kept, one that is not, one that cannot be told, a model, findings, a long seal."""
+    sealed = folder / "sealed"
+    shutil.copytree(SMALL, sealed)
+    assert call("session", "seal", sealed).code == DONE
     limits = (
         "{quantity: circular-deviation, largest: 1000, unit: µm}",
         "{quantity: centre-deviation, largest: 1, unit: µm}",
@@ -53,10 +57,10 @@ def _report(folder):
     settings.write_text("format: dbb-settings/2\ntolerances:\n" + "".join(f"  - {one}\n" for one in limits), "utf-8")
     out = folder / "report.html"
     outcome = call(
-        "--settings", settings, "report", SMALL, "--before", SMALL, "--model", MODEL, "--job", "12", "--out", out
+        "--settings", settings, "report", sealed, "--before", SMALL, "--model", MODEL, "--job", "12", "--out", out
     )
     assert outcome.code == DONE, outcome.err
-    assert all(f'class="said {kind}"' in out.read_text("utf-8") for kind in ("within", "exceeded", "cannot"))
+    assert all(f'class="said {kind} ' in out.read_text("utf-8") for kind in ("within", "exceeded", "cannot"))
     return out
 
 

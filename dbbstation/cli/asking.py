@@ -43,6 +43,15 @@ class Asker:
             click.prompt(on_one_line(question), type=kind, default=default, show_default=bool(default), err=True)
         )
 
+    def give(self, option: str, why: str) -> None:
+        """Say that an option is needed which no single answer can take the place of: `check` refuses, on a terminal too.
+
+        Args:
+            option: as it is typed.
+            why: it is needed.
+        """
+        self._missing.append(f"{option} ({why})")
+
     def number(self, question: str, option: str, *, needed: bool = False) -> float | None:
         """Return a number; None where nobody can give one, or where Enter says that nobody knows it.
 

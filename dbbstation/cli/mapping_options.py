@@ -76,7 +76,9 @@ _OPTIONS = (
         "--separator", type=SEPARATOR, metavar="[comma|semicolon|tab]", help="What stands between columns  [likewise]."
     ),
     click.option(
-        "--encoding", type=click.Choice(["utf-8", "utf-16", "cp1252"]), help="Of the files' text  [default: utf-8]."
+        "--encoding",
+        type=click.Choice(["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"]),
+        help="Of the files' text  [default: utf-8].",
     ),
 )
 
@@ -180,7 +182,7 @@ def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, aske
         options: by name.
         asker: of what cannot be told.
     """
-    from dbbstation.files.formats.mapping import ANGLE, DEVIATION, UNITS, read_mapping
+    from dbbstation.files.formats.mapping import ANGLE, DEVIATION, IGNORED, LENGTH, UNITS, read_mapping
     from dbbstation.tasks.importing.proposal import EXPORTED, Proposed
 
     kept = options.kept
@@ -196,10 +198,20 @@ def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, aske
             )
             columns[name] = Proposed(one.means, unit)
     means = {one.means for one in columns.values()}
+    if not means & {LENGTH, DEVIATION}:
+        unknown = ", ".join(name for name, one in columns.items() if one.means == IGNORED)
+        asker.give(
+            "--column 'NAME=deviation:µm' or 'NAME=length:mm'",
+            f"which column has the readings of the bar; these are not understood: {unknown}",
+        )
     own = set(table.table.names) >= EXPORTED
     trace = options.trace
     if ANGLE not in means and not own and trace is None:
-        question = "the files have no angles: are they the whole run with feed-in and feed-out, or the turn alone"
+        unknown = ", ".join(name for name, one in columns.items() if one.means == IGNORED)
+        question = (
+            "no column was taken for an angle: are the files the whole run with feed-in and feed-out, or the turn alone"
+            + f"; not understood: {unknown}, say --column 'NAME=angle:deg' where one is the angle" * bool(unknown)
+        )
         trace = asker.text(question, "--trace", ["whole", "turn"])
     angle = _angle(options, asker, own=own) if ANGLE in means else None
     zero_mm = options.zero_mm

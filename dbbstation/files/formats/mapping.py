@@ -56,8 +56,6 @@ MEANINGS = (*UNITS, columns.STATUS, *OF_RUNS, IGNORED)
 
 _SEPARATORS = {name: sign for sign, name in SEPARATORS.items()}
 
-ENCODINGS = ("utf-8", "utf-16", "cp1252")
-
 
 def in_run_units(meaning: str, unit: str) -> tuple[float, float]:
     """Return factor and offset from a unit to that of a run file: `value * factor + offset`."""
@@ -119,8 +117,8 @@ class MappingFile(Schema):
     """Name and version of this format."""
     name: Annotated[str, Field(min_length=1)] | None = None
     """What people call the program that wrote the files."""
-    encoding: Literal["utf-8", "utf-16", "cp1252"] = "utf-8"
-    """Of the files' text; a byte order mark in a file takes precedence."""
+    encoding: Literal["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"] = "utf-8"
+    """Of the files' text: Windows code pages are western, central European, Cyrillic and Japanese, GB 18030 is Chinese; a byte order mark in a file takes precedence."""
     separator: Literal["comma", "semicolon", "tab"] | None = None
     """What stands between columns; absent: a comma, or a semicolon where the decimal sign is a comma."""
     decimal: Literal[".", ","] | None = None

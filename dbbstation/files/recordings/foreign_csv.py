@@ -13,7 +13,8 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.csv_rows import csv_rows
 from dbbstation.files.formats.number_language import NumberLanguage
 from dbbstation.files.recordings.table_csv import TableFile, parse_table
-from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes
+from dbbstation.files.recordings.unread import kind_of, with_tabs
+from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,6 +30,9 @@ _LANGUAGES = (
 """Ways of writing tables; the first of those that fit as well."""
 
 _SIGNS = ",;\t"
+
+_MINUS = "\N{MINUS SIGN}"
+"""As text programs write it in place of a hyphen."""
 
 _STATED = "so say the mapping, the options or the shop's settings: --decimal and --separator say otherwise"
 
@@ -54,6 +58,7 @@ class ForeignTable:
         comments: `key: value` lines above the names, by key in small letters.
         data: the whole file.
         comment_lines: number of the line of each comment, by key.
+        repeated: numbers of lines in which the names of the columns come again: each run has a head of its own.
     """
 
     table: TableFile
@@ -62,6 +67,7 @@ class ForeignTable:
     comments: Mapping[str, str]
     data: bytes
     comment_lines: Mapping[str, int] = field(default_factory=dict)
+    repeated: tuple[int, ...] = ()
 
 
 def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: str = "utf-8") -> ForeignTable:
@@ -77,17 +83,20 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
     """
     faults: list[Problem] = []
     data = read_bytes(path, faults, LARGEST_TABLE)
+    if data is not None and (kind := kind_of(data)) is not None:
+        raise InputError([Problem(str(path), 1, 1, *kind)])
     text = None if data is None else _text(data, str(path), encoding, faults)
     if data is None or text is None:
         raise InputError(faults)
-    lines = _without_end(text.splitlines())
+    lines = _without_end(text.replace(_MINUS, "-").splitlines())
     chosen = language or _language(lines, str(path))
     stated = "" if language is None else f"; {_STATED}"
-    rows = [_cells(line, chosen, str(path), number) for number, line in enumerate(lines[:_LOOKED_AT], start=1)]
-    first = next((k for k in range(len(rows)) if _is_row(rows[k], chosen) and _goes_on(rows, k, chosen)), None)
+    rows, first = _looked_at(lines, chosen, str(path))
+    if first is None and (language is None or language.separator == "\t") and (parted := with_tabs(lines)) is not None:
+        lines, chosen = parted, language or _language(parted, str(path))
+        rows, first = _looked_at(lines, chosen, str(path))
     if first is None:
-        remedy = f"check which file it is; {chosen.text}{stated}"
-        raise InputError([Problem(str(path), 0, 0, "there is no table of numbers in this file", remedy)])
+        raise InputError([_no_table(lines, chosen, str(path), stated)])
     above = [
         k for k in range(first) if len(rows[k]) == len(rows[first]) and any(rows[k]) and not _count(rows[k], chosen)
     ]
@@ -105,11 +114,60 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
         body[near[-1]] = ""
     if lines[names].rstrip().endswith(chosen.separator) and not rows[names][-1]:
         body = [line.rstrip().removesuffix(chosen.separator) for line in body]
+    body, repeated = _heads_taken_out(body, names, chosen)
     table = parse_table("\n".join(body), str(path), numbers=chosen)
     units = dict(zip(table.names, rows[near[-1]], strict=False)) if has_units else {}
     comments = _comments(lines[:names])
     said = {key: text for key, (_, text) in comments.items()}
-    return ForeignTable(table, chosen, units, said, data, {key: line for key, (line, _) in comments.items()})
+    return ForeignTable(table, chosen, units, said, data, {key: line for key, (line, _) in comments.items()}, repeated)
+
+
+def _looked_at(lines: list[str], language: NumberLanguage, file: str) -> tuple[list[list[str]], int | None]:
+    """Return the cells of the lines that tell how a table is written, and which of them begins it; None where none does."""
+    rows = [_cells(line, language, file, number) for number, line in enumerate(lines[:_LOOKED_AT], start=1)]
+    return rows, next((k for k in range(len(rows)) if _is_row(rows[k], language) and _goes_on(rows, k, language)), None)
+
+
+def _no_table(lines: list[str], language: NumberLanguage, file: str, stated: str) -> Problem:
+    """Return that no table was found, at the line that comes nearest to a row of one: the one with the most groups of digits."""
+    groups = [len(re.findall(r"\d+", line)) for line in lines[:_LOOKED_AT]]
+    most = max(groups, default=0)
+    if most < 2:  # noqa: PLR2004 - a row has two numbers
+        return Problem(
+            file, 0, 0, "there is no table of numbers in this file", f"check which file it is; {language.text}{stated}"
+        )
+    line = groups.index(most) + 1
+    what = (
+        f"there is no table of numbers in this file; the line `{shortened(lines[line - 1].strip())}` is no row of one"
+    )
+    return Problem(
+        file,
+        line,
+        1,
+        what,
+        f"say --decimal and --separator, or check which file it is; as it was read {language.text}{stated}",
+    )
+
+
+def _heads_taken_out(body: list[str], names: int, language: NumberLanguage) -> tuple[list[str], tuple[int, ...]]:
+    """Return the lines of a table without further heads, and where those are: each run of an export may have title and names of its own.
+
+    Args:
+        body: lines of the file from the names on.
+        names: place of the line of names.
+        language: how numbers are written.
+    """
+    head = body[names].strip()
+    again = [k for k in range(names + 1, len(body)) if body[k].strip() == head]
+    kept = list(body)
+    for k in again:
+        kept[k] = ""
+        above = k - 1
+        # Titles stand right above the names: lines of one cell or two, such as `Run 2 CW` or `Date: 20.11.2026`.
+        while above > names and not _is_row(_cells(body[above], language, "", above + 1), language):
+            kept[above] = ""
+            above -= 1
+    return kept, tuple(k + 1 for k in again)
 
 
 def _without_end(lines: list[str]) -> list[str]:
@@ -124,7 +182,10 @@ def _text(data: bytes, file: str, encoding: str, faults: list[Problem]) -> str |
     if encoding == "utf-8" or data.startswith(codecs.BOM_UTF8):
         found: list[Problem] = []
         text = decode(data, file, found)
-        remedy = "say --encoding cp1252 where a western Windows program wrote it, or save it as UTF-8"
+        remedy = (
+            "say --encoding cp1252 where a western Windows program wrote it (cp1250 central European, cp1251 Cyrillic, cp932 Japanese, gb18030 "
+            "Chinese), or save it as UTF-8"
+        )
         faults += [Problem(one.file, one.line, one.column, one.what, remedy) for one in found]
         return text
     try:

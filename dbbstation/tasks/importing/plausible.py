@@ -173,6 +173,13 @@ def check_units(
         if found is None and TIME in values:
             found = unlike_the_feed(values[TIME], values[ANGLE], units[TIME], circle)
     if found is None:
+        name = named[means]
+        numbers = table.values[name][rows]
+        if len(numbers) > 1 and float(np.ptp(numbers)) == 0.0:
+            raise UnusableTravelError(
+                f"column {table.names.index(name) + 1}, {name}: it is {float(numbers[0]):g} in every row of the run, which no gauge reads",
+                "it may be what was wanted and not what was read: name another column with --column; --trust unit takes the numbers as they are",
+            )
         return
     name = named[found.means]
     meant = " or ".join(one.replace(":", " in ") for one in found.others)

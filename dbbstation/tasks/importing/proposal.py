@@ -24,12 +24,111 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 _WORDS = {
-    TIME: {"time", "t", "zeit", "elapsed", "sec", "seconds"},
-    ANGLE: {"angle", "theta", "winkel", "phi"},
-    LENGTH: {"length", "distance", "radius", "laenge", "länge", "abstand"},
-    DEVIATION: {"deviation", "dev", "error", "abweichung", "fehler"},
-    DIRECTION: {"richtung", "dir"},
+    TIME: {
+        "time",
+        "t",
+        "zeit",
+        "elapsed",
+        "sec",
+        "seconds",
+        "temps",
+        "tempo",
+        "tiempo",
+        "tid",
+        "tijd",
+        "čas",
+        "czas",
+        "время",
+        "时间",
+        "時間",
+    },
+    ANGLE: {
+        "angle",
+        "theta",
+        "winkel",
+        "phi",
+        "angolo",
+        "ángulo",
+        "angulo",
+        "ângulo",
+        "hoek",
+        "vinkel",
+        "úhel",
+        "kąt",
+        "угол",
+        "角度",
+        "각도",
+    },
+    DEVIATION: {
+        "deviation",
+        "dev",
+        "error",
+        "abweichung",
+        "fehler",
+        "écart",
+        "ecart",
+        "erreur",
+        "scostamento",
+        "deviazione",
+        "errore",
+        "desviación",
+        "desviacion",
+        "desvio",
+        "erro",
+        "afwijking",
+        "avvikelse",
+        "avvik",
+        "odchylka",
+        "odchyłka",
+        "отклонение",
+        "偏差",
+        "誤差",
+        "误差",
+        "편차",
+    },
+    LENGTH: {
+        "length",
+        "distance",
+        "radius",
+        "laenge",
+        "länge",
+        "abstand",
+        "longueur",
+        "distanza",
+        "lunghezza",
+        "longitud",
+        "comprimento",
+        "lengte",
+        "längd",
+        "lengde",
+        "délka",
+        "długość",
+        "длина",
+        "长度",
+        "長さ",
+        "半径",
+        "半徑",
+        "길이",
+    },
+    DIRECTION: {"richtung", "dir", "sens", "direzione", "dirección", "direção"},
 }
+"""Words of columns by what they mean, in the languages of shops that were thought of; a radius deviation is a deviation."""
+
+_NO_READINGS = {
+    "nominal",
+    "nom",
+    "target",
+    "commanded",
+    "soll",
+    "sollwert",
+    "set",
+    "programmed",
+    "nominale",
+    "théorique",
+    "目標",
+    "設定",
+}
+"""Words of columns that hold what was wanted, not what was read."""
 
 _UNIT_WORDS = {
     **dict.fromkeys(("µm", "um", "micron", "microns", "micrometer", "mikrometer"), "µm"),
@@ -37,7 +136,7 @@ _UNIT_WORDS = {
     **dict.fromkeys(("in", "inch", "inches", "zoll"), "inch"),
     **dict.fromkeys(("mil", "thou"), "mil"),
     **dict.fromkeys(("µin", "uin", "µinch", "uinch"), "µinch"),
-    **dict.fromkeys(("deg", "°", "degree", "degrees", "grad"), "deg"),
+    **dict.fromkeys(("deg", "°", "degree", "degrees", "grad", "度", "deg."), "deg"),
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("s", "sec", "second", "seconds"), "s"),
     **dict.fromkeys(("ms", "msec"), "ms"),
@@ -111,13 +210,15 @@ def stated(text: str) -> tuple[str, Proposed] | None:
 
 
 def _meaning(name: str) -> str | None:
-    words = set(re.findall(r"[^\W\d_]+", re.sub(r"[\[(].*", "", name).lower()))
+    words = set(re.findall(r"[^\W\d_]+", re.sub(r"[\[(（].*", "", name).lower()))
+    if words & _NO_READINGS:
+        return None
     return next((meaning for meaning, known in _WORDS.items() if words & known), None)
 
 
 def _unit(text: str, meaning: str) -> str:
     """Unit of a meaning that a name says, in brackets or as its last word; empty where it says none."""
-    bracket = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]", text)
+    bracket = re.search(r"[\[(（]\s*([^\])）]*?)\s*[\])）]", text)
     word = bracket[1] if bracket else re.split(r"[\s_,/]+", text.strip())[-1]
     unit = _UNIT_WORDS.get(_plain(word), "")
     return unit if unit in UNITS.get(meaning, {}) else ""

@@ -180,6 +180,13 @@ class Reader:
             return found
 
         every = np.arange(len(table.table))
+        if table.repeated and self.mapping.split is None:
+            again = ", ".join(map(str, table.repeated))
+            what = f"the names of the columns come again in line {again}: more than one run"
+            self._fault(
+                table.table.file, table.repeated[0], what, "say --split gaps, and --run FILE=a-ccw,a-cw in their order"
+            )
+            return []
         if self.mapping.split == "gaps":
             t_s = numbers(TIME)
             known = every if t_s is None else every[np.isfinite(t_s)]

@@ -164,7 +164,7 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
 
 
 def _where(observations: Sequence[Observation], found: Remainder) -> tuple[float, str]:
-    """Size [µm] and place, in a sentence, of what stands out most of what is left."""
+    """Size [µm] and place, in a sentence, of the largest part of the residual."""
     worst = min((found.harmonic, found.run, found.pulse), key=lambda one: one.probability)
     size_um = 1e3 * worst.rms
     if worst is found.harmonic:

@@ -35,7 +35,7 @@ class SettledCircles:
         best: its most probable hypothesis, or one as probable, whose named causes were fitted.
         comparison: that it came from.
         causes: that were compared.
-        unmodelled: effects without a name among them.
+        unmodelled: those among them that have no name.
         noise: measured on what all causes together leave.
         left: misfit of the joint fit.
         refused: causes that cannot be what these recordings show, and why.

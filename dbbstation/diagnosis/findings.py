@@ -39,7 +39,7 @@ class SourceFinding:
         verdict: what can be said.
         ambiguous_with: sources that would explain the recordings about as well in its place.
         gain: difference in log evidence that it brings.
-        concealed: share of its signature's sum of squares that the fitted machine parameters swallow.
+        concealed: share of its signature's sum of squares that the fitted machine parameters take up.
         whole_um: root mean square of its signature over the runs [µm].
         rest_um: of what the fitted parameters leave of it [µm].
         parameters: values with their uncertainty as fitted; for a source that was not, the best amplitudes beside those
@@ -110,7 +110,7 @@ class CurvePoint:
 
 @dataclass(frozen=True)
 class Curve:
-    """An error without a name as a function of what organises it.
+    """An unmodelled effect as a function of what organises it.
 
     Attributes:
         follows: what it is a function of, and what it moves.
@@ -153,7 +153,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What is left without a name.
+    """The unmodelled residual.
 
     Attributes:
         rms_um: beyond noise, in the low harmonics [µm].
@@ -237,7 +237,7 @@ class Diagnosis:
         workspace: how far the earlier calibration was off elsewhere; None where nothing was found.
         locations: largest share first.
         sources: best first.
-        unexplained: what is left.
+        unexplained: the residual.
         shifts: largest first.
         second_start_agrees: a second search came to the same set of causes; None where the comparison ended at its limit.
         next_tests: best first, each beside those before it; empty where nothing is to be asked.

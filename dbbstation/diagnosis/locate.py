@@ -50,7 +50,7 @@ def locate(
     struts: Sequence[NDArray[np.float64] | None],
     variable: str,
 ) -> tuple[Location, ...]:
-    """Stretches of the circles where the misfit stands out of the noise, largest share first.
+    """Stretches of the circles where the misfit exceeds the noise, largest share first.
 
     Args:
         observations: runs.

@@ -47,8 +47,8 @@ class GainOfTest:
 
     Attributes:
         name: as in maps.
-        residual_um: root mean square of what is left within the mounting, before and after [µm].
-        circularity_um: greatest of its runs, of what is left, before and after [µm].
+        residual_um: root mean square of the residual within the mounting, before and after [µm].
+        circularity_um: greatest of its runs, of the residual, before and after [µm].
         traces: its runs.
     """
 

@@ -1,4 +1,4 @@
-"""Errors without a name: an error of a strut, the reading or a ball that follows some variable.
+"""Unmodelled effects: an error of a strut, the reading or a ball that follows some variable.
 
 They compete with the named sources. Where one of them explains the recordings clearly better than every source that
 has a name, the cause is unknown, and strut and variable are what can be said of it.

@@ -79,7 +79,7 @@ class SourceCurves:
     """One source.
 
     Attributes:
-        source: its name; empty for what is left without a name.
+        source: its name; empty for the unmodelled residual.
         variable: what the curves are drawn over.
         unit: of the variable.
         fine: the error may change from each piece of the range to the next, as a wave does.
@@ -107,7 +107,7 @@ class _Samples:
 
 @with_one_thread
 def source_curves(diagnosis: Diagnosis) -> tuple[SourceCurves, ...]:
-    """Curves of every source that was found, and of what is left where some variable organises it."""
+    """Curves of every source that was found, and of the residual where some variable organises it."""
     left = ("",) if diagnosis.unexplained.follows is not None else ()
     return tuple(_curves(diagnosis, name) for name in (*found_sources(diagnosis), *left))
 

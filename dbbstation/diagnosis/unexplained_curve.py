@@ -1,4 +1,4 @@
-"""The curve of an error without a name: its values along the variable that organises it, with their uncertainty.
+"""The curve of an unmodelled effect: its values along the variable that organises it, with their uncertainty.
 
 Amplitudes are those of the most probable set of causes, with the kinematic parameters, mountings, balls and bar fitted
 anew beside them. What these can make of a curve cannot be told from them, so it is taken out by convention: a constant of everything, which is

@@ -1,4 +1,4 @@
-"""A model that keeps an error without a name, so that it can be predicted and compensated, marked as of unknown cause."""
+"""A model that keeps an unmodelled effect, so that it can be predicted and compensated, marked as of unknown cause."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Unmodelled effects as causes: errors without a name that follow some variable, beside those that have one."""
+"""Unmodelled effects as causes: errors that follow some variable and have no named cause, compared beside the named ones."""
 
 from __future__ import annotations
 

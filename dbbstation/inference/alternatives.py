@@ -131,13 +131,13 @@ class Alternatives:
 def named_already(
     comparison: ModelComparison, nameless: Sequence[Cause], named: Iterable[tuple[Variant, float]]
 ) -> frozenset[str]:
-    """Effects without a name, of one amplitude, that a named cause has among its forms, within what its formula may be off by.
+    """Unmodelled effects, of one amplitude, that a named cause has among its forms, within what its formula may be off by.
 
     They are that cause and no hypothesis of their own: listed beside it they would share its probability.
 
     Args:
         comparison: of columns.
-        nameless: effects without a name.
+        nameless: the unmodelled effects.
         named: forms of named causes, and by how much their formula may be off, as a share of the effect.
     """
     forms = [(variant.columns[0], share) for variant, share in named if len(variant.columns) == 1 and share > 0.0]

@@ -267,7 +267,7 @@ class Bank:
     def _colour_of(
         self, left: NDArray[np.float64], draws: NDArray[np.float64], stretches: Sequence[slice], level: Coloured
     ) -> Coloured:
-        """Noise of what is left, as it was before it was whitened, what columns take out of draws put back; at a level if alike."""
+        """Noise of the residual, as it was before it was whitened, what columns take out of draws put back; at a level if alike."""
         pairs = [(bands_of(draws[:, k], stretches), bands_of(left[:, 1 + k], stretches)) for k in range(draws.shape[1])]
         taken = [r.log_power - w.log_power for w, r in pairs if w is not None and r is not None]
         bands = bands_of(left[:, 0], stretches)

@@ -1,4 +1,4 @@
-"""How much of a signature the fitted parameters swallow, so that a fit looks fine without it."""
+"""How much of a signature the fitted parameters take up, so that a fit looks fine without it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.square_root import Block
 
 SEEN = 1e-5
-"""Relative singular value of fitted columns below which a direction is not identifiable and swallows nothing."""
+"""Relative singular value of fitted columns below which a direction is not identifiable and takes up nothing."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Concealment:
     """A signature before and after the fitted parameters have taken their share.
 
     Attributes:
-        share: of the sum of squares that is swallowed, 1 - |rest|²/|whole|².
+        share: of the sum of squares that is taken up, 1 - |rest|²/|whole|².
         whole_rms: of the signature, in the channel's unit.
         rest_rms: of what is left of it.
     """
@@ -42,7 +42,7 @@ def concealment(
     amplitudes: NDArray[np.float64],
     free: NDArray[np.float64] | None = None,
 ) -> Concealment:
-    """Share of a signature that fitted columns swallow, unweighted over all samples.
+    """Share of a signature that fitted columns take up, unweighted over all samples.
 
     Args:
         blocks: compressed runs; compression keeps all sums of products.
@@ -50,7 +50,7 @@ def concealment(
         columns: of the signature, shape (p,).
         amplitudes: that make the signature of its columns, shape (p,).
         free: directions of the fitted parameters that were fitted, as columns, shape (f, g); all of them if None. A
-            direction that was held swallows nothing, even where it is not quite lost.
+            direction that was held takes up nothing, even where it is not quite lost.
     """
     wanted = np.concatenate([fitted, columns])
     size = 1 + max(int(wanted.max()), *(int(block.columns.max()) for block in blocks))

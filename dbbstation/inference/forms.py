@@ -1,4 +1,4 @@
-"""Forms of curves that an error without a name may follow along its variable: each is a few columns of amplitudes.
+"""Forms of curves that an unmodelled effect may follow along its variable: each is a few columns of amplitudes.
 
 A form says what its columns are at any values of its variable, and at which values its curve is printed.
 """

@@ -39,12 +39,12 @@ WORTH = 2.0
 
 @dataclass(frozen=True)
 class Misfit:
-    """What is left beyond noise.
+    """The residual beyond noise.
 
     Attributes:
         probability: of such a misfit or a larger one if only noise were left.
         noise: standard deviation, per sample, of white noise with the same power at low harmonics.
-        rms: of what is left beyond noise in the low harmonics; zero where less than noise is left.
+        rms: of the residual beyond noise in the low harmonics; zero where less than noise is left.
         ratio: power in the low harmonics over what noise alone puts there, 1 for noise.
     """
 

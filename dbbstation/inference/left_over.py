@@ -74,7 +74,7 @@ def left_over(settled: Settled, freedom: float | None = None) -> LeftOver:
 
     Args:
         settled: what the comparison came to.
-        freedom: degrees of freedom of what is left; from the number of amplitudes if None.
+        freedom: degrees of freedom of the residual; from the number of amplitudes if None.
     """
     channel, bank = settled.channel, settled.bank
     rows = channel.residual - settled.predicted()

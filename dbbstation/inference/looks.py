@@ -159,7 +159,7 @@ def placed_better(pattern: Pattern, left: Left, kept: NDArray[np.bool_], size: f
 
     Args:
         pattern: that `looked_for` made.
-        left: what is left beside everything but it.
+        left: the residual beside everything but it.
         kept: which rows were fitted, shape (n,).
         size: as of `looked_for`.
     """

@@ -62,7 +62,7 @@ def noise_of_turns(residuals: Sequence[NDArray[np.float64]], freedom_used: float
 
     What a model lacks is smooth along a turn: read off the autocorrelation, it would pass for noise that remembers. What a fit takes out
     is smooth too, and noise that remembers would seem to remember less. Both leave the harmonics above the low ones alone, so that
-    the noise is read there and continued below (`dbbstation.inference.harmonics`). What is left beyond noise counts as if it were
+    the noise is read there and continued below (`dbbstation.inference.harmonics`). The residual beyond noise counts as if it were
     white.
 
     Args:

@@ -95,7 +95,7 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
 
 
 def _left_beside(bank: Bank, others: Fitting, sd: NDArray[np.float64], but_for: int, own: NDArray[np.float64]) -> Left:
-    """What is left beside others and all but one of some columns that are not whitened."""
+    """The residual beside others and all but one of some columns that are not whitened."""
     return others.beside(np.delete(bank.whitened(own), but_for, axis=1), sd).left(bank.target)
 
 

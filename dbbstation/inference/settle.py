@@ -1,4 +1,4 @@
-"""Which set of laws and patterns explains a channel: compare, look at what is left, lay out anew, until nothing changes."""
+"""Which set of laws and patterns explains a channel: compare, scan the residual, lay out anew, until nothing changes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MOST_ROUNDS = 12
 """Times that hypotheses, noise and looks may settle against each other."""
 
 MOST_LOOKS = 15
-"""Looks at what is left, one beside what the other brought, at the most."""
+"""Scans of the residual, one beside what the other brought, at the most."""
 
 BETTER = 3.0
 """Log probability that another look must add, noise included, to be followed by one more: odds of twenty."""
@@ -68,7 +68,7 @@ def settle(
         look: look for waves, bumps, steps, and pulses in time that nobody named.
         static: compare with the patterns that need no look, too.
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
-        most_looks: looks at what is left, one beside what the other brought, at the most.
+        most_looks: scans of the residual, one beside what the other brought, at the most.
         in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
         thorough: begin from several places, and look once more beside what a search ends at; False: begin with nothing and search
             once, where a selection is repeated many times and may be somewhat worse.
@@ -252,7 +252,7 @@ def _looked(
     *,
     in_time: bool = True,
 ) -> tuple[Member, ...]:
-    """Look at what is left, take in what is worth it, and look again beside that, until nothing more stands out.
+    """Scan the residual, take in what is worth it, and look again beside that, until nothing more stands out.
 
     Args:
         bank: of columns; they become more.

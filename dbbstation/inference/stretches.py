@@ -103,7 +103,7 @@ def refined(
     Args:
         pattern: that `stretches` made.
         count: of its stretches.
-        lefts: what is left beside everything but one of them, given its number and the columns of all, shape (n, count).
+        lefts: the residual beside everything but one of them, given its number and the columns of all, shape (n, count).
         blocks: as of `stretches`.
         kept: as of `stretches`.
         size: as of `stretches`.

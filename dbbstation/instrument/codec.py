@@ -66,7 +66,7 @@ def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, sta
         protocol: the wire.
         length_mm: length in mm; None: the device has none, which it tells as `fault` unless `status` says otherwise.
         counter: sample counter, taken modulo what the wire has.
-        status: what the device says of the sample. A length that does not fit is told as `overrange`; a device that
+        status: what the device says of the sample. A length that does not fit is reported as `overrange`; a device that
             cannot say `overrange` says `fault`.
 
     Raises:

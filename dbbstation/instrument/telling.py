@@ -49,7 +49,7 @@ class Text(Schema):
 
 
 class ErrorTable(Schema):
-    """The number of an error, with what each means; a number that is not listed is told as it is.
+    """The number of an error, with what each means; a number that is not listed is reported as it is.
 
     Attributes:
         width: characters of a number.

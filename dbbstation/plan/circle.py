@@ -15,7 +15,7 @@ FULL_TURN_DEG = 360.0
 
 USUAL_STROKE_MM = 10.0
 """Travel of a bar's gauge either way where neither instrument nor session states it [mm]. One bar serves circles of 150
-and 144 mm radius, so it is no less than 6; bars of 100 and 150 mm are told apart by anything up to 50."""
+and 144 mm radius, so it is no less than 6; bars of 100 and 150 mm are distinguished by anything up to 50."""
 
 
 class Direction(StrEnum):

@@ -152,7 +152,7 @@ def _log_likelihood(off: NDArray[np.float64], covariance: NDArray[np.float64]) -
 
 
 def _read(one: Seen) -> NDArray[np.float64]:
-    """Coefficients of the readings themselves, along the travel: bars and circles of another length are told apart by the mean."""
+    """Coefficients of the readings themselves, along the travel: bars and circles of another length are distinguished by the mean."""
     return along_travel(one.run.circle) * one.coefficients_um + _length_um(one.run.circle)
 
 

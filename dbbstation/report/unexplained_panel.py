@@ -1,4 +1,4 @@
-"""Panel of an error without a name: its curve with a band of two standard uncertainties."""
+"""Panel of an unmodelled effect: its curve with a band of two standard uncertainties."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from dbbstation.results.serialise import Absent, Array, AsItIs, Kept, Quantified
 
 @dataclass(frozen=True)
 class MisfitResult:
-    """What is left beyond noise and mountings, by an F test of low harmonics.
+    """The residual beyond noise and mountings, by an F test of low harmonics.
 
     Attributes:
         probability: of that much by chance.
@@ -51,7 +51,7 @@ class PlanCheckResult:
 
 @dataclass(frozen=True)
 class OutlierResult:
-    """What does not belong, and was kept out of the fit.
+    """An outlier that was kept out of the fit.
 
     Attributes:
         kind: what it is.
@@ -210,7 +210,7 @@ class CalibrationFigures(Framed):
         residual_rms_um: the same under the model's machine [µm].
         residual_within_mounting_rms_um: the same after each mounting's shift of the ball [µm].
         noise_um: of one reading, from differences of neighbours [µm].
-        misfit: what is left beyond noise and mountings.
+        misfit: the residual beyond noise and mountings.
         noise_correlation_samples: samples after which noise is new.
         parameters_identified: how many.
         directions_lost: what the tests cannot identify, in words.

@@ -176,7 +176,7 @@ class CauseNotAsked:
 
 @dataclass(frozen=True)
 class ComparisonResidual:
-    """What is left beside everything found.
+    """The residual beside everything found.
 
     Attributes:
         beyond_noise: whether that is more than noise.
@@ -225,7 +225,7 @@ class ComparisonResult(Framed):
         directions: parts that are alike and opposite; None where only one direction was measured.
         organised_text: what was found, in short.
         causes: those that are there first.
-        left: what is left.
+        left: the residual.
         only_in_a: tests that only A has.
         only_in_b: tests that only B has.
         not_comparable: tests that cannot be compared.

@@ -166,7 +166,7 @@ class UnexplainedPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class UnexplainedCurve:
-    """An error without a name as a function of what organises it.
+    """An unmodelled effect as a function of what organises it.
 
     Attributes:
         variable: what it follows, as printed.
@@ -199,7 +199,7 @@ class UnexplainedCurve:
 
 @dataclass(frozen=True)
 class UnexplainedResult:
-    """What is left without a name.
+    """The unmodelled residual.
 
     Attributes:
         rms_um: beyond noise [µm].
@@ -286,7 +286,7 @@ class DiagnosisFigures(Framed):
         outliers: kept out of the fits.
         locations: where the misfit is, the largest first.
         sources: what was found of every cause.
-        unexplained: what is left without a name.
+        unexplained: the unmodelled residual.
         parameter_shift: bias of the kinematic calibration, the largest first.
         second_start_agrees: whether a second search came to the same causes; None where there was none.
         next_test: what to measure next; None: no proposal.

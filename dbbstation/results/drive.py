@@ -204,7 +204,7 @@ class DriveCause:
 
 @dataclass(frozen=True)
 class UnexplainedForce:
-    """A force without a name.
+    """An unmodelled force.
 
     Attributes:
         text: kind and variable.
@@ -227,7 +227,7 @@ class UnexplainedForce:
 
 @dataclass(frozen=True)
 class UnexplainedForces:
-    """What is left without a name.
+    """The unmodelled residual.
 
     Attributes:
         rms_n: beyond noise [N].
@@ -311,7 +311,7 @@ class DriveResult(Framed):
         friction: per direction, Coulomb and viscous friction.
         locations: where the misfit is large.
         sources: causes, those that are there first.
-        unexplained: what is left.
+        unexplained: the residual.
         cannot_tell: what these recordings cannot tell, a sentence each.
         held_out: `tested` or `not-tested`.
         held_out_rms_n: errors of held-out parts; None where not tested.

@@ -135,7 +135,7 @@ def covariance_of(identified: IdentifiedModel) -> Covariance:
 
 
 def outlier_result(outlier: Outlier) -> OutlierResult:
-    """Return one thing that does not belong."""
+    """Return one outlier."""
     return OutlierResult(
         kind=str(outlier.kind),
         test=outlier.test,

@@ -174,7 +174,7 @@ class SeparatingInput:
         terms: both.
         part: stretch of the recordings in which they differ most.
         sigmas: standard deviations by which they differ there.
-        repeats: of that stretch until they are told apart.
+        repeats: of that stretch until they are distinguished.
     """
 
     text: str

@@ -199,7 +199,7 @@ def _read(name: str, folder: Path) -> _Named:
 
 
 def _once(sessions: Iterator[_Named], telling: Telling) -> list[_Named]:
-    """Return each session once, whatever folder it was found by, and its copies not at all; names are told apart."""
+    """Return each session once, whatever folder it was found by, and its copies not at all; names are distinguished."""
     first: dict[str, _Named] = {}
     names: dict[str, int] = {}
     kept = []

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from dbbstation.inference.square_root import Block
 
 WEAKEST = 3
-"""Weak directions that are told."""
+"""Weak directions that are reported."""
 
 STRONGEST = 5
-"""Correlations that are told."""
+"""Correlations that are reported."""
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class RunNodes:
         coarse: the same run with the nodes in place of the samples; its lengths say nothing.
         roots: R of each sector, shape (sectors, nodes, nodes).
         seen: Q^T of measured less nominal length, shape (sectors, nodes) [mm].
-        unseen: length of what is left of it, which no smooth reading can explain [mm].
+        unseen: length of its residual, which no smooth reading can explain [mm].
     """
 
     run: Observation

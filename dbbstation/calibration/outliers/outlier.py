@@ -1,4 +1,4 @@
-"""What does not belong among the runs of a session, and what it is called."""
+"""Outliers among the runs of a session, and their names."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     Step = tuple["Outlier", list[Observation], Calibration]
 
 STANDS_OUT = 4.0
-"""A run does not belong that leaves this many times what the usual one does ..."""
+"""A run is an outlier whose residual is this many times the usual one ..."""
 
 LEAST_UM = 3.0
 """... and more than a bar's noise could [µm]."""
 
 
 class OutlierKind(StrEnum):
-    """What does not belong."""
+    """Kinds of outliers."""
 
     RUN = "run"
     WRONG_PLACE = "wrong-place"
@@ -45,7 +45,7 @@ SOURCE_OF = {
 
 @dataclass(frozen=True)
 class Outlier:
-    """One thing that does not belong.
+    """One outlier.
 
     Attributes:
         kind: what it is.

@@ -30,7 +30,7 @@ def calibrate_robust(
     balls: bool = True,
     begun: tuple[Calibration, tuple[Outlier, ...]] | None = None,
 ) -> tuple[Calibration, tuple[Outlier, ...]]:
-    """Fit, and fit again without what does not belong.
+    """Fit, and fit again without the outliers.
 
     Args:
         fit: calibrates runs.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
 
 FALLS, AT_NOISE = 4.0, 4.0
-"""A test does not belong without which the others' mean square falls by the first, to less than the second in units of
+"""A test is an outlier if without it the others' mean square falls by the first, to less than the second in units of
 the noise. Physics that the model lacks stays in the others."""
 
 ALONE = 1.2
@@ -124,7 +124,7 @@ def leave_out(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> 
 def _looks_like(
     calibration: Calibration, others: Sequence[Observation], run: Observation, residual: NDArray[np.float64]
 ) -> tuple[OutlierKind, str]:
-    """What a run that does not belong most resembles."""
+    """What an outlying run most resembles."""
     noise = _strange_from_um(np.array([rms_um(left) for _, left in left_of(calibration)]))
     best, where = np.inf, run
     for other in others:

@@ -1,7 +1,7 @@
 """The channel of two sessions: readings of A as the simulation of B, circle by circle at the same angles.
 
 Base: what is stated of balls, bars and the beginning of turns in both sessions. Causes: error sources that changed or acted in one
-session, balls and bars that sit further off than stated, the jig put down elsewhere. Effects without a name: over the angle and
+session, balls and bars that sit further off than stated, the jig put down elsewhere. Unmodelled effects: over the angle and
 what else tells runs apart, on struts, and a curve of its own in every test or run.
 """
 

@@ -1,4 +1,4 @@
-"""Effects without a name between two sessions: on the reading, on struts, balls and table, and a curve of its own in every test."""
+"""Unmodelled effects between two sessions: on the reading, on struts, balls and table, and a curve of its own in every test."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def samples_of_b(sides: Sides) -> list[Samples]:
 
 
 def of_struts(sides: Sides, runs: Sequence[Samples]) -> list[Pattern]:
-    """Effects without a name on struts, balls, table and tool; see `shapes`."""
+    """Unmodelled effects on struts, balls, table and tool; see `shapes`."""
     found = [
         _pattern(shape, sides, runs)
         for shape in shapes(ranges(runs))

@@ -216,7 +216,7 @@ def _departure(effect: NDArray[np.float64], along: NDArray[np.float64]) -> NDArr
 
 
 def _curves(recordings: Recordings) -> Iterator[Pattern]:
-    """Forces without a name: any smooth curve over a variable, and the same by direction of travel."""
+    """Unmodelled forces: any smooth curve over a variable, and the same by direction of travel."""
     scale = recordings.scale
     starts = dict(zip((id(s) for s in recordings.signals), _starts(recordings), strict=True))
     travels = recordings.at(lambda s: s.since_reversal_m)

@@ -38,7 +38,7 @@ class DriveFinding:
         probability: that it is there, or one that nothing recorded here tells from it.
         ambiguous_with: causes that would explain the recording about as well in its place.
         gain: log Bayes factor of it beside the others.
-        concealed: share of its signature's sum of squares that mass and viscous friction swallow.
+        concealed: share of its signature's sum of squares that mass and viscous friction take up.
         whole_n: root mean square of its signature [N].
         rest_n: of what the base leaves of it [N].
         parameters: as fitted; for a cause that was not, best amplitudes, whose uncertainty says how much could hide.
@@ -97,7 +97,7 @@ class DrivePart:
 
 @dataclass(frozen=True)
 class UnmodelledForce:
-    """A force without a name.
+    """An unmodelled force.
 
     Attributes:
         text: kind and variable, such as `curve over speed`.
@@ -157,7 +157,7 @@ class DriveStep:
 
 @dataclass(frozen=True)
 class Rest:
-    """What is left without a name.
+    """The unmodelled residual.
 
     Attributes:
         rms_n: beyond noise [N].
@@ -210,7 +210,7 @@ class DriveDiagnosis:
         steps: from the base to the last model.
         locations: of the base model's misfit, largest share first.
         findings: best first.
-        rest: what is left.
+        rest: the residual.
         rest_locations: where, largest share first.
         cannot_tell: sentences.
         held_out: predictions of parts that took no part; None: not asked for.

@@ -26,7 +26,7 @@ SLOW = 0.1
 
 
 def locate(recordings: Recordings, residual_n: NDArray[np.float64], noise: Coloured) -> tuple[DriveLocation, ...]:
-    """Stretches in which a residual, shape (m,) [N], stands out of the noise, largest share first."""
+    """Stretches in which a residual, shape (m,) [N], exceeds the noise, largest share first."""
     smooth = np.convolve(residual_n, np.full(SMOOTHED, 1.0 / SMOOTHED), mode="same")
     together = min(noise.correlation_samples, float(SMOOTHED))
     threshold = COUNTS_SIGMA * noise.sigma * np.sqrt(together / SMOOTHED)

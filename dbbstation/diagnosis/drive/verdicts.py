@@ -86,7 +86,7 @@ class Verdicts:
         return self._source_of.get(name, "")
 
     def effects(self) -> tuple[UnmodelledForce, ...]:
-        """Forces without a name that are there, largest first."""
+        """Unmodelled forces that are there, largest first."""
         found = []
         for one in self._raw:
             if self._source_of[one.name] or one.verdict is not Verdict.IDENTIFIED:
@@ -124,7 +124,7 @@ class Verdicts:
             text = self._text(source, verdict, alike, there)
         else:
             verdict, text = self._absent(source, own)
-            # A force without a name that could stand for it is no reason to expect it.
+            # An unmodelled force that could stand for it is no reason to expect it.
             alike = tuple(name for name in alike if name in self._drive.sources)
             if alike:
                 verdict, text = (
@@ -298,7 +298,7 @@ class Verdicts:
         if source.name in looked_for:
             return looked_for[source.name]()
         for finding in own:
-            # What nothing tells from something else, were it only a force without a name, would not have been seen.
+            # What nothing tells from something else, were it only an unmodelled force, would not have been seen.
             if finding.verdict in {Verdict.NOT_TESTABLE, Verdict.AMBIGUOUS}:
                 return Verdict.NOT_TESTABLE, finding.text
         refused = [f.text for f in own if f.text and f.probability == 0.0 and not f.values]

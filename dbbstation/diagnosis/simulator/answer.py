@@ -64,7 +64,7 @@ class SimulatorComparison:
         found: what the search ended at.
         findings: of terms that are there or that the recordings cannot exclude, those that are there first.
         parameters: of the simulator.
-        left: tests of what is left.
+        left: tests of the residual.
         held_out: error of parts that took no part; None where it was not asked for.
         as_simulated: measured less simulated values with the parameters as stated, shape (n,).
         nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term.

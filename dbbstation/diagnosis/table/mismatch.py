@@ -114,7 +114,7 @@ class Mismatch:
         shares: of variables, largest first.
         resembles: of smooth curves that are there, which named forms they follow: share of each, R², by name of finding.
         fitted: base parameters.
-        left: tests of what is left.
+        left: tests of the residual.
         held_out: error of rows that took no part; None where it was not asked for.
         lacking: physics of the user's own that could not be asked, and why.
         texts: of that which was asked, by name.

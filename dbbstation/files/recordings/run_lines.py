@@ -139,7 +139,7 @@ def pieces_of(
 
 
 def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
-    """Take a whole run file apart; None, or columns that cannot be used, are told in `faults`."""
+    """Take a whole run file apart; None, or columns that cannot be used, are reported in `faults`."""
     whole = _whole(split_pieces([data], file, faults))
     if whole is not None:
         _check_columns(whole.columns, file, whole.header_line, faults)

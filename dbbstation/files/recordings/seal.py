@@ -2,7 +2,7 @@
 
 Every sealed run's entry carries a link: the SHA-256 of the link before it and of what the entry says of the recording. Who takes
 an entry out of the list, exchanges two or changes one breaks a link. The seal counts the runs and has the last link, so that
-runs taken out at the end are told as well. A copy of every sealed file is kept in the folder `sealed`, so that it can be said
+runs taken out at the end are reported as well. A copy of every sealed file is kept in the folder `sealed`, so that it can be said
 which key has changed, and the file can be put back.
 
 It tells what was changed by mistake or without a note. It keeps nobody from writing a whole new seal.

@@ -1,4 +1,4 @@
-"""What errors without a name have in common: piecewise linear curves of six struts with fixed points."""
+"""What unmodelled effects have in common: piecewise linear curves of six struts with fixed points."""
 
 from __future__ import annotations
 

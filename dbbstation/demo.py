@@ -6,12 +6,11 @@ jig plate, calibrated, diagnosed; compensated programs are written, run on it an
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +21,17 @@ from dbbstation.files.formats.model import write_model
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.results.demo import (
+    DemoCalibration,
+    DemoCircle,
+    DemoDiagnosis,
+    DemoEvaluation,
+    DemoReport,
+    DemoResult,
+    DemoRun,
+    MeasuredBeforeAfter,
+)
+from dbbstation.results.serialise import read_json
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from dbbstation.virtual.truth import random_kinematics
@@ -46,26 +56,6 @@ tolerances:
   - {quantity: centre-deviation, largest: 15.0, unit: µm}
 """
 """Tolerances that the compensated machine keeps and the nominal one does not: holders put balls back to a few micrometres."""
-
-
-@dataclass(frozen=True)
-class DemoResult:
-    """Files and figures of a demonstration.
-
-    Attributes:
-        folder: where everything is.
-        runs: per test, figures of the first circle in its first direction, before and after, in µm; the circularity with
-            the bar's noise and without, as `evaluate --json` has both.
-        diagnosis: what `diagnose --json` said.
-        calibration: what `calibrate --json` said.
-        report: what `report --json` said.
-    """
-
-    folder: Path
-    runs: list[dict[str, Any]]
-    diagnosis: dict[str, Any]
-    calibration: dict[str, Any]
-    report: dict[str, Any]
 
 
 def run_demo(folder: Path, seed: int, tell: Callable[[str], None], progress: Callable[[str], None]) -> DemoResult:
@@ -96,10 +86,19 @@ def run_demo(folder: Path, seed: int, tell: Callable[[str], None], progress: Cal
         diagnosis = job.answer(["diagnose", "measured", "--out", "joint.yaml"])
         job.answer(["program", *job.what, "--dialect", "linuxcnc", "--model", "joint.yaml", "--out", "programs"])
         job.measure(place, "verified", ["--programs", "programs"])
-    before = job.answer(["evaluate", "measured", "--model", "joint.yaml"])
-    after = job.answer(["evaluate", "verified", "--model", "joint.yaml"])
+    before, after = (
+        read_json(DemoEvaluation, job.answer(["evaluate", session, "--model", "joint.yaml"]))
+        for session in ("measured", "verified")
+    )
     report = job.answer(["report", "verified", "--before", "measured", "--model", "joint.yaml", "--out", "report.html"])
-    return DemoResult(folder, _side_by_side(before, after), diagnosis, calibration, report)
+    return DemoResult(
+        folder,
+        _side_by_side(before, after),
+        read_json(DemoCalibration, calibration),
+        read_json(DemoDiagnosis, diagnosis),
+        read_json(DemoReport, report),
+        {"diagnosis": diagnosis, "report": report},
+    )
 
 
 def _write_truth(path: Path, machine_file: Path, seed: int) -> None:
@@ -112,6 +111,14 @@ def _write_truth(path: Path, machine_file: Path, seed: int) -> None:
 
 
 @dataclass(frozen=True)
+class _Place:
+    """Port of the virtual instrument, and control address of the virtual machine."""
+
+    port: str
+    control: str
+
+
+@dataclass(frozen=True)
 class _Job:
     """Runs the program's own commands in the demonstration's folder."""
 
@@ -120,7 +127,7 @@ class _Job:
     tell: Callable[[str], None]
     progress: Callable[[str], None]
 
-    def answer(self, arguments: list[str]) -> dict[str, Any]:
+    def answer(self, arguments: list[str]) -> str:
         """Run a command and return what it printed as JSON."""
         self.tell("dbbstation " + " ".join(_short(argument) for argument in arguments))
         done = subprocess.run(
@@ -128,13 +135,12 @@ class _Job:
         )
         if done.returncode != 0:
             raise StationError(done.stderr.strip(), where=f"dbbstation {arguments[0]}")
-        found: dict[str, Any] = json.loads(done.stdout)
-        return found
+        return done.stdout
 
-    def measure(self, place: dict[str, str], session: str, programs: list[str]) -> None:
+    def measure(self, place: _Place, session: str, programs: list[str]) -> None:
         """Measure the virtual machine over its line."""
         arguments = ["measure", *self.what, "--instrument", INSTRUMENT, "--out", session, *programs]
-        line = ["--port", place["port"], "--auto", place["control"], *SPEED]
+        line = ["--port", place.port, "--auto", place.control, *SPEED]
         bar = ["--bar-length-mm", "150", "--bar-uncertainty-um", "0.5"]
         self.tell("dbbstation " + " ".join(_short(argument) for argument in [*arguments, *line]))
         with subprocess.Popen(
@@ -153,7 +159,7 @@ class _Job:
             raise StationError("\n".join(said[-5:]), where="dbbstation measure")
 
     @contextmanager
-    def emulated(self, arguments: list[str]) -> Iterator[dict[str, str]]:
+    def emulated(self, arguments: list[str]) -> Iterator[_Place]:
         """Switch on the virtual machine as a process of its own.
 
         Yields:
@@ -169,8 +175,7 @@ class _Job:
             if not first:
                 _, said = process.communicate(timeout=PATIENCE_S)
                 raise StationError(said.strip() or "it ended at once", where="dbbstation emulate")
-            place: dict[str, str] = json.loads(first)
-            yield place
+            yield read_json(_Place, first)
         finally:
             process.terminate()
             process.communicate(timeout=PATIENCE_S)
@@ -184,16 +189,19 @@ def _short(argument: str) -> str:
     return argument.rpartition("/")[2] if argument.endswith(".yaml") else argument
 
 
-def _side_by_side(before: dict[str, Any], after: dict[str, Any]) -> list[dict[str, Any]]:
+def _side_by_side(before: DemoEvaluation, after: DemoEvaluation) -> tuple[DemoCircle, ...]:
     """Measured figures of the same runs in two sessions, [CAL Table III]."""
-    later = {(run["test"], run["direction"]): _measured(run) for run in after["runs"]}
-    return [
-        {"test": run["test"], "before": _measured(run), "after": later[run["test"], run["direction"]]}
-        for run in before["runs"]
-        if run["direction"] == "ccw"
-    ]
+    later = {(run.test, run.direction): _measured(run) for run in after.runs}
+    return tuple(
+        DemoCircle(run.test, _measured(run), later[run.test, run.direction])
+        for run in before.runs
+        if run.direction == "ccw"
+    )
 
 
-def _measured(run: dict[str, Any]) -> dict[str, float]:
+def _measured(run: DemoRun) -> MeasuredBeforeAfter:
     """Measured figures of a run."""
-    return {**run["measured"], "circularity_30_upr_um": run["circularity_30_upr_um"]["measured"]}
+    of = run.measured
+    return MeasuredBeforeAfter(
+        of.centre_deviation_um, of.mean_radial_error_um, of.circularity_um, run.circularity_30_upr_um.measured
+    )

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from dbbstation.errors import Problem
     from dbbstation.files.checking import Checked
     from dbbstation.nc.circle_program import Approach
+    from dbbstation.results.checked import CheckedFile, CheckResult
+    from dbbstation.results.sampling import SampledCircle
     from dbbstation.sources.contract import ErrorSource
 
 
@@ -91,7 +93,7 @@ def check(
       dbbstation check 2026-11-20-hexapod-7 --anchor 3f2a9c1b2d4e5f60
       dbbstation check --schema dbb-plan/2 > dbb-plan-2.schema.json
     """
-    from dbbstation.cli.output import print_json
+    from dbbstation.cli.output import print_result
     from dbbstation.errors import InputError
 
     if schema is not None:
@@ -124,18 +126,7 @@ def check(
     problems = [problem for result in results for problem in result.problems]
     problems += [problem for run in runs for problem in run.problems]
     if as_json:
-        print_json(
-            {
-                "files": [_file(result) for result in results],
-                "dry_runs": [
-                    {"plan": str(r.plan), "machine": str(r.machine), "programs": r.programs, "ok": not r.problems}
-                    for r in runs
-                ],
-                "sampling": [{"plan": str(one.plan), "circles": one.circles} for one in seen],
-                "problems": [asdict(problem) for problem in problems],
-                "warnings": [asdict(warning) for result in results for warning in result.warnings],
-            }
-        )
+        print_result(_result(results, runs, seen, problems))
     else:
         _print(results, runs)
         for one in seen:
@@ -156,19 +147,27 @@ def _hold_against(results: Sequence[Checked], anchor: str | None) -> None:
             (result.problems if told.remedy else result.warnings).append(told)
 
 
-def _file(result: Checked) -> dict[str, object]:
-    """Return what was found in a file; of a session also the findings of its runs."""
-    from dbbstation.results.findings import plain_findings
+def _result(
+    results: Sequence[Checked], runs: Sequence[DryRun], seen: Sequence[SampledPlan], problems: Sequence[Problem]
+) -> CheckResult:
+    from dbbstation.results.checked import CheckResult, DryRunResult, SampledPlanResult
 
-    told: dict[str, object] = {
-        "file": str(result.path),
-        "format": result.kind,
-        "ok": not result.problems,
-        "summary": result.summary,
-    }
-    if result.judgements:
-        told["runs"] = [{"run": one.run.label, "findings": plain_findings(one.findings)} for one in result.judgements]
-    return told
+    return CheckResult(
+        files=tuple(_file(result) for result in results),
+        dry_runs=tuple(DryRunResult(str(r.plan), str(r.machine), r.programs, not r.problems) for r in runs),
+        sampling=tuple(SampledPlanResult(str(one.plan), one.circles) for one in seen),
+        problems=tuple(problems),
+        warnings=tuple(warning for result in results for warning in result.warnings),
+    )
+
+
+def _file(result: Checked) -> CheckedFile:
+    """Return what was found in a file; of a session also the findings of its runs."""
+    from dbbstation.results.checked import CheckedFile, CheckedRun
+    from dbbstation.results.findings import finding_results
+
+    runs = tuple(CheckedRun(one.run.label, finding_results(one.findings)) for one in result.judgements)
+    return CheckedFile(str(result.path), result.kind, not result.problems, result.summary, runs or None)
 
 
 def _print(results: Sequence[Checked], runs: Sequence[DryRun]) -> None:
@@ -208,24 +207,24 @@ class SampledPlan:
 
     Attributes:
         plan: file of the plan.
-        circles: plain numbers, one entry per test.
+        circles: one for each test.
         notes: the same in sentences.
     """
 
     plan: Path
-    circles: list[dict[str, Any]]
+    circles: tuple[SampledCircle, ...]
     notes: list[str]
 
 
 def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[SampledPlan]:
-    from dbbstation.cli.sampling import sampling_data, sampling_notes
+    from dbbstation.cli.sampling import sampled_circles, sampling_notes
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.instrument.library import load_instrument
 
     protocol = load_instrument(instrument, profile)
     read = [(file, read_plan(file)) for file in plans]
     return [
-        SampledPlan(file, sampling_data(plan, protocol), list(sampling_notes(plan, protocol))) for file, plan in read
+        SampledPlan(file, sampled_circles(plan, protocol), list(sampling_notes(plan, protocol))) for file, plan in read
     ]
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
-    from dbbstation.demo import DemoResult
+    from collections.abc import Sequence
+
+    from dbbstation.results.demo import DemoCircle, DemoResult
 
 
 @click.command()
@@ -48,12 +52,10 @@ def demo(*, out: Path | None, seed: int, as_json: bool) -> None:
 
     result = run_demo(folder, seed, tell, progress)
     if as_json:
-        print_json({"folder": str(folder), "runs": result.runs, "diagnosis": result.diagnosis, "report": result.report})
+        printed = {name: json.loads(text) for name, text in result.printed.items()}
+        print_json({"folder": str(folder), "runs": [asdict(run) for run in result.runs], **printed})
     else:
         _print(result)
-
-
-FIGURES = ("centre_deviation_um", "mean_radial_error_um", "circularity_30_upr_um")
 
 
 def _print(result: DemoResult) -> None:
@@ -62,35 +64,30 @@ def _print(result: DemoResult) -> None:
 
     echo()
     echo("      centre deviation  mean radial error  circular deviation G   [µm, measured]")
-    rows: list[list[object]] = [
-        [run["test"], *(run[when][figure] for figure in FIGURES for when in ("before", "after"))] for run in result.runs
-    ]
+    rows: list[list[object]] = [[run.test, *(size for sizes in _sizes(run) for size in sizes)] for run in result.runs]
     means: list[object] = ["mean", *_means(result.runs)]
     print_table(["test", "before", "after", " before", " after", "  before", "  after"], [*rows, means])
     echo("before: nominal programs; after: programs compensated with the joint model")
     echo(G_LOW_PASSED)
     echo()
-    left = result.calibration
-    echo(
-        f"A kinematic calibration alone leaves {left['residual_within_mounting_rms_um']:.1f} µm rms within mountings; "
-        f"the bar's noise is 0.3 µm."
-    )
-    for source in result.diagnosis["sources"]:
-        if source["verdict"] == "identified":
-            hidden = 100 * source["concealed"]
-            for name, number in source["parameters"].items():
+    left_um = result.calibration.residual_within_mounting_rms_um
+    echo(f"A kinematic calibration alone leaves {left_um:.1f} µm rms within mountings; the bar's noise is 0.3 µm.")
+    for source in result.diagnosis.sources:
+        if source.verdict == "identified":
+            hidden = 100 * (source.concealed or 0.0)
+            for name, number in source.parameters.items():
                 echo(
-                    f"The diagnosis names {source['name']}: {name} {number['value']:.3g} ± {number['uncertainty']:.1g} "
-                    f"{number['unit']}; the kinematic parameters had concealed {hidden:.0f} % of it."
+                    f"The diagnosis names {source.name}: {name} {number.value:.3g} ± {number.uncertainty or 0.0:.1g} {number.unit}; "
+                    f"the kinematic parameters had concealed {hidden:.0f} % of it."
                 )
-    held_out = result.diagnosis["held_out_rms_um"]
-    echo(f"Held-out tests are predicted to {held_out['before']:.1f} µm rms before, {held_out['after']:.1f} after.")
+    held_out = result.diagnosis.held_out_rms_um
+    echo(f"Held-out tests are predicted to {held_out.before:.1f} µm rms before, {held_out.after:.1f} after.")
     echo()
-    echo(f"The report says: {result.report['verdict']['headline']}")
-    for rank, one in enumerate(result.report["causes"], start=1):
+    echo(f"The report says: {result.report.verdict.headline}")
+    for rank, one in enumerate(result.report.causes, start=1):
         echo(
-            f"Cause {rank} of what was measured before: {one['cause']}, {one['g_um']:.1f} µm of G, {one['centre_um']:.1f} µm of the "
-            f"centres. {one['cure']}"
+            f"Cause {rank} of what was measured before: {one.cause}, {one.g_um:.1f} µm of G, {one.centre_um:.1f} µm of the "
+            f"centres. {one.cure}"
         )
     echo()
     echo(f"everything is in {result.folder}:")
@@ -110,8 +107,17 @@ _CONTENTS = (
 )
 
 
-def _means(runs: list[dict[str, Any]]) -> list[float]:
+def _sizes(run: DemoCircle) -> tuple[tuple[float, float], ...]:
+    """Centre deviation, mean radial error and circular deviation, before and after each [µm]."""
+    before, after = run.before, run.after
+    return (
+        (before.centre_deviation_um, after.centre_deviation_um),
+        (before.mean_radial_error_um, after.mean_radial_error_um),
+        (before.circularity_30_upr_um, after.circularity_30_upr_um),
+    )
+
+
+def _means(runs: Sequence[DemoCircle]) -> list[float]:
     """Mean size of each column."""
-    return [
-        sum(abs(run[when][figure]) for run in runs) / len(runs) for figure in FIGURES for when in ("before", "after")
-    ]
+    columns = zip(*([abs(size) for sizes in _sizes(run) for size in sizes] for run in runs), strict=True)
+    return [sum(column) / len(column) for column in columns]

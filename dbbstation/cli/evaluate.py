@@ -85,7 +85,7 @@ def evaluate(
         echo(f"{label}    {value_um:8.1f} µm   {known}")
     if result.plane_uncertainty_not_known_because:
         echo(f"  ({result.plane_uncertainty_not_known_because})")
-    print_tolerances(result.tolerances, settings.tolerances_from)
+    print_tolerances(result.tolerances or (), settings.tolerances_from)
 
 
 def _print_predicted(runs: Sequence[EvaluatedRun]) -> None:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.mapping_options import MappingOptions, mapping_options
-from dbbstation.cli.output import echo
-from dbbstation.cli.session_options import noted_options, session_details
+from dbbstation.cli.option_object import taken_from
+from dbbstation.cli.output import echo, print_result
+from dbbstation.cli.session_options import SessionOptions, noted_options
 from dbbstation.text.printable import printable
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.plan import Plan
+    from dbbstation.results.imported import ImportResult
     from dbbstation.tasks.importing.names import RunName
     from dbbstation.tasks.importing.runs import ImportedRun, Reader
 
@@ -103,7 +105,7 @@ def import_(
 
     if out.exists():
         raise OutputError("the session folder exists already", where=str(out), remedy="choose another name")
-    of_mapping = MappingOptions.taken_from(options)
+    of_mapping = taken_from(options, MappingOptions)
     remembered = of_mapping.mapping_file
     if remembered is not None and remembered.exists():
         remembered = None
@@ -111,7 +113,7 @@ def import_(
         refuse_existing(remembered, force=False)
     asker = Asker()
     told = _Told(named, started, frozenset(trust), not_known)
-    found = _read(asker, files, of_mapping, (plan, machine), told, options)
+    found = _read(asker, files, of_mapping, (plan, machine), told, taken_from(options, SessionOptions))
     writes = (out, found.machine, found.plan, found.runs, found.details, found.more)
     with staged(*writes, dry=dry_run) as put:
         if not as_json:
@@ -122,7 +124,7 @@ def import_(
             if remembered is not None:
                 write_mapping(remembered, found.mapping)
     if as_json:
-        _print_json(found, out, written=not dry_run)
+        print_result(_result(found, out, written=not dry_run))
     elif dry_run:
         echo("nothing was written (--dry-run)")
     else:
@@ -159,7 +161,7 @@ def _read(
     of_mapping: MappingOptions,
     paths: tuple[Path | None, Path | None],
     said: _Told,
-    options: dict[str, Any],
+    noted: SessionOptions,
 ) -> _Import:
     """Read everything, and ask for what is missing."""
     from dataclasses import replace
@@ -178,7 +180,7 @@ def _read(
     chosen = chosen_mapping(list(tables.values()), of_mapping, asker)
     plan = paths[0] or Path(asker.text("test plan whose circles were run", "--plan"))
     machine = paths[1] or Path(asker.text("file of the machine", "--machine"))
-    _ask_conditions(asker, options, said.not_known)
+    noted = _with_conditions(asker, noted, said.not_known)
     asker.check()
     mapping, inline, nominal = chosen(), read_inline_plan(plan), read_machine(machine)
     planned = inline.to_domain()
@@ -195,10 +197,10 @@ def _read(
     runs = [places[one.test, one.direction, one.repeat] for one in repeats_in_order(one.run for one in runs)]
     trusted = [f"taken as they are, whatever they look like: {one}" for one in sorted(said.trusted)]
     centred = [] if "centre" in said.trusted else _asked_centres(asker, runs, planned)
-    statements = [*_statements(mapping, runs, _unknown(options)), *trusted, *centred, *reader.left_out]
+    statements = [*_statements(mapping, runs, _unknown(noted)), *trusted, *centred, *reader.left_out]
     now = datetime.now(UTC).replace(microsecond=0)
     notes = tuple(Note(now, f"imported: {text}") for text in statements)
-    details = replace(session_details(**options, stroke_mm=None), notes=notes)
+    details = replace(noted.details(), notes=notes)
     more = originals({path: table.data for path, table in tables.items()}, mapping, provenance(), statements)
     return _Import(mapping, inline, nominal, runs, details, statements, more)
 
@@ -216,43 +218,42 @@ def _confirm(asker: Asker, question: str, *, yes: bool) -> None:
         click.confirm(printable(question), abort=True, err=True)
 
 
-def _print_json(found: _Import, out: Path, *, written: bool) -> None:
-    from dbbstation.cli.output import print_json
+def _result(found: _Import, out: Path, *, written: bool) -> ImportResult:
+    from dbbstation.results.imported import ImportResult, TakenRun
 
-    runs = [
-        {
-            "file": Path(one.file).name,
-            "run": one.name,
-            "samples": len(one.run.columns["t_s"]),
-            "computed": list(one.computed),
-        }
+    runs = tuple(
+        TakenRun(Path(one.file).name, one.name, len(one.run.columns.get("t_s", ())), tuple(one.computed))
         for one in found.runs
-    ]
-    told = {"session": str(out), "written": written, "mapping": found.mapping.model_dump(exclude_none=True)}
-    print_json({**told, "runs": runs, "statements": list(found.statements)})
+    )
+    mapping = found.mapping.model_dump(exclude_none=True)
+    return ImportResult(str(out), written, mapping, runs, tuple(found.statements))
 
 
-def _ask_conditions(asker: Asker, options: dict[str, Any], not_known: Sequence[str]) -> None:
-    """Ask for conditions that neither option nor settings state, and put the answers into the options."""
-    if options["ambient_temp_c"] is None and "temperature" not in not_known:
-        options["ambient_temp_c"] = asker.number(
-            "temperature of the shop [degC]", _or("--ambient-temp-c", "temperature")
-        )
-    if not options["operator"] and "operator" not in not_known:
-        options["operator"] = asker.text("who measured", _or("--operator", "operator"), default="")
-    if not options["job"] and "job" not in not_known:
-        options["job"] = asker.text("what it was measured for", _or("--job", "job"), default="")
-    if options["bar_file"] is None and options["bar_length_mm"] is None and "bar" not in not_known:
+def _with_conditions(asker: Asker, told: SessionOptions, not_known: Sequence[str]) -> SessionOptions:
+    """Ask for conditions that neither option nor settings state."""
+    from dataclasses import replace
+
+    if told.ambient_temp_c is None and "temperature" not in not_known:
+        asked = asker.number("temperature of the shop [degC]", _or("--ambient-temp-c", "temperature"))
+        told = replace(told, ambient_temp_c=asked)
+    if not told.operator and "operator" not in not_known:
+        told = replace(told, operator=asker.text("who measured", _or("--operator", "operator"), default=""))
+    if not told.job and "job" not in not_known:
+        told = replace(told, job=asker.text("what it was measured for", _or("--job", "job"), default=""))
+    if told.bar_file is None and told.bar_length_mm is None and "bar" not in not_known:
         option = _or("--bar FILE, or --bar-length-mm with --bar-uncertainty-um", "bar")
-        options["bar_length_mm"] = asker.number("calibrated length of the bar [mm]", option)
-        if options["bar_length_mm"] is not None:
-            options["bar_uncertainty_um"] = asker.number("its standard uncertainty [µm]", "--bar-uncertainty-um")
+        length_mm = asker.number("calibrated length of the bar [mm]", option)
+        told = replace(told, bar_length_mm=length_mm)
+        if length_mm is not None:
+            u_um = asker.number("its standard uncertainty [µm]", "--bar-uncertainty-um")
+            told = replace(told, bar_uncertainty_um=u_um)
+    return told
 
 
-def _unknown(options: Mapping[str, Any]) -> list[str]:
+def _unknown(told: SessionOptions) -> list[str]:
     """Conditions that nobody knows, whether that was said on the command line or by Enter."""
-    has_bar = options["bar_file"] is not None or options["bar_length_mm"] is not None
-    known = (options["ambient_temp_c"] is not None, bool(options["operator"]), bool(options["job"]), has_bar)
+    has_bar = told.bar_file is not None or told.bar_length_mm is not None
+    known = (told.ambient_temp_c is not None, bool(told.operator), bool(told.job), has_bar)
     return [one for one, is_known in zip(CONDITIONS, known, strict=True) if not is_known]
 
 

@@ -26,14 +26,15 @@ def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None
       dbbstation instruments keyence-dl-rs1a --profile gt-70a
       dbbstation instruments ./my-gauge.yaml
     """  # noqa: D301 (click reads the escape)
-    from dbbstation.cli.output import print_json
+    from dbbstation.cli.output import print_result
     from dbbstation.instrument.library import known_instruments, load_instrument, load_variants
+    from dbbstation.results.instruments import InstrumentsResult, instrument_result
 
     if name is not None:
         protocol = load_instrument(name, profile)
         names = [one.profile for one in load_variants(name) if one.profile]
         if as_json:
-            print_json({**_summary(protocol), "profiles": names, "protocol": protocol.model_dump(mode="json")})
+            print_result(instrument_result(protocol, names, whole=True))
         else:
             echo("\n".join(_details(protocol, names)))
         return
@@ -41,8 +42,8 @@ def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None
         raise click.UsageError("--profile is one of an instrument: name the instrument too")
     known = [load_variants(one) for one in known_instruments()]
     if as_json:
-        rows = [{**_summary(one[0]), "profiles": [each.profile for each in one if each.profile]} for one in known]
-        print_json({"instruments": rows})
+        shown = (instrument_result(one[0], (each.profile for each in one if each.profile)) for one in known)
+        print_result(InstrumentsResult(tuple(shown)))
         return
     for variants in known:
         one, called = variants[0], ", ".join(each.profile for each in variants if each.profile)
@@ -52,21 +53,6 @@ def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None
         echo(f"    {one.line.text}, about {one.fastest_hz():.0f} readings per second")
         if open_ones:
             echo(f"    {open_ones} of {len(one.references)} statements about it are not verified")
-
-
-def _summary(protocol: Protocol) -> dict[str, object]:
-    return {
-        "name": protocol.name,
-        "profile": protocol.profile,
-        "title": protocol.title,
-        "line": protocol.line.model_dump(),
-        "mode": protocol.ask.mode,
-        "readings_per_second": protocol.fastest_hz(),
-        "not_verified": [one.says for one in protocol.references if not one.verified],
-        "has_checksum": protocol.has_checksum,
-        "counts_samples": protocol.counter_modulus is not None,
-        "range_mm": protocol.length.range_mm,
-    }
 
 
 NO_CHECKSUM = (

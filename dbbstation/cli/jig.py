@@ -94,11 +94,12 @@ def sheet(
       dbbstation jig sheet cmm.csv --jig plate.yaml --column x=Ist_X --column y=Ist_Y --column z=Ist_Z --column u=U --k 2 --out new.yaml
       dbbstation jig sheet plate.dmo --jig plate.yaml --name SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
     """  # noqa: D301 (click reads the escape)
-    from dbbstation.cli.output import print_json, print_table
+    from dbbstation.cli.output import print_result, print_table
     from dbbstation.cli.provenance import provenance
     from dbbstation.files.formats.jig import jig_text, read_jig
     from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.files.recordings.cmm_sheet import jig_of_sheet, read_sheet
+    from dbbstation.results.jig import MeasuredBall, SheetResult
 
     refuse_existing_table(out, force=force)
     old = read_jig(before)
@@ -111,14 +112,15 @@ def sheet(
         uncertainty_um=u_um,
         cmm_temp_c=cmm_temp_c,
     )
-    write_table(out, jig_text(new.model_dump(exclude_none=True)), provenance(), force=force)
+    write_table(out, jig_text(new), provenance(), force=force)
     balls = {name: _change_um(old, name, ball.centre_mm) for name, ball in new.balls.items()}
     lost = [name for name in old.balls if name not in new.balls]
     if as_json:
         told = {
-            name: {"centre_mm": list(new.balls[name].centre_mm), "change_um": change} for name, change in balls.items()
+            name: MeasuredBall(tuple(new.balls[name].centre_mm), None if change is None else tuple(change))
+            for name, change in balls.items()
         }
-        print_json({"jig": str(out), "balls": told, "not_in_the_sheet": lost})
+        print_result(SheetResult(str(out), told, tuple(lost)))
         return
     rows = [
         [
@@ -176,11 +178,12 @@ def holders(
       dbbstation jig holders mountings.csv
       dbbstation jig holders mountings.csv --cmm-repeatability-um 0.3 --jig plate.yaml --out plate-2026.yaml
     """  # noqa: D301 (click reads the escape)
-    from dbbstation.cli.output import print_json
+    from dbbstation.cli.output import print_result
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.files.recordings.cmm_sheet import read_sheet
     from dbbstation.plan.repeatability import repeatability
+    from dbbstation.results.jig import HoldersResult, holder_result
 
     if (before is None) != (out is None):
         raise click.UsageError(
@@ -200,8 +203,8 @@ def holders(
     if before is not None and out is not None:
         _write_holders(found, before, out, sheet, force=force)
     if as_json:
-        told = {name: _summary(one) for name, one in found.items()}
-        print_json({"holders": told, "jig": None if out is None else str(out)})
+        told = {name: holder_result(one) for name, one in found.items()}
+        print_result(HoldersResult(told, None if out is None else str(out)))
         return
     _print_holders(found)
     if out is not None:
@@ -217,7 +220,7 @@ def _write_holders(found: Mapping[str, Repeatability], before: Path, out: Path, 
     """
     from dbbstation.cli.provenance import provenance
     from dbbstation.errors import InputError, Problem
-    from dbbstation.files.formats.jig import checked_jig, jig_text, read_jig
+    from dbbstation.files.formats.jig import HolderSchema, checked_jig, jig_text, read_jig
     from dbbstation.files.provenance import write_table
 
     old = read_jig(before)
@@ -225,10 +228,10 @@ def _write_holders(found: Mapping[str, Repeatability], before: Path, out: Path, 
     if unknown:
         what = f"the jig has no holder {', '.join(unknown)}"
         raise InputError([Problem(str(before), 0, 0, what, f"its holders: {', '.join(old.holders)}")])
-    data = old.model_dump(exclude_none=True)
-    data["holders"] |= {name: {"repeatability_um": float(f"{one.together.s_um:.4g}")} for name, one in found.items()}
-    new = checked_jig(jig_text(data), str(sheet))
-    write_table(out, jig_text(new.model_dump(exclude_none=True)), provenance(), force=force)
+    scatter = {name: float(f"{one.together.s_um:.4g}") for name, one in found.items()}
+    holders = {name: HolderSchema.model_construct(repeatability_um=s_um) for name, s_um in scatter.items()}
+    new = checked_jig(jig_text(old.model_copy(update={"holders": {**old.holders, **holders}})), str(sheet))
+    write_table(out, jig_text(new), provenance(), force=force)
 
 
 def _print_holders(found: Mapping[str, Repeatability]) -> None:
@@ -307,29 +310,3 @@ def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str
     for (name, _), centres in groups.items():
         found.setdefault(name, []).append(np.array(centres))
     return found
-
-
-def _summary(one: Repeatability) -> dict[str, Any]:
-    from dbbstation.plan.repeatability import LEVEL
-
-    def plain(scatter: Any) -> dict[str, Any]:  # noqa: ANN401 - imported late
-        ends = {"low_um": scatter.low_um, "high_um": scatter.high_um}
-        return {
-            "s_um": scatter.s_um,
-            **ends,
-            "standard_uncertainty_um": scatter.u_um,
-            "degrees_of_freedom": scatter.freedom,
-        }
-
-    return {
-        "repeatability_um": one.together.s_um,
-        "together": plain(one.together),
-        "axes": {axis: plain(scatter) for axis, scatter in zip("xyz", one.axes, strict=False)},
-        "level": LEVEL,
-        "rms_distance_um": one.rms_distance_um,
-        "mean_distance_um": one.mean_distance_um,
-        "places": one.places,
-        "mountings": one.mountings,
-        "p_axes_alike": one.axes_differ,
-        "of_cmm_um": one.of_cmm_um,
-    }

@@ -101,11 +101,6 @@ class MappingOptions:
     separator: str | None
     encoding: str | None
 
-    @classmethod
-    def taken_from(cls, options: dict[str, Any]) -> MappingOptions:
-        """Take these options out of all that a command was given."""
-        return cls(**{one.name: options.pop(one.name) for one in fields(cls)})
-
     @property
     def kept(self) -> Path | None:
         """File of the mapping; None where there is none yet."""

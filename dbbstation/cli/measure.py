@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,14 +16,15 @@ from dbbstation.cli.instrument_options import chosen_protocol, instrument_option
 from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.option_object import taken_from
 from dbbstation.cli.order_options import in_order, order_options, programs_option
 from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
-from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
+from dbbstation.cli.session_options import SessionOptions, require_bar, session_options
 from dbbstation.service.patience import RECONNECT_S, driver_patience
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
     from types import FrameType
 
     from dbbstation.plan.circle import Direction
@@ -73,9 +74,8 @@ def measure(**given: Any) -> None:  # noqa: ANN401 - the options, each with a ty
       dbbstation measure ... --order drift --gate first   (heights in turn, the first test again at the end)
       dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `emulate`)
     """
-    own = {one.name for one in fields(MeasureOptions)} - {"session"}
-    session = {name: value for name, value in given.items() if name not in own}
-    _measured(MeasureOptions(**{name: given[name] for name in own}, session=session))
+    noted = taken_from(given, SessionOptions)
+    _measured(MeasureOptions(**given, session=noted))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +103,7 @@ class MeasureOptions:
         order: in which tests are measured.
         gate: which run must be good before the others.
         as_json: whether what was recorded is printed as JSON.
-        session: what is stated of the session, by the names of its options.
+        session: what is stated of the session.
     """
 
     plan_file: Path
@@ -126,7 +126,7 @@ class MeasureOptions:
     order: str
     gate: str
     as_json: bool
-    session: Mapping[str, Any]
+    session: SessionOptions
 
 
 def _measured(asked: MeasureOptions) -> None:
@@ -147,14 +147,14 @@ def _measured(asked: MeasureOptions) -> None:
         with_loss_limit(read_inline_plan(asked.plan_file), asked.largest_loss_percent), asked.order, asked.gate
     )
     chosen = chosen_protocol(
-        asked.instrument, asked.profile, asked.zero_mm, bar_length_mm=stated_length_mm(asked.session)
+        asked.instrument, asked.profile, asked.zero_mm, bar_length_mm=asked.session.stated_length_mm()
     )
     protocol = at_rate(chosen, asked.rate_hz)
     job = Job(
         machine=machine,
         plan=plan,
         folder=asked.out,
-        details=session_details(**asked.session, stroke_mm=protocol.length.stroke_mm),
+        details=asked.session.details(protocol.length.stroke_mm),
         programs={} if asked.programs is None else load_programs(asked.programs, plan.to_domain(), machine),
         patience=Patience()
         if asked.auto is None
@@ -197,7 +197,7 @@ def _measured(asked: MeasureOptions) -> None:
 def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> bool:
     """Run the sequence, say what happens, print the summary; return whether Ctrl-C ended it."""
     from dbbstation.cli.measure_talk import Keyboard, Log, Summary, Talk
-    from dbbstation.cli.output import print_json
+    from dbbstation.cli.output import print_result
     from dbbstation.station.autopilot import Autopilot
 
     station, summary = workplace.station, Summary()
@@ -216,7 +216,7 @@ def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> 
     finally:
         workplace.close()
         if as_json:
-            print_json(summary.of(workplace))
+            print_result(summary.of(workplace))
         else:
             done, planned = workplace.schedule.accepted, len(workplace.schedule.tasks)
             echo(f"{workplace.writer.session.folder}: {done} of {planned} runs accepted")

@@ -5,10 +5,11 @@ from __future__ import annotations
 import logging
 import sys
 import threading
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from dbbstation.cli.output import echo, log_said
-from dbbstation.results.findings import plain_findings
+from dbbstation.results.findings import finding_results
+from dbbstation.results.measured import CompletedRun, MeasuredSession, RecordedRun
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, AddNote, GoTo, Pause, Quit, Reject, Repeat, Resume, Skip, Start
@@ -130,45 +131,43 @@ class Summary:
         elif isinstance(event, events.Fault):
             self._fault = str(event.error)
 
-    def of(self, workplace: Workplace) -> dict[str, Any]:
-        """Return the session as plain values; figures of the runs that were recorded now."""
+    def of(self, workplace: Workplace) -> MeasuredSession:
+        """Return the session; figures of the runs that were recorded now."""
         session, schedule = workplace.writer.session, workplace.schedule
-        return {
-            "session": str(session.folder),
-            "state": workplace.station.state.name.lower(),
-            "fault": self._fault or None,
-            "planned": len(schedule.tasks),
-            "accepted": schedule.accepted,
-            "missing": [task.text for task in schedule.open],
-            "runs": [self._run(run) for run in session.runs],
-        }
+        return MeasuredSession(
+            session=str(session.folder),
+            state=workplace.station.state.name.lower(),
+            fault=self._fault or None,
+            planned=len(schedule.tasks),
+            accepted=schedule.accepted,
+            missing=tuple(task.text for task in schedule.open),
+            runs=tuple(self._run(run) for run in session.runs),
+        )
 
-    def _run(self, run: RunEntry) -> dict[str, Any]:
-        told: dict[str, Any] = {
-            "test": run.test,
-            "direction": run.direction.value,
-            "repeat": run.repeat,
-            "mounting": run.mounting,
-            "state": run.state.value,
-            "file": f"runs/{run.path.name}",
-        }
+    def _run(self, run: RunEntry) -> RecordedRun:
+        recorded = RecordedRun(
+            test=run.test,
+            direction=run.direction.value,
+            repeat=run.repeat,
+            mounting=run.mounting,
+            state=run.state.value,
+            file=f"runs/{run.path.name}",
+        )
         completed = self._completed.get(f"{run.test}-{run.direction}-{run.repeat}")
         if completed is None:
-            return told
-        told |= {
-            "samples": completed.samples,
-            "lost": completed.lost,
-            "doubtful": completed.doubtful,
-            "problem": completed.problem or None,
-        }
-        told["findings"] = plain_findings(completed.findings)
-        if completed.figures is not None:
-            told |= {
-                "centre_deviation_um": completed.figures.centre_deviation_um,
-                "mean_radial_error_um": completed.figures.mean_radial_error_um,
-                "circularity_um": completed.figures.circularity_um,
-            }
-        return told
+            return recorded
+        figures = completed.figures
+        return CompletedRun(
+            **vars(recorded),
+            samples=completed.samples,
+            lost=completed.lost,
+            doubtful=completed.doubtful,
+            problem=completed.problem or None,
+            findings=finding_results(completed.findings),
+            centre_deviation_um=None if figures is None else figures.centre_deviation_um,
+            mean_radial_error_um=None if figures is None else figures.mean_radial_error_um,
+            circularity_um=None if figures is None else figures.circularity_um,
+        )
 
 
 class Keyboard:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import logging
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from dbbstation.text.printable import on_one_line, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 COVERAGE_FACTOR = 2.0
 """k of the expanded uncertainty U = k u that people read: about 95 % of a normal distribution [GUM 6.3.3]."""
@@ -36,7 +36,7 @@ def echo(text: object = "", *, err: bool = False, nl: bool = True) -> None:
     click.echo(printable(str(text)), err=err, nl=nl)
 
 
-def print_json(data: dict[str, Any]) -> None:
+def print_json(data: Mapping[str, object]) -> None:
     """Print one JSON object with where it comes from; numbers that are not finite are refused: they are no JSON."""
     from dbbstation.cli.provenance import provenance
 
@@ -50,12 +50,12 @@ def print_result(result: object) -> None:
     print_json(plain(result))
 
 
-def print_plain_json(data: dict[str, Any]) -> None:
+def print_plain_json(data: Mapping[str, object]) -> None:
     """Print one JSON object as it is: a document of its own, such as a schema."""
     echo(json_text(data, indent=1))
 
 
-def json_text(data: dict[str, Any], indent: int | None = None) -> str:
+def json_text(data: Mapping[str, object], indent: int | None = None) -> str:
     """Return data as JSON that no terminal takes for an order: delete is the one control that `json` leaves as it is."""
     return json.dumps(data, indent=indent, allow_nan=False).replace("\x7f", "\\u007f")
 

@@ -52,7 +52,7 @@ def plot(
       dbbstation plot session --test a,b --kind deviation --out ab.pdf
       dbbstation plot before after --test a --kind compare --out a.png
     """
-    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.report.plot import PlotKind, Plotted, plot_figure
@@ -66,11 +66,11 @@ def plot(
         say(f"note: {warning}")
     wanted = format_of(out)
     plotted = Plotted(PlotKind(kind), found, chosen, wanted.provenance.program)
-    numbers = plotted.numbers()
+    result = plotted.result(str(out))
     write_bytes(out, plot_figure(plotted, wanted), force=force)
-    for one in numbers["one_direction_only"]:
+    for one in result.one_direction_only:
         say(f"note: {one} was measured in one direction only")
     if as_json:
-        print_json({"figure": str(out), **numbers})
+        print_result(result)
     else:
         say(f"figure written to {out}")

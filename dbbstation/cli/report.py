@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -70,7 +69,7 @@ def report(
       dbbstation report session --job "spindle exchanged" --out report.html --pdf report.pdf
     """
     from dbbstation.cli.asking import Asker
-    from dbbstation.cli.output import COVERAGE_FACTOR, print_json, say
+    from dbbstation.cli.output import COVERAGE_FACTOR, print_result, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.shop import shop_settings
@@ -104,13 +103,10 @@ def report(
     if pdf is not None:
         say(f"printed to {pdf}")
     if as_json:
-        print_json({"report": str(out), **written.numbers})
+        print_result(written)
     else:
-        echo(written.numbers["certificate"]["title"])
-        _print(written.numbers["verdict"])
-
-
-def _print(verdict: dict[str, Any]) -> None:
-    echo(verdict["headline"])
-    for text in (*verdict["reasons"], *verdict["to_do"]):
-        echo(f"- {text}")
+        verdict = written.verdict
+        echo(written.certificate.title)
+        echo(verdict.headline)
+        for text in (*verdict.reasons, *verdict.to_do):
+            echo(f"- {text}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.cli.output import say
 
@@ -11,10 +11,11 @@ if TYPE_CHECKING:
 
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.plan.plan import Plan
+    from dbbstation.results.sampling import SampledCircle
 
 
-def sampling_data(plan: Plan, protocol: Protocol, baud: int | None = None) -> list[dict[str, Any]]:
-    """Return for each circle of a plan what the instrument sees of it, as plain numbers.
+def sampled_circles(plan: Plan, protocol: Protocol, baud: int | None = None) -> tuple[SampledCircle, ...]:
+    """Return for each circle of a plan what the instrument sees of it.
 
     Args:
         plan: what is to be measured.
@@ -22,52 +23,53 @@ def sampling_data(plan: Plan, protocol: Protocol, baud: int | None = None) -> li
         baud: of its line, None: the usual rate.
     """
     from dbbstation.plan.sampling import enough_feed_mm_min, sampling
+    from dbbstation.results.sampling import SampledCircle
 
     rate_hz = protocol.fastest_hz(baud)
-    rows = []
+    found = []
     for name, test in plan.tests.items():
         seen = sampling(test.circle, rate_hz)
-        rows.append(
-            {
-                "test": name,
-                "feed_mm_min": test.circle.feed_mm_min,
-                "readings_per_second": rate_hz,
-                "points_per_turn": seen.points_per_turn,
-                "spacing_deg": seen.spacing_deg,
-                "highest_undulation": seen.highest_undulation,
-                "enough": seen.enough,
-                "is_circle": seen.is_circle,
-                "greatest_feed_mm_min": enough_feed_mm_min(test.circle, rate_hz),
-            }
+        found.append(
+            SampledCircle(
+                test=name,
+                feed_mm_min=test.circle.feed_mm_min,
+                readings_per_second=rate_hz,
+                points_per_turn=seen.points_per_turn,
+                spacing_deg=seen.spacing_deg,
+                highest_undulation=seen.highest_undulation,
+                enough=seen.enough,
+                is_circle=seen.is_circle,
+                greatest_feed_mm_min=enough_feed_mm_min(test.circle, rate_hz),
+            )
         )
-    return rows
+    return tuple(found)
 
 
 def sampling_notes(plan: Plan, protocol: Protocol, baud: int | None = None) -> Iterator[str]:
     """Yield a sentence for the plan, and one for each kind of circle that the instrument is too slow for."""
     from dbbstation.plan.sampling import SMALLEST_POINTS, UNDULATIONS
 
-    rows = sampling_data(plan, protocol, baud)
-    slowest = min(rows, key=lambda row: row["points_per_turn"])
+    circles = sampled_circles(plan, protocol, baud)
+    slowest = min(circles, key=lambda one: one.points_per_turn)
     yield (
-        f"{protocol.label} takes {slowest['readings_per_second']:.3g} readings per second: at least "
-        f"{slowest['points_per_turn']:.0f} points per turn ({slowest['spacing_deg']:.2g}° apart), up to "
-        f"{slowest['highest_undulation']} undulations per revolution"
+        f"{protocol.label} takes {slowest.readings_per_second:.3g} readings per second: at least "
+        f"{slowest.points_per_turn:.0f} points per turn ({slowest.spacing_deg:.2g}° apart), up to "
+        f"{slowest.highest_undulation} undulations per revolution"
     )
     for is_circle in (False, True):
-        slow = [row for row in rows if not row["enough"] and row["is_circle"] is is_circle]
+        slow = [one for one in circles if not one.enough and one.is_circle is is_circle]
         if not slow:
             continue
-        worst = min(slow, key=lambda row: row["points_per_turn"])
-        tests = ", ".join(row["test"] for row in slow)
+        worst = min(slow, key=lambda one: one.points_per_turn)
+        tests = ", ".join(one.test for one in slow)
         what = (
-            f"undulations above {worst['highest_undulation']} per revolution are not seen, and pass for slower ones"
+            f"undulations above {worst.highest_undulation} per revolution are not seen, and pass for slower ones"
             if is_circle
             else f"fewer than {SMALLEST_POINTS} points per turn are no circle"
         )
         yield (
-            f"too slow for test {tests} at {worst['feed_mm_min']:g} mm/min: {what}; for {UNDULATIONS} undulations take at most "
-            f"{worst['greatest_feed_mm_min']:.0f} mm/min, or a higher baud rate"
+            f"too slow for test {tests} at {worst.feed_mm_min:g} mm/min: {what}; for {UNDULATIONS} undulations take at most "
+            f"{worst.greatest_feed_mm_min:.0f} mm/min, or a higher baud rate"
         )
 
 

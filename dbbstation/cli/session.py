@@ -43,29 +43,31 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
       dbbstation session list 2026-11-20-hexapod-7
       dbbstation session list 2026-11-20-hexapod-7 --json
     """  # noqa: D301 (click reads the escape)
-    from dbbstation.cli.output import print_json, print_table
+    from dbbstation.cli.output import print_result, print_table
     from dbbstation.files.recordings.session import read_session
+    from dbbstation.results.serialise import read_plain
+    from dbbstation.results.sessions import ListedRun, ListedSession, SampleCounts
     from dbbstation.text.counting import repeats_in_order
 
     read = read_session(folder)
     missing = [f"{test} {direction}" for test, direction in _missing(read)]
     if as_json:
-        runs = [
-            {
-                "run": _name(run),
-                "test": run.test,
-                "direction": run.direction.value,
-                "repeat": run.repeat,
-                "mounting": run.mounting,
-                "started": None if run.started is None else run.started.isoformat(),
-                "state": run.state.value,
-                "reason": run.reason or None,
-                "counts": None if run.counts is None else run.counts.data(),
-                "file": run.path.relative_to(read.folder).as_posix(),
-            }
+        runs = tuple(
+            ListedRun(
+                run=_name(run),
+                test=run.test,
+                direction=run.direction.value,
+                repeat=run.repeat,
+                mounting=run.mounting,
+                started=None if run.started is None else run.started.isoformat(),
+                state=run.state.value,
+                reason=run.reason or None,
+                counts=None if run.counts is None else read_plain(SampleCounts, run.counts.data()),
+                file=run.path.relative_to(read.folder).as_posix(),
+            )
             for run in repeats_in_order(read.runs)
-        ]
-        print_json({"session": read.name, "runs": runs, "missing": missing})
+        )
+        print_result(ListedSession(read.name, runs, tuple(missing)))
         return
     rows = [
         [
@@ -236,25 +238,26 @@ def log(folder: Path, *, as_json: bool) -> None:
       dbbstation session log 2026-11-20-hexapod-7
       dbbstation session log 2026-11-20-hexapod-7 --json
     """  # noqa: D301 (click reads the escape)
-    from dbbstation.cli.output import print_json, print_table
+    from dbbstation.cli.output import print_result, print_table
     from dbbstation.files.recordings.event_log import keys_told, read_event_log, runs_told
     from dbbstation.files.recordings.session import read_session
+    from dbbstation.results.sessions import ListedEvent, SessionEvents
 
     read = read_session(folder)
     found = read_event_log(read.folder, [])
     events = () if found is None else found.events
     if as_json:
-        listed = [
-            {
-                "event": number,
-                "at": None if event.at is None else event.at.isoformat(),
-                "what": event.what,
-                "about": runs_told(event) or ", ".join(keys_told(event)),
-                "link": event.link,
-            }
+        listed = tuple(
+            ListedEvent(
+                event=number,
+                at=None if event.at is None else event.at.isoformat(),
+                what=event.what,
+                about=runs_told(event) or ", ".join(keys_told(event)),
+                link=event.link,
+            )
             for number, event in enumerate(events, start=1)
-        ]
-        print_json({"session": read.name, "events": listed, "anchor": events[-1].link if events else None})
+        )
+        print_result(SessionEvents(read.name, listed, events[-1].link if events else None))
         return
     rows = [
         [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -12,7 +12,7 @@ from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import from_settings, shop_option
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.plan.bar import Bar
@@ -61,7 +61,7 @@ _AGE = shop_option(
 
 
 def noted_options(function: _Function) -> _Function:
-    """Give a command the options of what a session notes; it takes them as keywords and passes them to `session_details`."""
+    """Give a command the options of what a session notes; it takes them as keywords, `SessionOptions` takes them together."""
     for option in reversed((*_OPTIONS, *_OF_BAR)):
         function = option(function)
     return function
@@ -72,56 +72,97 @@ def session_options(function: _Function) -> _Function:
     return noted_options(_AGE(function))
 
 
-def session_details(
-    *,
-    operator: str,
-    job: str,
-    serial_number: str,
-    ambient_temp_c: float | None,
-    bar_serial_number: str,
-    bar_length_mm: float | None,
-    bar_uncertainty_um: float | None,
-    bar_temp_c: float | None,
-    bar_file: Path | None,
-    bar_waiver: str,
-    stroke_mm: float | None,
-) -> SessionDetails:
-    """Return what was told of machine, shop and bar, with the stroke that the instrument file states [mm].
+@dataclass(frozen=True)
+class SessionOptions:
+    """What these options say of machine, shop and bar.
 
-    Raises:
-        click.UsageError: length without uncertainty, something of the bar without either, or a file and options of the bar.
-        InputError: faults of the bar's file.
+    Attributes:
+        operator: name; empty for none.
+        job: what it is measured for; empty for none.
+        serial_number: of the machine; empty for none.
+        ambient_temp_c: temperature of the shop [degC]; None where not known.
+        bar_serial_number: of the bar; empty for none.
+        bar_length_mm: distance of its balls [mm]; None where not known.
+        bar_uncertainty_um: standard uncertainty of that [µm]; None where not known.
+        bar_temp_c: of the bar at its calibration [degC]; None where not known.
+        bar_file: file of the bar, in place of these; None for none.
+        bar_waiver: why it is measured without a fresh calibration of the bar; empty where there is one.
     """
-    from dbbstation.files.recordings.session_details import SessionDetails
 
-    if bar_file is not None:
+    operator: str
+    job: str
+    serial_number: str
+    ambient_temp_c: float | None
+    bar_serial_number: str
+    bar_length_mm: float | None
+    bar_uncertainty_um: float | None
+    bar_temp_c: float | None
+    bar_file: Path | None
+    bar_waiver: str
+
+    def details(self, stroke_mm: float | None = None) -> SessionDetails:
+        """Return what a session notes.
+
+        Args:
+            stroke_mm: of the bar, as the instrument file states it; None where it does not [mm].
+
+        Raises:
+            click.UsageError: length without uncertainty, something of the bar without either, or a file and options of the bar.
+            InputError: faults of the bar's file.
+        """
+        from dbbstation.files.recordings.session_details import SessionDetails
+
+        if self.bar_file is None:
+            bar = self._bar(stroke_mm)
+        else:
+            from dbbstation.files.formats.bar import read_bar
+
+            if self.of_bar:
+                raise click.UsageError("--bar says everything of the bar: leave out --bar-length-mm and the like")
+            bar = read_bar(self.bar_file).to_bar(stroke_mm)
+        return SessionDetails(
+            self.serial_number,
+            self.operator,
+            self.ambient_temp_c,
+            bar,
+            self.bar_waiver.strip(),
+            job=self.job.strip(),
+        )
+
+    @property
+    def of_bar(self) -> list[str]:
+        """Names of the options of the bar, beside its file, that were given and do not come from settings."""
+        given = {
+            "bar_serial_number": self.bar_serial_number,
+            "bar_length_mm": self.bar_length_mm,
+            "bar_uncertainty_um": self.bar_uncertainty_um,
+            "bar_temp_c": self.bar_temp_c,
+        }
+        return [name for name, value in given.items() if value not in {"", None} and not from_settings(name)]
+
+    def stated_length_mm(self) -> float | None:
+        """Return the length of the bar that its file or `--bar-length-mm` states [mm]; None where neither does.
+
+        Raises:
+            InputError: faults of the bar's file.
+        """
+        if self.bar_file is None:
+            return self.bar_length_mm
         from dbbstation.files.formats.bar import read_bar
 
-        names = ("bar_serial_number", "bar_length_mm", "bar_uncertainty_um", "bar_temp_c")
-        values = (bar_serial_number, bar_length_mm, bar_uncertainty_um, bar_temp_c)
-        if any(value not in {"", None} and not from_settings(name) for name, value in zip(names, values, strict=True)):
-            raise click.UsageError("--bar says everything of the bar: leave out --bar-length-mm and the like")
-        details = SessionDetails(serial_number, operator, ambient_temp_c, read_bar(bar_file).to_bar(stroke_mm))
-        return replace(details, bar_waiver=bar_waiver.strip(), job=job.strip())
-    bar = _bar(bar_serial_number, bar_length_mm, bar_uncertainty_um, bar_temp_c, stroke_mm)
-    return SessionDetails(serial_number, operator, ambient_temp_c, bar, bar_waiver.strip(), job=job.strip())
+        return read_bar(self.bar_file).length_mm
 
+    def _bar(self, stroke_mm: float | None) -> Bar | None:
+        from dbbstation.plan.bar import Bar
 
-def stated_length_mm(told: Mapping[str, Any]) -> float | None:
-    """Return the length of the bar that its file or `--bar-length-mm` states [mm]; None where neither does.
-
-    Args:
-        told: the options, as `session_details` takes them.
-
-    Raises:
-        InputError: faults of the bar's file.
-    """
-    if told["bar_file"] is None:
-        length_mm: float | None = told["bar_length_mm"]
-        return length_mm
-    from dbbstation.files.formats.bar import read_bar
-
-    return read_bar(told["bar_file"]).length_mm
+        length_mm, u_um = self.bar_length_mm, self.bar_uncertainty_um
+        if length_mm is None and u_um is None:
+            if self.bar_serial_number or self.bar_temp_c is not None:
+                raise click.UsageError("a bar needs --bar-length-mm and --bar-uncertainty-um")
+            return None
+        if length_mm is None or u_um is None:
+            raise click.UsageError("--bar-length-mm and --bar-uncertainty-um belong together")
+        return Bar(self.bar_serial_number, length_mm, u_um / 1e3, None, self.bar_temp_c, None, stroke_mm)
 
 
 def require_bar(job: Job, largest_age_h: float | None) -> None:
@@ -145,21 +186,3 @@ def require_bar(job: Job, largest_age_h: float | None) -> None:
         return
     largest = USUAL_AGE_H if largest_age_h is None else largest_age_h
     check_bar_known(job.details.bar, job.plan.to_domain(), datetime.now(UTC), largest)
-
-
-def _bar(
-    serial_number: str,
-    length_mm: float | None,
-    uncertainty_um: float | None,
-    temp_c: float | None,
-    stroke_mm: float | None,
-) -> Bar | None:
-    from dbbstation.plan.bar import Bar
-
-    if length_mm is None and uncertainty_um is None:
-        if serial_number or temp_c is not None:
-            raise click.UsageError("a bar needs --bar-length-mm and --bar-uncertainty-um")
-        return None
-    if length_mm is None or uncertainty_um is None:
-        raise click.UsageError("--bar-length-mm and --bar-uncertainty-um belong together")
-    return Bar(serial_number, length_mm, uncertainty_um / 1e3, None, temp_c, None, stroke_mm)

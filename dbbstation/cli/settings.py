@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,6 +12,7 @@ from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from dbbstation.files.formats.settings import Settings
+    from dbbstation.results.settings import SettingsResult
 
 
 @click.command()
@@ -33,7 +34,7 @@ def settings(folder: Path | None, *, template: bool, as_json: bool) -> None:
       dbbstation settings --template > dbbstation-settings.yaml
       dbbstation settings 2026-11-20-hexapod-7 --json
     """
-    from dbbstation.cli.output import print_json
+    from dbbstation.cli.output import print_result
     from dbbstation.cli.shop import shop_settings
 
     if template:
@@ -43,7 +44,7 @@ def settings(folder: Path | None, *, template: bool, as_json: bool) -> None:
         return
     found = shop_settings()
     if as_json:
-        print_json(_data(found))
+        print_result(_result(found))
     else:
         _print(found)
 
@@ -52,7 +53,7 @@ NOT_SET = "not set"
 PROGRAM = "dbbstation"
 
 
-def built_in() -> dict[str, Any]:
+def built_in() -> dict[str, str | int | float | None]:
     """Values of the program itself by key, None where it has none; every key of the settings but the tolerances."""
     from dbbstation.files.formats.number_language import PLAIN
     from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH
@@ -79,48 +80,47 @@ def built_in() -> dict[str, Any]:
     }
 
 
-def _data(found: Settings) -> dict[str, Any]:
+def _result(found: Settings) -> SettingsResult:
+    from dbbstation.results.settings import SettingsResult, ShopTolerance, ShownSetting
     from dbbstation.results.tolerances import filter_words
 
     values = {}
     for key, own in built_in().items():
         setting = found.values.get(key)
         if setting is None:
-            values[key] = {"value": own, "from": None if own is None else PROGRAM}
+            values[key] = ShownSetting(own, None if own is None else PROGRAM)
         else:
-            values[key] = {"value": setting.value, "from": setting.origin}
-    tolerances = [
-        {
-            "quantity": one.figure.value,
-            "largest_um": one.largest_um,
-            "filter": filter_words(one),
-            "tests": list(one.tests),
-            "directions": [direction.value for direction in one.directions],
-        }
-        for one in found.tolerances
-    ]
-    return {
-        "files": [str(path) for path in found.files],
-        "values": values,
-        "tolerances": tolerances,
-        "tolerances_from": found.tolerances_from or None,
-    }
+            values[key] = ShownSetting(setting.value, setting.origin)
+    return SettingsResult(
+        files=tuple(str(path) for path in found.files),
+        values=values,
+        tolerances=tuple(
+            ShopTolerance(
+                quantity=one.figure.value,
+                largest_um=one.largest_um,
+                filter=filter_words(one),
+                tests=tuple(one.tests),
+                directions=tuple(direction.value for direction in one.directions),
+            )
+            for one in found.tolerances
+        ),
+        tolerances_from=found.tolerances_from or None,
+    )
 
 
 def _print(found: Settings) -> None:
     from dbbstation.cli.output import print_table
     from dbbstation.cli.tolerances import which_circles
 
-    data = _data(found)
+    result = _result(found)
     rows = []
-    for key, one in data["values"].items():
-        value = NOT_SET if one["value"] is None else str(one["value"]).replace("\t", "tab")
-        rows.append([key, value, one["from"] or ""])
+    for key, one in result.values.items():
+        value = NOT_SET if one.value is None else str(one.value).replace("\t", "tab")
+        rows.append([key, value, one.origin or ""])
     print_table(["setting", "value", "from"], rows)
-    for one in data["tolerances"]:
-        echo(
-            f"tolerance: {one['quantity']}{_filtered(one['filter'])} at most {one['largest_um']:g} µm, {which_circles(one['tests'], one['directions'])}"
-        )
+    for held in result.tolerances:
+        circles = which_circles(held.tests, held.directions)
+        echo(f"tolerance: {held.quantity}{_filtered(held.filter)} at most {held.largest_um:g} µm, {circles}")
     if found.tolerances_from:
         echo(f"tolerances from {found.tolerances_from}")
     if not found.files:

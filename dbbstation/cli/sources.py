@@ -40,12 +40,11 @@ def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[
       dbbstation sources gravity --machine machine.yaml
       dbbstation sources scale-bow --source-file scale_bow.py --json
     """
-    from dbbstation.cli.output import print_json, print_result, print_table
+    from dbbstation.cli.output import print_result, print_table
     from dbbstation.errors import ModelError
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.own_sources import every_source
-    from dbbstation.results.serialise import plain
-    from dbbstation.results.sources import role_of, source_description
+    from dbbstation.results.sources import SourcesResult, role_of, source_description
     from dbbstation.sources.registry import sources_named
 
     known = every_source(source_files)
@@ -66,7 +65,7 @@ def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[
             echo("\n".join(_details(found)))
         return
     if as_json:
-        print_json({"sources": [plain(source_description(source)) for source in known.values()]})
+        print_result(SourcesResult(tuple(source_description(source) for source in known.values())))
         return
     rows = [
         [source.name, source.belongs_to.value, role_of(source), _first(source.texts.what)] for source in known.values()

@@ -18,14 +18,15 @@ from dbbstation.cli.instrument_options import chosen_protocol, instrument_option
 from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.option_object import taken_from
 from dbbstation.cli.order_options import in_order, order_options, programs_option
 from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
-from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
+from dbbstation.cli.session_options import SessionOptions, require_bar, session_options
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
     from types import FrameType
 
     from dbbstation.model.identified import IdentifiedModel
@@ -99,11 +100,12 @@ def station(
       dbbstation station --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
         --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
     """
-    if told["job"].endswith((".yaml", ".yml")):
+    noted = taken_from(told, SessionOptions)
+    if noted.job.endswith((".yaml", ".yml")):
         if virtual or any(given is not None for given in (plan_file, machine_file, out)):
             raise click.UsageError("a job says what is measured: leave out --plan, --machine, --out and --virtual")
         _check_terminal()
-        return _operate(Path(told["job"]), judging_model(model_file, source_files))
+        return _operate(Path(noted.job), judging_model(model_file, source_files))
     # The shop's instrument stands elsewhere: a virtual one brings its own line.
     port = None if virtual and from_settings("port") else port
     baud = None if virtual and from_settings("baud") else baud
@@ -111,7 +113,7 @@ def station(
         _check_terminal()
         return _begin(
             replace(
-                _given(_line(instrument, profile, port, baud, zero_mm), spy, (order, gate), told), programs=programs
+                _given(_line(instrument, profile, port, baud, zero_mm), spy, (order, gate), noted), programs=programs
             ),
             _limits(largest_loss_percent, largest_bar_age_h),
             judging_model(model_file, source_files),
@@ -140,8 +142,8 @@ def station(
     machine = read_machine(machine_file or demo("machine"))
     plan = in_order(with_loss_limit(read_inline_plan(plan_file), largest_loss_percent), order, gate)
     name = instrument or _DEMO_INSTRUMENT
-    protocol = chosen_protocol(name, profile, zero_mm, bar_length_mm=stated_length_mm(told))
-    details = session_details(**told, stroke_mm=protocol.length.stroke_mm)
+    protocol = chosen_protocol(name, profile, zero_mm, bar_length_mm=noted.stated_length_mm())
+    details = noted.details(protocol.length.stroke_mm)
     folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
     with ExitStack() as stack:
         job = Job(
@@ -272,14 +274,14 @@ def _line(
     return Line(instrument=instrument or "", profile=profile or "", port=port or "", baud=baud, zero_mm=zero_mm)
 
 
-def _given(line: Line, spy: Path | None, sequence: tuple[str, str], told: Mapping[str, Any]) -> Choice:
+def _given(line: Line, spy: Path | None, sequence: tuple[str, str], noted: SessionOptions) -> Choice:
     """Return what options and settings say of a session that is chosen on the screen.
 
     Args:
         line: instrument and port.
         spy: file of `--spy`.
         sequence: order of the tests, and what is repeated at their end.
-        told: the session's options.
+        noted: the session's options.
 
     Raises:
         click.UsageError: an option that the start screen has no place for.
@@ -287,22 +289,21 @@ def _given(line: Line, spy: Path | None, sequence: tuple[str, str], told: Mappin
     from dbbstation.service.choice import Choice
     from dbbstation.service.order import Gate, Order
 
-    of_bar = ("bar_serial_number", "bar_length_mm", "bar_uncertainty_um", "bar_temp_c")
     lost = ["spy"] if spy is not None else []
-    lost += [name for name in of_bar if told[name] not in {"", None} and not from_settings(name)]
+    lost += noted.of_bar
     if lost:
         names = ", ".join(f"--{name.replace('_', '-')}" for name in lost)
         raise click.UsageError(f"{names} goes with --plan, --machine, --instrument, --port and --out")
     return Choice(
         line=line,
-        bar=told["bar_file"],
-        bar_waiver=told["bar_waiver"].strip(),
-        operator=told["operator"],
-        serial_number=told["serial_number"],
-        job=told["job"],
+        bar=noted.bar_file,
+        bar_waiver=noted.bar_waiver.strip(),
+        operator=noted.operator,
+        serial_number=noted.serial_number,
+        job=noted.job,
         order=Order(sequence[0]),
         gate=Gate(sequence[1]),
-        ambient_temp_c=told["ambient_temp_c"],
+        ambient_temp_c=noted.ambient_temp_c,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.inference.verdict import Acts, Gains, Value, Verdict
 
@@ -146,7 +146,7 @@ class Curve:
         """Period of a wave of strut length [mm]; None for all others."""
         return self.period if self.follows.variable == "strut-length" else None
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self) -> dict[str, object]:
         """Return it as plain values for JSON."""
         return {"variable": self.variable, "period_mm": self.period_mm, **asdict(self)}
 

@@ -69,7 +69,7 @@ class FleetFolder:
         if not mark.is_file():
             write_text(mark, json.dumps({"format": "dbb-fleet/1"}) + "\n")
 
-    def known(self, name: str, key: str) -> dict[str, Any] | None:
+    def known(self, name: str, key: str) -> dict[str, object] | None:
         """Return a result that was kept under a key; None where there is none that can be read."""
         path = self._file(name, key)
         try:
@@ -80,7 +80,7 @@ class FleetFolder:
             return None
         return data if all((self.folder / file).is_file() for file in data.get("files", ())) else None
 
-    def keep(self, name: str, key: str, data: Mapping[str, Any], files: Mapping[str, bytes]) -> dict[str, Any]:
+    def keep(self, name: str, key: str, data: Mapping[str, Any], files: Mapping[str, bytes]) -> dict[str, object]:
         """Keep a result, and return it as `known` would.
 
         Args:

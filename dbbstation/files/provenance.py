@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import textwrap
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.files.atomic import refuse_existing, write_folder
 
@@ -37,7 +37,7 @@ class Provenance:
     command: str
     inputs: Mapping[str, str] = field(default_factory=dict)
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> dict[str, object]:
         """Return it as JSON and YAML hold it."""
         return {"program": self.program, "command": self.command, "inputs": dict(self.inputs)}
 

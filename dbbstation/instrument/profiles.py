@@ -127,7 +127,7 @@ def _merged(document: YamlDocument, name: str) -> YamlDocument:
     return replace(document, data=data, value_places=values, key_places=keys)
 
 
-def _over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+def _over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, object]:
     both = dict(below)
     for key, value in above.items():
         whole = not (isinstance(value, dict) and isinstance(below.get(key), dict))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from dbbstation.model.machine_model import by_parameters
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -144,10 +145,31 @@ def predicted_poses(
     return actual, known
 
 
-def prediction_summary(
+@dataclass(frozen=True)
+class PoseErrors:
+    """Position errors of predicted poses, and how well they are known.
+
+    Attributes:
+        greatest_error_um: largest distance from the commanded position [µm].
+        error_rms_um: root mean square of the distances [µm].
+        common_shift_um: mean error, X, Y, Z [µm].
+        error_about_mean_rms_um: root mean square without the common shift [µm].
+        greatest_uncertainty_um: largest standard uncertainty of a position, its length over the axes; None where not known [µm].
+        greatest_uncertainty_by_axis_um: the same of each axis [µm].
+    """
+
+    greatest_error_um: float
+    error_rms_um: float
+    common_shift_um: tuple[float, ...]
+    error_about_mean_rms_um: float
+    greatest_uncertainty_um: float | None
+    greatest_uncertainty_by_axis_um: Mapping[str, float | None]
+
+
+def pose_errors(
     commanded: NDArray[np.float64], actual: NDArray[np.float64], uncertainty_mm: NDArray[np.float64]
-) -> dict[str, Any]:
-    """Position errors of predicted poses, and how well they are known, as plain numbers.
+) -> PoseErrors:
+    """Return position errors of predicted poses, and how well they are known.
 
     A common shift is part of an error, and a program whose zero is set on the part does not feel it: both are given.
 
@@ -160,16 +182,16 @@ def prediction_summary(
     shift_um = off_um.mean(axis=0)
     greatest_um = 1e3 * uncertainty_mm.max(axis=0)
     whole_um = 1e3 * float(np.linalg.norm(uncertainty_mm, axis=1).max())
-    return {
-        "greatest_error_um": float(np.linalg.norm(off_um, axis=1).max()),
-        "error_rms_um": rms_length(off_um),
-        "common_shift_um": shift_um.tolist(),
-        "error_about_mean_rms_um": rms_length(off_um - shift_um),
-        "greatest_uncertainty_um": None if np.isnan(whole_um) else whole_um,
-        "greatest_uncertainty_by_axis_um": {
+    return PoseErrors(
+        greatest_error_um=float(np.linalg.norm(off_um, axis=1).max()),
+        error_rms_um=rms_length(off_um),
+        common_shift_um=tuple(shift_um.tolist()),
+        error_about_mean_rms_um=rms_length(off_um - shift_um),
+        greatest_uncertainty_um=None if np.isnan(whole_um) else whole_um,
+        greatest_uncertainty_by_axis_um={
             axis: None if np.isnan(u) else u for axis, u in zip("xyz", greatest_um.tolist(), strict=True)
         },
-    }
+    )
 
 
 def rms_length(vectors: NDArray[np.float64]) -> float:

@@ -72,8 +72,8 @@ class CauseRow(NamedTuple):
     confirm: str
 
 
-class CuredPolar(NamedTuple):
-    """A circle as measured and as it would be without a cause."""
+class TitledPolar(NamedTuple):
+    """A polar trace with its title."""
 
     title: str
     drawing: Polar
@@ -108,7 +108,7 @@ def cause_rows(ranked: Ranked, coverage_factor: float) -> list[CauseRow]:
     return rows
 
 
-def cured_polars(ranked: Ranked) -> list[CuredPolar]:
+def cured_polars(ranked: Ranked) -> list[TitledPolar]:
     """Return drawings of the circles as measured and as they would be if the first cause were cured."""
     if not ranked.effects:
         return []
@@ -118,7 +118,7 @@ def cured_polars(ranked: Ranked) -> list[CuredPolar]:
         of.setdefault(circle.test, circle)
     chosen = sorted(list(of.values())[:MOST_DRAWN], key=lambda one: one.test)
     return [
-        CuredPolar(
+        TitledPolar(
             f"test {one.test} {one.direction.upper()}: G {one.measured_g_um:.1f}, without it {one.cured_g_um:.1f} µm",
             _drawn(one),
         )

@@ -1,28 +1,42 @@
-"""What a report says: figures, verdict, conditions and drawings, ready for its template."""
+"""What a report says: its numbers, and with conditions and drawings what its template names."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.plan.tolerance import OF_A_MODEL
 from dbbstation.quality.conformity import Conformity
-from dbbstation.report.causes_part import cause_rows, cured_polars
+from dbbstation.report.causes_part import TitledPolar, cause_rows, cured_polars
 from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.model_part import not_visible, parameters, quality_of_fit
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
+from dbbstation.report.shown import ReportContent, ShownCauses, ShownFindings, ShownModel, ShownSession
 from dbbstation.report.verdict import verdict_of
-from dbbstation.results.circles import circled_summary
+from dbbstation.results.circle_figures import RunWithoutCircle
+from dbbstation.results.circles import circles_result
 from dbbstation.results.effects import effect_results
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
-from dbbstation.results.serialise import plain
+from dbbstation.results.report import (
+    CertificateState,
+    ComparedTolerance,
+    HeldTolerance,
+    MeanAndLargest,
+    MeasuredFigures,
+    MeasuredMean,
+    MeasuredSize,
+    NotEvaluated,
+    ReportResult,
+    ToleranceOfTest,
+    WorstCircle,
+)
 from dbbstation.results.tolerances import filter_words, held_against, tolerated_circles, tolerated_pairs
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
     from dbbstation.circles.path import Filter
     from dbbstation.files.formats.settings import Settings
@@ -31,7 +45,9 @@ if TYPE_CHECKING:
     from dbbstation.plan.tolerance import Tolerance
     from dbbstation.report.causes_part import Ranked
     from dbbstation.report.certificate import Certified
-    from dbbstation.results.circles import Circled
+    from dbbstation.results.circle_figures import FigureBudget
+    from dbbstation.results.circles import Circled, CirclesResult
+    from dbbstation.results.evaluation import EvaluationResult
     from dbbstation.results.tolerances import Held, ToleratedCircle
 
 
@@ -45,12 +61,12 @@ class Modelled:
 
     Attributes:
         identified: the model.
-        evaluation: what `evaluated` returns; empty where it could not be worked out.
+        evaluation: what it leaves; None where that could not be worked out.
         problem: why it could not; empty where it could.
     """
 
     identified: IdentifiedModel
-    evaluation: Mapping[str, Any]
+    evaluation: EvaluationResult | None
     problem: str = ""
 
 
@@ -81,57 +97,41 @@ class Reported:
     place: str = ""
 
 
-def numbers_of(reported: Reported) -> dict[str, Any]:
-    """Return the numbers of a report: what its command prints as JSON, and its template shows."""
-    tolerances = reported.settings.tolerances
+def numbers_of(reported: Reported, page: str) -> ReportResult:
+    """Return the numbers of a report: what its command prints as JSON, and its template shows.
+
+    Args:
+        reported: what goes into it.
+        page: file that it is written to.
+    """
+    tolerances, coverage_factor = reported.settings.tolerances, reported.coverage_factor
     now = tolerated_circles(reported.found.circles, tolerances)
     now_both = (*now, *tolerated_pairs(reported.found.pairs, tolerances))
-    held = held_against(tolerances, now_both, reported.coverage_factor)
-    identified = None if reported.modelled is None else reported.modelled.identified
-    ranked = reported.ranked
+    held = held_against(tolerances, now_both, coverage_factor)
+    modelled, ranked = reported.modelled, reported.ranked
+    identified = None if modelled is None else modelled.identified
     certificate = certified_of(reported)
-    verdict = verdict_of(held, reported.found, reported.coverage_factor, identified, reported.ranked)
     former = reported.before
     before = () if former is None else tolerated_circles(former.circles, tolerances)
     before_both = (*before, *(() if former is None else tolerated_pairs(former.pairs, tolerances)))
-    tests = dict.fromkeys(one.test for one in now)
-    rows = list(_side_by_side(now, before))
-    return {
-        "verdict": {
-            "kind": verdict.kind,
-            "headline": verdict.headline,
-            "reasons": list(verdict.reasons),
-            "to_do": list(verdict.to_do),
-        },
-        "certificate": {
-            "title": certificate.title,
-            "lacking": list(certificate.lacking),
-            "place": certificate.place or None,
-        },
-        "model_warnings": [] if identified is None else list(model_warnings(identified)),
-        "coverage_factor": reported.coverage_factor,
-        "tolerances": [_held_both(one, now_both, before_both, reported.coverage_factor) for one in tolerances],
-        "tolerances_by_test": [
-            {
-                "test": test,
-                **_held_both(one, _of_test(now_both, test), _of_test(before_both, test), reported.coverage_factor),
-            }
-            for test in tests
-            for one in tolerances
-            if any(
-                one.holds_for(circle.test, circle.direction) and circle.size(one) is not None
-                for circle in _of_test(now_both, test)
-            )
-        ],
-        "measured": rows,
-        "measured_means": _means(rows),
-        "circles": circled_summary(reported.found, reported.chosen),
-        "causes": []
-        if ranked is None
-        else [plain(one) for one in effect_results(ranked.effects, ranked.verdicts or {})],
-        "causes_of": None if ranked is None or not ranked.effects else ranked.session,
-        "model": None if reported.modelled is None else dict(reported.modelled.evaluation),
-    }
+    measured = tuple(_side_by_side(now, before))
+    return ReportResult(
+        report=page,
+        verdict=verdict_of(held, reported.found, coverage_factor, identified, ranked),
+        certificate=CertificateState(certificate.title, certificate.lacking, certificate.place or None),
+        model_warnings=() if identified is None else model_warnings(identified),
+        coverage_factor=coverage_factor,
+        tolerances=tuple(_compared(one, now_both, before_both, coverage_factor) for one in tolerances),
+        tolerances_by_test=tuple(
+            _by_test(dict.fromkeys(one.test for one in now), tolerances, (now_both, before_both), coverage_factor)
+        ),
+        measured=measured,
+        measured_means=tuple(_means(measured)),
+        circles=circles_result(reported.found, reported.chosen),
+        causes=() if ranked is None else effect_results(ranked.effects, ranked.verdicts or {}),
+        causes_of=None if ranked is None or not ranked.effects else ranked.session,
+        model=None if modelled is None else modelled.evaluation or NotEvaluated(),
+    )
 
 
 def certified_of(reported: Reported) -> Certified:
@@ -141,8 +141,8 @@ def certified_of(reported: Reported) -> Certified:
     return certified(shown, reported.job, reported.place, tolerances=bool(reported.settings.tolerances))
 
 
-def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Provenance) -> dict[str, Any]:
-    """Return everything that the template of a report names.
+def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance) -> ReportContent:
+    """Return what the template of a report names beside its numbers.
 
     Args:
         reported: what goes into it.
@@ -150,64 +150,63 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
         provenance: where it comes from.
     """
     found, modelled = reported.found, reported.modelled
-    bad = {one["worst"]["test"] for one in numbers["tolerances"] if one["worst"] and not one["within"]}
+    bad = {one.worst.test for one in numbers.tolerances if one.worst is not None and not one.within}
     bad |= {one.entry.test for one in found.circles if one.problem or (one.judgement and one.judgement.wrong)}
-    return {
-        **numbers,
-        "machine": found.sessions[0].machine.name,
-        "virtual": [session.name for session in found.sessions if session.virtual],
-        "job": reported.job or found.sessions[0].job,
-        "sessions": [
-            {
-                "name": session.name,
-                "measured": when_measured(c.entry for c in found.circles if c.session == session.name),
-                "identity": identity(session),
-                "conditions": conditions(
-                    session, [c for c in found.circles if c.session == session.name], reported.job
-                ),
-                "places": plate_map({name: session.plan.tests[name] for name in _tests_of(found, session.name)}, bad),
-                "known": all(session.plan.tests[name].ball.place_known for name in _tests_of(found, session.name)),
-            }
-            for session in found.sessions
-            if any(c.session == session.name for c in found.circles)
-        ],
-        "reasons_shown": REASONS_SHOWN,
-        "map_width": WIDTH,
-        "polar_size": SIZE,
-        "polar_radius": CIRCLE,
-        "polars": _polars(reported),
-        "causes": _causes(reported),
-        "before_name": "" if reported.before is None else reported.before.sessions[0].name,
-        "several": len(found.sessions) > 1,
-        "findings": _findings(found),
-        "not_stated": _not_stated(numbers["circles"]),
-        "why_not": _why_not(numbers["circles"]),
-        "tolerances_from": reported.settings.tolerances_from,
-        "modelled": None
+    return ReportContent(
+        machine=found.sessions[0].machine.name,
+        virtual=[session.name for session in found.sessions if session.virtual],
+        job=reported.job or found.sessions[0].job,
+        sessions=list(_sessions(reported, bad)),
+        reasons_shown=REASONS_SHOWN,
+        map_width=WIDTH,
+        polar_size=SIZE,
+        polar_radius=CIRCLE,
+        polars=_polars(reported),
+        ranking=_ranking(reported),
+        before_name="" if reported.before is None else reported.before.sessions[0].name,
+        several=len(found.sessions) > 1,
+        findings=_findings(found),
+        not_stated=_not_stated(numbers.circles),
+        why_not=_why_not(numbers.circles),
+        tolerances_from=reported.settings.tolerances_from,
+        modelled=None
         if modelled is None
-        else {
-            "problem": modelled.problem,
-            "failed": lacks_physics(modelled.identified.report),
-            "quality": quality_of_fit(modelled.identified),
-            "parameters": parameters(modelled.identified, reported.coverage_factor),
-            "not_visible": not_visible(modelled.identified),
-        },
-        "notes": [*found.warnings, *_notes_before(reported)],
-        "files": list(_files(reported, provenance)),
-        "provenance": provenance,
-    }
+        else ShownModel(
+            problem=modelled.problem,
+            failed=lacks_physics(modelled.identified.report),
+            quality=quality_of_fit(modelled.identified),
+            parameters=parameters(modelled.identified, reported.coverage_factor),
+            not_visible=not_visible(modelled.identified),
+        ),
+        notes=[*found.warnings, *_notes_before(reported)],
+        files=list(_files(reported, provenance)),
+        provenance=provenance,
+    )
 
 
-def _causes(reported: Reported) -> dict[str, Any] | None:
+def _sessions(reported: Reported, bad: set[str]) -> Iterable[ShownSession]:
+    """Yield the sessions that have circles; `bad` names tests that need attention."""
+    for session in reported.found.sessions:
+        circles = [one for one in reported.found.circles if one.session == session.name]
+        tests = list(dict.fromkeys(one.entry.test for one in circles))
+        if circles:
+            yield ShownSession(
+                name=session.name,
+                measured=when_measured(one.entry for one in circles),
+                identity=identity(session),
+                conditions=conditions(session, circles, reported.job),
+                places=plate_map({name: session.plan.tests[name] for name in tests}, bad),
+                known=all(session.plan.tests[name].ball.place_known for name in tests),
+            )
+
+
+def _ranking(reported: Reported) -> ShownCauses | None:
     ranked = reported.ranked
     if ranked is None:
         return None
-    return {
-        "session": ranked.session,
-        "why_not": ranked.why_not,
-        "rows": cause_rows(ranked, reported.coverage_factor),
-        "polars": cured_polars(ranked),
-    }
+    return ShownCauses(
+        ranked.session, ranked.why_not, cause_rows(ranked, reported.coverage_factor), cured_polars(ranked)
+    )
 
 
 def _notes_before(reported: Reported) -> list[str]:
@@ -220,97 +219,100 @@ def _notes_before(reported: Reported) -> list[str]:
     return [*([note] if unlike else []), *reported.before.warnings]
 
 
-def _tests_of(found: Circled, session: str) -> list[str]:
-    return list(dict.fromkeys(one.entry.test for one in found.circles if one.session == session))
+def _by_test(
+    tests: Iterable[str],
+    tolerances: Sequence[Tolerance],
+    both: tuple[Sequence[ToleratedCircle], Sequence[ToleratedCircle]],
+    coverage_factor: float,
+) -> Iterable[ToleranceOfTest]:
+    """Yield every tolerance held against the circles of each test that it is for.
+
+    Args:
+        tests: names.
+        tolerances: of the shop.
+        both: circles now, and before.
+        coverage_factor: k of U = k u.
+    """
+    for test in tests:
+        now, before = ([one for one in circles if one.test == test] for circles in both)
+        for one in tolerances:
+            if any(one.holds_for(circle.test, circle.direction) and circle.size(one) is not None for circle in now):
+                yield ToleranceOfTest(test=test, **vars(_compared(one, now, before, coverage_factor)))
 
 
-def _of_test(circles: Sequence[ToleratedCircle], test: str) -> list[ToleratedCircle]:
-    return [one for one in circles if one.test == test]
-
-
-def _held_both(
+def _compared(
     tolerance: Tolerance, now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle], coverage_factor: float
-) -> dict[str, Any]:
+) -> ComparedTolerance:
     """Return what one tolerance says of circles now and before; nothing of before where it holds for none of them."""
     (held,) = held_against((tolerance,), now, coverage_factor)
     (former,) = held_against((tolerance,), before, coverage_factor)
-    told = None if former.worst is None else _held_data(former, coverage_factor)
-    return {**_held_data(held, coverage_factor), "before": told}
+    told = None if former.worst is None else _held(former, coverage_factor)
+    return ComparedTolerance(**vars(_held(held, coverage_factor)), before=told)
 
 
-def _held_data(held: Held, coverage_factor: float) -> dict[str, Any]:
-    worst = held.worst
-    size = held.size
-    return {
-        "quantity": held.tolerance.figure.value,
-        "filter": filter_words(held.tolerance),
-        "largest_um": held.tolerance.largest_um,
-        "tests": list(held.tolerance.tests),
-        "directions": [direction.value for direction in held.tolerance.directions],
-        "conformity": None if held.conformity is None else str(held.conformity),
-        "within": held.conformity in {None, Conformity.WITHIN},
-        "exceeded": held.exceeded,
-        "undecided": held.undecided,
-        "circles": held.circles,
-        "worst": None
-        if worst is None or size is None
-        else {
-            "test": worst.test,
-            "direction": worst.direction,
-            "repeat": worst.repeat,
-            "um": size.um,
-            "expanded_um": None if size.u_um is None else coverage_factor * size.u_um,
-            "why_not": size.why_not or None,
-        },
-    }
+def _held(held: Held, coverage_factor: float) -> HeldTolerance:
+    tolerance = held.tolerance
+    return HeldTolerance(
+        quantity=tolerance.figure.value,
+        filter=filter_words(tolerance),
+        largest_um=tolerance.largest_um,
+        tests=tuple(tolerance.tests),
+        directions=tuple(direction.value for direction in tolerance.directions),
+        conformity=None if held.conformity is None else str(held.conformity),
+        within=held.conformity in {None, Conformity.WITHIN},
+        exceeded=held.exceeded,
+        undecided=held.undecided,
+        circles=held.circles,
+        worst=_worst(held, coverage_factor),
+    )
 
 
-def _side_by_side(now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle]) -> Iterable[dict[str, Any]]:
+def _worst(held: Held, coverage_factor: float) -> WorstCircle | None:
+    worst, size = held.worst, held.size
+    if worst is None or size is None:
+        return None
+    expanded_um = None if size.u_um is None else coverage_factor * size.u_um
+    return WorstCircle(worst.test, worst.direction, worst.repeat, size.um, expanded_um, size.why_not or None)
+
+
+def _side_by_side(now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle]) -> Iterable[MeasuredFigures]:
     """Yield figures as measured, each with those of the same test, direction and repeat before."""
-    former = {one.key: one for one in before}
+    former = {one.key: _sizes(one) for one in before}
     for one in now:
-        then = former.get(one.key)
-        yield {
-            "session": one.session,
-            "test": one.test,
-            "direction": one.direction,
-            "repeat": one.repeat,
-            "now": _sizes(one),
-            "before": None if then is None else _sizes(then),
-        }
+        yield MeasuredFigures(
+            one.session, one.test, one.direction, one.repeat, now=_sizes(one), before=former.get(one.key)
+        )
 
 
-def _sizes(one: ToleratedCircle) -> dict[str, dict[str, float | None]]:
-    return {str(figure): {"um": size.um, "u_um": size.u_um} for figure, size in one.sizes.items()}
+def _sizes(one: ToleratedCircle) -> dict[str, MeasuredSize]:
+    return {str(figure): MeasuredSize(size.um, size.u_um) for figure, size in one.sizes.items()}
 
 
-def _means(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Mean and largest of each figure; with those before of the circles that were measured both times."""
-    both = [row for row in rows if row["before"] is not None]
-    taken = both or list(rows)
-    return [
-        {
-            "quantity": figure.value,
-            "circles": len(taken),
-            "now": _mean_and_largest([row["now"][figure.value]["um"] for row in taken]),
-            "before": _mean_and_largest([row["before"][figure.value]["um"] for row in both]),
-        }
-        for figure in OF_A_MODEL
-    ]
+def _means(measured: Sequence[MeasuredFigures]) -> Iterable[MeasuredMean]:
+    """Yield mean and largest of each figure; with those before of the circles that were measured both times."""
+    both = [one for one in measured if one.before is not None]
+    taken = both or measured
+    for figure in OF_A_MODEL:
+        yield MeasuredMean(
+            quantity=figure.value,
+            circles=len(taken),
+            now=_mean_and_largest([one.now[figure.value].um for one in taken]),
+            before=_mean_and_largest([one.before[figure.value].um for one in both if one.before is not None]),
+        )
 
 
-def _mean_and_largest(sizes: Sequence[float]) -> dict[str, float] | None:
-    return {"mean_um": sum(sizes) / len(sizes), "largest_um": max(sizes)} if sizes else None
+def _mean_and_largest(sizes: Sequence[float]) -> MeanAndLargest | None:
+    return MeanAndLargest(sum(sizes) / len(sizes), max(sizes)) if sizes else None
 
 
-def _polars(reported: Reported) -> list[dict[str, Any]]:
+def _polars(reported: Reported) -> list[TitledPolar]:
     before = () if reported.before is None else reported.before.circles
     tests = dict.fromkeys((one.session, one.entry.test) for one in reported.found.circles if one.analysis is not None)
     several = len(reported.found.sessions) > 1
     return [
-        {
-            "title": f"{session}: test {test}" if several else f"test {test}",
-            "drawing": polar(
+        TitledPolar(
+            f"{session}: test {test}" if several else f"test {test}",
+            polar(
                 test,
                 [
                     c
@@ -319,12 +321,12 @@ def _polars(reported: Reported) -> list[dict[str, Any]]:
                 ],
                 [c for c in before if c.entry.test == test and c.analysis is not None],
             ),
-        }
+        )
         for session, test in tests
     ]
 
 
-def _findings(found: Circled) -> dict[str, Any]:
+def _findings(found: Circled) -> ShownFindings:
     """Return findings that are wrong, run by run, and those that cannot be decided, by what they are."""
     wrong, undecided, good = [], dict[tuple[str, str], list[str]](), 0
     for one in found.circles:
@@ -335,27 +337,26 @@ def _findings(found: Circled) -> dict[str, Any]:
                 good += 1
             else:
                 undecided.setdefault((str(finding.name), finding.text), []).append(one.entry.label)
-    return {
-        "wrong": wrong,
-        "undecided": [(name, text, runs) for (name, text), runs in undecided.items()],
-        "good": good,
-    }
+    return ShownFindings(wrong, [(name, text, runs) for (name, text), runs in undecided.items()], good)
 
 
-def _not_stated(circles: Mapping[str, Any]) -> list[str]:
-    budgets = [
-        budget for run in [*circles["runs"], *circles["pairs"]] for budget in run.get("uncertainty", {}).values()
-    ]
-    return list(dict.fromkeys(cause for budget in budgets for cause in budget["missing"]))
+def _budgets(circles: CirclesResult) -> Iterable[tuple[str, FigureBudget]]:
+    """Yield the name and the budget of every figure."""
+    for one in (*circles.runs, *circles.pairs):
+        if not isinstance(one, RunWithoutCircle):
+            yield from one.uncertainty.items()
 
 
-def _why_not(circles: Mapping[str, Any]) -> list[str]:
+def _not_stated(circles: CirclesResult) -> list[str]:
+    return list(dict.fromkeys(cause for _, budget in _budgets(circles) for cause in budget.missing))
+
+
+def _why_not(circles: CirclesResult) -> list[str]:
     """Return why figures have no uncertainty, with their names."""
     of: dict[str, dict[str, None]] = {}
-    for run in [*circles["runs"], *circles["pairs"]]:
-        for figure, budget in run.get("uncertainty", {}).items():
-            if budget["why_not"]:
-                of.setdefault(budget["why_not"], {})[figure] = None
+    for figure, budget in _budgets(circles):
+        if budget.why_not:
+            of.setdefault(budget.why_not, {})[figure] = None
     return [f"{', '.join(figures)}: {why}" for why, figures in of.items()]
 
 

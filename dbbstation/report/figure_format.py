@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.report.svg import as_svg
 
@@ -63,7 +63,7 @@ def in_format(figure: Figure, wanted: FigureFormat | Stamped) -> bytes:
     return out.getvalue()
 
 
-def _metadata(provenance: Provenance, kind: FigureFormat) -> dict[str, Any]:
+def _metadata(provenance: Provenance, kind: FigureFormat) -> dict[str, object]:
     """Program, command and inputs under the names that each format has for them."""
     names = {
         FigureFormat.SVG: ("Creator", "Description"),  # Dublin Core, in RDF

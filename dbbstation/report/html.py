@@ -5,7 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from hashlib import sha256
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import jinja2
 
@@ -13,22 +13,25 @@ from dbbstation.report.history_words import DASH, rounded
 from dbbstation.text.digits import with_uncertainty
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from dbbstation.report.shown import ReportContent
+    from dbbstation.results.report import ReportResult
 
 
-def report_html(content: Mapping[str, Any]) -> bytes:
+def report_html(numbers: ReportResult, content: ReportContent) -> bytes:
     """Return a report as HTML: one file that refers to nothing outside it, the same for the same content.
 
     Its one script enlarges polar traces and reads them off; the page says everything without it. By its own policy the
     page runs no other script, whatever people typed.
 
     Args:
-        content: what `content_of` returns.
+        numbers: of the report.
+        content: what the page shows beside them.
     """
     script = files("dbbstation.report").joinpath("templates", "polar.js").read_text("utf-8").strip()
     digest = b64encode(sha256(script.encode()).digest()).decode()
     page = environment().get_template("report.html")
-    return page.render(content, script=script, script_sha256=digest).encode()
+    shown = {**vars(numbers), **vars(content)}
+    return page.render(shown, script=script, script_sha256=digest).encode()
 
 
 def environment() -> jinja2.Environment:

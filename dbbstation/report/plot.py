@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.circles.budget import budget_of
 from dbbstation.circles.quantity import BudgetQuantity
@@ -18,6 +18,8 @@ from dbbstation.report.plot_map import draw_map
 from dbbstation.report.plot_panels import CAPTION_IN, draw_deviation, draw_polar, draw_spectrum, draw_together
 from dbbstation.report.polar import chosen
 from dbbstation.report.sheet import MARGIN_IN, Cell, Key, Sheet
+from dbbstation.results.circle_figures import PlaneVector
+from dbbstation.results.plotted import DrawnCircle, PlotResult
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -119,18 +121,23 @@ class Plotted:
             return [one for one in self.found.circles if one.analysis is not None]
         return [one for panel in self.panels() for one, _ in panel.drawn]
 
-    def numbers(self) -> dict[str, Any]:
-        """Return what the figure shows as plain numbers: what its command prints as JSON."""
+    def result(self, figure: str) -> PlotResult:
+        """Return what the figure shows: what its command prints as JSON.
+
+        Args:
+            figure: its file.
+        """
         panels = self.panels()
-        return {
-            "kind": str(self.kind),
-            "filter": self.chosen.words,
-            "drawn": [_numbers_of(one) for panel in panels for one, _ in panel.drawn],
-            "not_drawn": sum(panel.not_drawn for panel in panels),
-            "one_direction_only": [
+        return PlotResult(
+            figure=figure,
+            kind=str(self.kind),
+            filter=self.chosen.words,
+            drawn=tuple(_drawn(one) for panel in panels for one, _ in panel.drawn if one.analysis is not None),
+            not_drawn=sum(panel.not_drawn for panel in panels),
+            one_direction_only=tuple(
                 f"{panel.session}: {panel.test}" for panel in panels if len(_directions(panel.drawn)) == 1
-            ],
-        }
+            ),
+        )
 
 
 def plot_figure(plotted: Plotted, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
@@ -242,7 +249,7 @@ def _keys(plotted: Plotted, panels: Sequence[PlotPanel]) -> list[Key]:
         ]
     present = dict.fromkeys(str(one.entry.direction) for panel in panels for one, _ in panel.drawn)
     words = {"ccw": "counter-clockwise (CCW)", "cw": "clockwise (CW)"}
-    styles: dict[str, dict[str, Any]] = {
+    styles: dict[str, dict[str, object]] = {
         "ccw": {"color": AFTER, "linewidth": 1.2},
         "cw": {"color": BEFORE, "linewidth": 1.2, "linestyle": "--"},
     }
@@ -305,18 +312,11 @@ def _reach_um(drawn: Sequence[Drawn]) -> float:
     return max(float(abs(one.analysis.residual_um).max()) for one, _ in drawn if one.analysis is not None)
 
 
-def _numbers_of(one: MeasuredCircle) -> dict[str, Any]:
+def _drawn(one: MeasuredCircle) -> DrawnCircle:
     """Figures of a run that stand on the sheet."""
     if one.analysis is None:
-        return {}
+        raise ValueError("a run without a circle is on no sheet")
     x, y = one.analysis.centre_mm
     g = budget_of(one.analysis, BudgetQuantity.G, one.known)
-    return {
-        "session": one.session,
-        "test": one.entry.test,
-        "direction": str(one.entry.direction),
-        "repeat": one.entry.repeat,
-        "g_um": g.value_um,
-        "u_g_um": g.u_um,
-        "centre_um": {"x": 1e3 * x, "y": 1e3 * y},
-    }
+    name = (one.session, one.entry.test, str(one.entry.direction), one.entry.repeat)
+    return DrawnCircle(*name, g_um=g.value_um, u_g_um=g.u_um, centre_um=PlaneVector(1e3 * x, 1e3 * y))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.quality.conformity import Conformity
 from dbbstation.report.causes_part import told_causes
 from dbbstation.results.model_warnings import lacks_physics
+from dbbstation.results.report import ReportVerdict
 from dbbstation.text.digits import with_uncertainty
 
 if TYPE_CHECKING:
@@ -20,23 +20,6 @@ if TYPE_CHECKING:
 
 MOST_TOLD = 5
 """Runs that the first page names; the findings name all."""
-
-
-@dataclass(frozen=True)
-class ReportVerdict:
-    """What a foreman reads first.
-
-    Attributes:
-        kind: `within`, `exceeded`, `cannot tell` or `none`, where nothing was held against anything.
-        headline: in one sentence.
-        reasons: one sentence for each tolerance that is not kept.
-        to_do: what to do, in order.
-    """
-
-    kind: str
-    headline: str
-    reasons: tuple[str, ...]
-    to_do: tuple[str, ...]
 
 
 def verdict_of(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.circles.analysis import EDITION
 from dbbstation.circles.budget import budgets, pair_budgets
@@ -143,16 +143,6 @@ def circles_result(found: Circled, chosen: Filter, *, quick_look: bool = False) 
         circles=found,
         notes=found.warnings,
     )
-
-
-def circled_summary(found: Circled, chosen: Filter) -> dict[str, Any]:
-    """All figures of circles and pairs, with their budgets, as plain numbers: what `circles --json` prints.
-
-    Args:
-        found: the circles.
-        chosen: filter that they were worked out with.
-    """
-    return circles_result(found, chosen).to_dict()
 
 
 def _run(circle: MeasuredCircle) -> CircleFiguresResult | RunWithoutCircle:

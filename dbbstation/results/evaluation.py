@@ -118,7 +118,7 @@ class EvaluationResult(Framed):
         plane_uncertainty_not_known_because: why one of both is not known; None where both are.
         plane_z_mm: commanded Z of that plane [mm].
         plane_without: sources that are left out there, because no pose alone says what they do.
-        tolerances: of the shop, held against every circle.
+        tolerances: of the shop, held against every circle; None where another result holds them.
     """
 
     runs: tuple[EvaluatedRun, ...]
@@ -131,7 +131,7 @@ class EvaluationResult(Framed):
     plane_uncertainty_not_known_because: str | None
     plane_z_mm: float
     plane_without: tuple[str, ...]
-    tolerances: tuple[EvaluatedTolerance, ...] = ()
+    tolerances: Annotated[tuple[EvaluatedTolerance, ...] | None, Absent] = ()
 
     def rows(self) -> list[dict[str, object]]:
         """Figures of the runs, one row for each."""

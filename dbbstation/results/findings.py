@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -37,8 +37,3 @@ def finding_results(findings: Iterable[Finding]) -> tuple[FindingResult, ...]:
     return tuple(
         FindingResult(str(one.name), one.value, one.limit, one.unit, str(one.verdict), one.text) for one in findings
     )
-
-
-def plain_findings(findings: Iterable[Finding]) -> list[dict[str, object]]:
-    """Return every finding of a run as JSON has it."""
-    return [asdict(one) for one in finding_results(findings)]

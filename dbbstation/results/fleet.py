@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from dbbstation.results.frame import Framed
 from dbbstation.results.serialise import Absent
@@ -262,15 +262,9 @@ def _row(session: FleetSession, value: FleetValue | None, scored: Mapping[tuple[
     return [*about, one.sisters, one.usual, one.scatter, one.score, one.smallest_seen, one.unlike]
 
 
-def found_from(data: Mapping[str, Any]) -> FleetFound:
-    """Return what a task found, as it was kept.
+@dataclass(frozen=True)
+class StoredFiles:
+    """Where a result is kept: its key, and further files of it."""
 
-    Raises:
-        KeyError, TypeError: it was not kept by this program.
-    """
-    return FleetFound(
-        tuple(FleetValue(**one) for one in data["values"]),
-        tuple(FleetCause(**one) for one in data["causes"]),
-        str(data["headline"]),
-        tuple(data["notes"]),
-    )
+    key: str
+    files: tuple[str, ...]

@@ -113,7 +113,7 @@ def calibration_result(
     )
 
 
-def report_of(figures: CalibrationFigures, **more: Any) -> dict[str, Any]:  # noqa: ANN401 - what the file takes
+def report_of(figures: CalibrationFigures, **more: Any) -> dict[str, object]:  # noqa: ANN401 - what the file takes
     """Return the numbers that a model file keeps of its fit.
 
     Args:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.calibration.outliers.outlier import SOURCE_OF, OutlierKind
 from dbbstation.calibration.reporting.evaluation import rms_um
@@ -109,7 +109,7 @@ def diagnosis_result(
     return DiagnosisResult(**{**own, "drawing": drawing, "notes": notes}, effects=effects, model=model)
 
 
-def kept_of(figures: DiagnosisFigures) -> dict[str, Any]:
+def kept_of(figures: DiagnosisFigures) -> dict[str, object]:
     """Return what a model file keeps of the diagnosis that it comes from: what speaks against its causes.
 
     Args:

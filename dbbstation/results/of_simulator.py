@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dbbstation.diagnosis.simulator.separate import separating_input
+from dbbstation.diagnosis.simulator.separate import separating_inputs
 from dbbstation.inference.verdict import Verdict
 from dbbstation.results.inference import all_quantified, finite, gains_result, quantified, residual_result
 from dbbstation.results.simulator import (
@@ -61,8 +61,7 @@ def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -
         parameters=tuple(_parameter(one) for one in answer.parameters),
         left=residual_result(answer.left),
         next=tuple(
-            SeparatingInput(one["text"], tuple(one["terms"]), one["part"], one["sigmas"], one["repeats"])
-            for one in separating_input(answer)
+            SeparatingInput(one.text, one.terms, one.part, one.sigmas, one.repeats) for one in separating_inputs(answer)
         ),
         not_asked=dict(answer.not_asked),
         simulations=simulations,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from dbbstation.model.uncertainty import prediction_summary
+from dbbstation.model.uncertainty import pose_errors
 from dbbstation.results.frame import Framed
 from dbbstation.results.model_warnings import model_warnings, unknown_causes
 from dbbstation.results.serialise import Absent, AsItIs, Kept
@@ -84,12 +84,12 @@ def prediction_result(
         uncertainty_mm: shape (n, 3) [mm]; NaN where not known.
         file: table that was written.
     """
-    figures = prediction_summary(commanded, actual, uncertainty_mm)
-    unknown = None in figures["greatest_uncertainty_by_axis_um"].values()
+    figures = pose_errors(commanded, actual, uncertainty_mm)
+    unknown = None in figures.greatest_uncertainty_by_axis_um.values()
     return PredictionResult(
         file=file,
         poses=len(actual),
-        **{**figures, "common_shift_um": tuple(figures["common_shift_um"])},
+        **vars(figures),
         uncertainty_not_known_because=identified.why_unknown if unknown else None,
         directions_lost=tuple(identified.directions_lost),
         unknown_causes=unknown_causes(identified.model),

@@ -5,31 +5,58 @@ from __future__ import annotations
 from typing import Any
 
 from dbbstation.results.calibration import CalibrationResult
+from dbbstation.results.checked import CheckResult
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.comparison import ComparisonResult
 from dbbstation.results.diagnosis import DiagnosisResult
 from dbbstation.results.drive import DriveResult
 from dbbstation.results.evaluation import EvaluationResult
+from dbbstation.results.export import ExportResult
 from dbbstation.results.fleet import FleetResult
 from dbbstation.results.history import HistoryResult
+from dbbstation.results.imported import ImportResult
+from dbbstation.results.instruments import InstrumentsResult
+from dbbstation.results.jig import HoldersResult, SheetResult
+from dbbstation.results.measured import MeasuredSession
 from dbbstation.results.mismatch import MismatchResult
+from dbbstation.results.plotted import PlotResult
 from dbbstation.results.prediction import PredictionResult
 from dbbstation.results.programs import ProgramsResult
+from dbbstation.results.report import ReportResult
 from dbbstation.results.serialise import schema_of
+from dbbstation.results.sessions import ListedSession, SessionEvents, SimulatedSession
+from dbbstation.results.settings import SettingsResult
+from dbbstation.results.simulator import SimulatorResult
+from dbbstation.results.sources import SourcesResult
 
 RESULTS: dict[str, type] = {
     "calibrate": CalibrationResult,
+    "check": CheckResult,
     "circles": CirclesResult,
     "compare": ComparisonResult,
     "compensate": ProgramsResult,
     "diagnose": DiagnosisResult,
     "drive": DriveResult,
     "evaluate": EvaluationResult,
+    "export": ExportResult,
     "fleet": FleetResult,
     "history": HistoryResult,
+    "import": ImportResult,
+    "instruments": InstrumentsResult,
+    "jig-holders": HoldersResult,
+    "jig-sheet": SheetResult,
+    "measure": MeasuredSession,
     "mismatch": MismatchResult,
+    "mismatch-simulator": SimulatorResult,
+    "plot": PlotResult,
     "predict": PredictionResult,
     "program": ProgramsResult,
+    "report": ReportResult,
+    "session-list": ListedSession,
+    "session-log": SessionEvents,
+    "settings": SettingsResult,
+    "simulate": SimulatedSession,
+    "sources": SourcesResult,
 }
 """Class of each command's result, by the command's name."""
 

@@ -6,6 +6,7 @@ A result is a frozen dataclass. Its fields are the keys of the JSON, in the same
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
@@ -105,4 +106,18 @@ def read_json(kind: type[_Kind], text: str | bytes) -> _Kind:
         ValueError: the text is no JSON, or not of this class.
     """
     found: _Kind = _adapter(kind).validate_json(text)
+    return found
+
+
+def read_plain(kind: type[_Kind], data: Mapping[str, object]) -> _Kind:
+    """Return what `plain` made of a frozen dataclass, or as much of it as another class has.
+
+    Args:
+        kind: the class; its fields' names are keys.
+        data: objects, lists, texts and numbers; further keys are let be.
+
+    Raises:
+        ValueError: a key is missing, or its value is of another type.
+    """
+    found: _Kind = _adapter(kind).validate_python(data)
     return found

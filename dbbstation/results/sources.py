@@ -63,6 +63,13 @@ class SourceDescription:
     parameters: Annotated[tuple[SourceParameter, ...] | None, Absent] = None
 
 
+@dataclass(frozen=True)
+class SourcesResult:
+    """All causes that are known."""
+
+    sources: tuple[SourceDescription, ...]
+
+
 def source_description(source: ErrorSource, machine: Machine | None = None) -> SourceDescription:
     """Describe a cause, with its parameters on a machine where one is given.
 

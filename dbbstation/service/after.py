@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.files.places import unused_path
@@ -45,7 +45,7 @@ class Result:
     progress: WorkProgress | None = None
     stage: str = ""
     passed_s: float = 0.0
-    answer: dict[str, Any] = field(default_factory=dict)
+    answer: dict[str, object] = field(default_factory=dict)
     failure: str = ""
     path: Path | None = None
 

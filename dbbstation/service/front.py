@@ -12,7 +12,9 @@ from dbbstation.errors import StationError
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
+from dbbstation.results.serialise import read_plain
 from dbbstation.service.after import JOINT, KINEMATIC, After
+from dbbstation.service.answers import ProgramsAnswer
 from dbbstation.service.bar_calibration import BarCalibration, Stated
 from dbbstation.service.bar_stated import fault_of
 from dbbstation.service.candidates import CandidateFormat, candidates
@@ -209,7 +211,7 @@ class Front:
         try:
             if work.wait() is not WorkProgress.DONE:
                 raise StationError(work.failure())
-            return len(work.answer()["programs"]), folder
+            return len(read_plain(ProgramsAnswer, work.answer()).programs), folder
         finally:
             work.close()
 

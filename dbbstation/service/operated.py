@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.files.atomic import write_text
@@ -15,7 +15,9 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import format_for
 from dbbstation.quality.conformity import Conformity
+from dbbstation.results.serialise import read_plain
 from dbbstation.service.after import After
+from dbbstation.service.answers import ReportAnswer
 from dbbstation.service.choice import Choice
 from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Line
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.job import JobFile
+    from dbbstation.service.answers import VerdictAnswer
     from dbbstation.service.job import SessionJob
 
 
@@ -139,27 +142,27 @@ class JobAnswer:
             return None
         if result.progress is not WorkProgress.DONE:
             return Answered(Conformity.UNDECIDED, (result.failure or "the report was ended before it was done",))
-        return answer_of(result.answer["verdict"], self._missing, result.path)
+        return answer_of(read_plain(ReportAnswer, result.answer).verdict, self._missing, result.path)
 
     def close(self) -> None:
         """End what is being worked out."""
         self._after.close()
 
 
-def answer_of(verdict: dict[str, Any], missing: Sequence[str], report: Path | None) -> Answered:
+def answer_of(verdict: VerdictAnswer, missing: Sequence[str], report: Path | None) -> Answered:
     """Return the answer of a report's verdict; one that is complete needs every run of the plan.
 
     What exceeds a limit does so whatever is missing; what is within says nothing of circles that were not measured.
 
     Args:
-        verdict: `verdict` of the report's JSON.
+        verdict: of the report.
         missing: runs of the plan without an accepted recording.
         report: its file.
     """
     kinds = {str(one): one for one in Conformity}
-    word = kinds.get(verdict["kind"], Conformity.UNDECIDED)
-    reasons = list(verdict["reasons"]) or [verdict["headline"]]
-    to_do = list(verdict["to_do"])
+    word = kinds.get(verdict.kind, Conformity.UNDECIDED)
+    reasons = list(verdict.reasons) or [verdict.headline]
+    to_do = list(verdict.to_do)
     if missing:
         word = word if word is Conformity.EXCEEDED else Conformity.UNDECIDED
         reasons.insert(0, f"Not measured: {', '.join(missing)}.")

@@ -13,7 +13,7 @@ import threading
 import time
 from contextlib import suppress
 from enum import StrEnum
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -102,10 +102,10 @@ class BackgroundWork:
         self._process.wait()
         return self.progress
 
-    def answer(self) -> dict[str, Any]:
+    def answer(self) -> dict[str, object]:
         """Return the result as JSON has it, once it is done."""
         self._answer.seek(0)
-        found: dict[str, Any] = json.loads(self._answer.read())
+        found: dict[str, object] = json.loads(self._answer.read())
         return found
 
     def failure(self) -> str:

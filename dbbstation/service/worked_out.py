@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -34,7 +34,7 @@ class DoneStep(BaseModel):
     """What it wrote, in the folder of results."""
     passed_s: float
     """How long it took [s]."""
-    answer: dict[str, Any]
+    answer: dict[str, object]
     """What its command printed."""
 
 

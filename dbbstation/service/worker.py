@@ -12,7 +12,7 @@ import logging
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation import __version__
 from dbbstation.errors import StationError
@@ -67,7 +67,7 @@ def main() -> None:
         )
 
 
-def done(job: SessionJob) -> Mapping[str, Any]:
+def done(job: SessionJob) -> Mapping[str, object]:
     """Do a job in the working folder; return its result as JSON has it.
 
     Args:
@@ -86,7 +86,7 @@ def done(job: SessionJob) -> Mapping[str, Any]:
         case SessionTask.PROGRAMS:
             return plain(_programs(job, settings))
         case SessionTask.REPORT | SessionTask.ACCEPTANCE:
-            return _reported(job, settings)
+            return plain(_reported(job, settings))
 
 
 def _fitted(job: SessionJob) -> object:
@@ -134,13 +134,13 @@ def _programs(job: SessionJob, settings: Settings) -> object:
     )
 
 
-def _reported(job: SessionJob, settings: Settings) -> Mapping[str, Any]:
+def _reported(job: SessionJob, settings: Settings) -> object:
     """Write the report of a session, or of two."""
     from dbbstation.tasks.report import report  # noqa: PLC0415 - the same
 
     session = _needed(job.session, "session")
     given = [word for name in ("model", "before") if (path := getattr(job, name)) for word in (f"--{name}", path)]
-    written = report(
+    return report(
         session,
         job.out,
         settings=settings,
@@ -150,7 +150,6 @@ def _reported(job: SessionJob, settings: Settings) -> Mapping[str, Any]:
         provenance=lambda: _provenance("report", session, *given),
         progress=_stage,
     )
-    return {"report": job.out, **written.numbers}
 
 
 def _needed(path: Path | None, what: str) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -62,7 +62,7 @@ class Diagnosed:
     diagnosis: Diagnosis
     lacking: Mapping[str, str]
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """Everything that is said, as plain numbers."""
         return plain(diagnosis_figures(self.diagnosis, self.lacking))
 

@@ -17,6 +17,7 @@ from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.run_lines import split_head
 from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.results.export import ExportResult
 from dbbstation.tasks.chosen import chosen_of
 from dbbstation.tasks.load import paths_of
 from dbbstation.tasks.provenance import from_python
@@ -40,23 +41,6 @@ if TYPE_CHECKING:
 
 FORMATS = (".csv", ".parquet")
 """Formats of a table, by the ending of its file."""
-
-
-@dataclass(frozen=True)
-class ExportResult:
-    """A table that was written.
-
-    Attributes:
-        table: its file.
-        runs: in it.
-        rows: in it, one for each sample.
-        columns: names, with units.
-    """
-
-    table: str
-    runs: int
-    rows: int
-    columns: tuple[str, ...]
 
 
 def export(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
 from dbbstation.files.atomic import write_bytes
@@ -19,7 +19,8 @@ from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.report.fleet_page import fleet_html
-from dbbstation.results.fleet import FleetFound, FleetResult, FleetSession, found_from
+from dbbstation.results.fleet import FleetFound, FleetResult, FleetSession, StoredFiles
+from dbbstation.results.serialise import read_plain
 from dbbstation.sisters.unlike import FALSE_ALARMS
 from dbbstation.tasks.executors import Ended, WorkPool
 from dbbstation.tasks.fleet_compare import Sister, compared
@@ -233,9 +234,9 @@ def _taken(one: _Named, kept: FleetFolder, key: str, result: Worked | Ended) -> 
     return _known(one, kept, kept.keep(one.name, key, data, result.files), fresh=True)
 
 
-def _known(one: _Named, kept: FleetFolder, data: dict[str, Any], *, fresh: bool) -> _Outcome:
-    found = found_from(data)
-    files = (kept.file_of(one.name, data["key"]), *data["files"])
+def _known(one: _Named, kept: FleetFolder, data: dict[str, object], *, fresh: bool) -> _Outcome:
+    found, stored = read_plain(FleetFound, data), read_plain(StoredFiles, data)
+    files = (kept.file_of(one.name, stored.key), *stored.files)
     about = FleetSession(
         session=one.name,
         machine=one.machine,

@@ -135,7 +135,7 @@ def _refuse_other_inputs(inputs: Mapping[str, str]) -> None:
             raise InputError([Problem(path, 0, 0, what, "let all computers see one folder, under one path")])
 
 
-Done = tuple[FleetFound, "dict[str, Any]", "dict[str, bytes]"]
+Done = tuple[FleetFound, "dict[str, object]", "dict[str, bytes]"]
 
 
 def _calibrated(piece: FleetPiece) -> Done:
@@ -218,8 +218,9 @@ def _reported(piece: FleetPiece) -> Done:
             provenance=lambda: _provenance(piece),
         )
         html = content_of(page)
-    numbers = dict(written.numbers)
-    return FleetFound((), (), str(numbers["verdict"]["headline"]), ()), numbers, {".html": html}
+    numbers = plain(written)
+    del numbers["report"]  # a folder that is gone
+    return FleetFound((), (), written.verdict.headline, ()), numbers, {".html": html}
 
 
 TASKS = {"calibrate": _calibrated, "circles": _circles, "diagnose": _diagnosed, "report": _reported}

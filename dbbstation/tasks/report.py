@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.effects import effects_of
 from dbbstation.diagnosis.thinned import thinned
@@ -17,7 +17,6 @@ from dbbstation.report.content import Modelled, Reported, certified_of, content_
 from dbbstation.report.html import report_html
 from dbbstation.report.pdf import chromium, printed
 from dbbstation.results.model_warnings import lacks_physics
-from dbbstation.results.serialise import plain
 from dbbstation.results.tolerances import TOLERATED
 from dbbstation.tasks.circles import load_circles
 from dbbstation.tasks.evaluate import evaluate
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
     from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.results.report import ReportResult
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.load import Sessions
     from dbbstation.tasks.models import Model
@@ -50,21 +50,6 @@ STAGES = {
 """Stages of a report, and the share of its time that has passed by then [%]."""
 
 USUAL_COVERAGE = 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class WrittenReport:
-    """A report that was written.
-
-    Attributes:
-        file: the page.
-        pdf: the same on paper; None where it was not printed.
-        numbers: everything that it shows, as `report --json` prints it.
-    """
-
-    file: Path
-    pdf: Path | None
-    numbers: Mapping[str, Any]
 
 
 def report(
@@ -86,7 +71,7 @@ def report(
     provenance: Callable[[], Provenance] = from_python,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
-) -> WrittenReport:
+) -> ReportResult:
     """Write a report of measured circles: one HTML file that opens anywhere, without network, and prints to A4.
 
     Args:
@@ -142,14 +127,14 @@ def report(
             "leave --certificate out"
         )
         raise StationError(what, where=", ".join(session.name for session in found.sessions), remedy=remedy)
-    numbers = numbers_of(reported)
+    numbers = numbers_of(reported, str(out))
     telling.stage("writing")
-    html = report_html(content_of(reported, numbers, provenance()))
+    html = report_html(numbers, content_of(reported, numbers, provenance()))
     write_bytes(page, html, force=force)
     if paper is not None and browser is not None:
         telling.stage("printing")
         write_bytes(paper, printed(html, browser), force=force)
-    return WrittenReport(page, paper, numbers)
+    return replace(numbers, pdf=paper)
 
 
 def _modelled(
@@ -169,8 +154,8 @@ def _modelled(
     except StoppedError:
         raise
     except StationError as error:
-        return Modelled(identified, {}, str(error))
-    return Modelled(identified, {key: value for key, value in plain(found).items() if key != "tolerances"})
+        return Modelled(identified, None, str(error))
+    return Modelled(identified, replace(found, tolerances=None))
 
 
 def _ranked(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from dbbstation.quality.conformity import Conformity
 from dbbstation.tui import texts
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
     from pathlib import Path
 
+    from dbbstation.service.answers import AcceptanceAnswer, HeldAnswer, ToleranceOfTestAnswer, WorstAnswer
     from dbbstation.service.former_sessions import Former, InForce
 
 _WIDE = 12
@@ -26,34 +28,34 @@ _DIGEST = 8
 """Digits of a SHA-256 that are shown: people compare them, nothing is looked up by them."""
 
 
-def test_line(one: Mapping[str, Any]) -> Content:
+def test_line(one: ToleranceOfTestAnswer) -> Content:
     """Return the row of one test and figure: its worst circle before and now, limit, U and a word."""
     row = _ROW.format(
-        test=_short(one["test"]),
-        figure=texts.FIGURE_NAMES[one["quantity"]],
-        before=_um(one["before"]),
+        test=_short(one.test),
+        figure=texts.FIGURE_NAMES[one.quantity],
+        before=_um(one.before),
         now=_um(one),
-        limit=f"{one['largest_um']:g}",
-        expanded=_expanded(one["worst"]),
+        limit=f"{one.largest_um:g}",
+        expanded=_expanded(one.worst),
     )
-    word = texts.CONFORMITY_WORDS[one["conformity"]]
-    return Content.assemble(row, (word, f"bold {_STYLES[one['conformity']]}"))
+    conformity = one.conformity or str(Conformity.UNDECIDED)
+    return Content.assemble(row, (texts.CONFORMITY_WORDS[conformity], f"bold {_STYLES[conformity]}"))
 
 
-def worst_lines(answer: Mapping[str, Any]) -> Iterator[str]:
+def worst_lines(answer: AcceptanceAnswer) -> Iterator[str]:
     """Yield a sentence for each tolerance: the worst circle before and now; where there is none, what is missing."""
-    told = [one for one in answer["tolerances"] if one["worst"] is not None]
-    for one in told:
-        worst, before = one["worst"], one["before"]
+    told = [(one, one.worst) for one in answer.tolerances if one.worst is not None]
+    for one, worst in told:
+        before = None if one.before is None else one.before.worst
         yield texts.WORST.format(
-            figure=texts.FIGURE_NAMES[one["quantity"]],
-            before=texts.NOT_BEFORE if before is None else _circle(before["worst"]),
+            figure=texts.FIGURE_NAMES[one.quantity],
+            before=texts.NOT_BEFORE if before is None else _circle(before),
             now=_circle(worst),
-            limit=one["largest_um"],
-            word=texts.CONFORMITY_WORDS[one["conformity"]],
+            limit=one.largest_um,
+            word=texts.CONFORMITY_WORDS[one.conformity or str(Conformity.UNDECIDED)],
         )
     if not told:
-        yield from (answer["verdict"]["headline"], *answer["verdict"]["to_do"])
+        yield from (answer.verdict.headline, *answer.verdict.to_do)
 
 
 def in_force_line(in_force: InForce) -> str:
@@ -78,18 +80,18 @@ def way_back_lines(former: Former, kept: tuple[Path, ...]) -> Iterator[str]:
         yield texts.WAY_BACK_PROGRAMS.format(path=in_force.programs)
 
 
-def _circle(worst: Mapping[str, Any]) -> str:
-    return texts.WORST_CIRCLE.format(**{**worst, "expanded": _expanded(worst)})
+def _circle(worst: WorstAnswer) -> str:
+    return texts.WORST_CIRCLE.format(**vars(worst), expanded=_expanded(worst))
 
 
-def _expanded(worst: Mapping[str, Any]) -> str:
+def _expanded(worst: WorstAnswer | None) -> str:
     """Return U of a circle; what stands for none where nobody knows it."""
-    u_um = worst["expanded_um"]
+    u_um = None if worst is None else worst.expanded_um
     return texts.NOT_BEFORE if u_um is None else f"{u_um:.1f}"
 
 
-def _um(held: Mapping[str, Any] | None) -> str:
-    return texts.NOT_BEFORE if held is None else f"{held['worst']['um']:.1f}"
+def _um(held: HeldAnswer | None) -> str:
+    return texts.NOT_BEFORE if held is None or held.worst is None else f"{held.worst.um:.1f}"
 
 
 def _short(name: str) -> str:

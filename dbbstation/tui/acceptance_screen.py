@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from textual.content import Content
 
 from dbbstation.errors import StationError
+from dbbstation.results.serialise import read_plain
+from dbbstation.service.answers import AcceptanceAnswer, ReportAnswer
 from dbbstation.service.background import Background
 from dbbstation.service.former_sessions import before_and_now
 from dbbstation.service.job import SessionTask
@@ -123,10 +125,11 @@ class AcceptanceScreen(RowScreen):
     def _draw(self) -> None:
         if not self.stands:
             return
-        answer = self._after.results[SessionTask.ACCEPTANCE].answer
+        told = self._after.results[SessionTask.ACCEPTANCE].answer
+        answer = read_plain(AcceptanceAnswer, told) if told else None
         sentence, wrong = self._sentence()
         self.say(sentence, wrong=wrong)
-        tests: list[dict[str, Any]] = answer.get("tolerances_by_test", [])
+        tests = () if answer is None else answer.tolerances_by_test
         if self._after.former is None:
             self.put([Content(label) for label in self._offered()])
             self.about(self._about_now())
@@ -155,7 +158,7 @@ class AcceptanceScreen(RowScreen):
         """Return what is to be said of the comparison."""
         match result.progress:
             case WorkProgress.DONE:
-                kind = result.answer["verdict"]["kind"]
+                kind = read_plain(ReportAnswer, result.answer).verdict.kind
                 return texts.ACCEPTANCE_VERDICT[kind], kind == "exceeded"
             case WorkProgress.FAILED:
                 return result.failure, True
@@ -167,10 +170,10 @@ class AcceptanceScreen(RowScreen):
     def _about_now(self) -> Content:
         return Content("" if self._found is None else texts.RUN_BY_NOW.format(by=in_force_line(self._found.now)))
 
-    def _notes(self, answer: dict[str, Any]) -> list[Content]:
+    def _notes(self, answer: AcceptanceAnswer | None) -> list[Content]:
         """Return what stands below the list: worst figures, what the circles ran by, the way back, the file."""
         after = self._after
-        told = [] if not answer else [Content(text) for text in worst_lines(answer)]
+        told = [] if answer is None else [Content(text) for text in worst_lines(answer)]
         if self._found is not None:
             now = self._found.now
             style = "" if now.compensated == now.circles else "$text-warning"

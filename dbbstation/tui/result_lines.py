@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from dbbstation.results.serialise import read_plain
+from dbbstation.service.answers import (
+    AcceptanceAnswer,
+    CalibrationAnswer,
+    DiagnosisAnswer,
+    ProgramsAnswer,
+    ReportAnswer,
+)
 from dbbstation.service.job import SessionTask
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_lines import worst_lines
@@ -15,71 +23,70 @@ _MOST = 6
 """Causes, and sentences of a kind, that are shown; the files have all."""
 
 
-def result_lines(step: SessionTask, answer: Mapping[str, Any]) -> list[str]:
-    """Return what is worth reading of the answer of a step's command."""
-    return list(_LINES[step](answer))
+def result_lines(step: SessionTask, answer: Mapping[str, object]) -> list[str]:
+    """Return what is worth reading of the result of a step, as JSON has it."""
+    match step:
+        case SessionTask.CALIBRATE:
+            return list(_calibrated(read_plain(CalibrationAnswer, answer)))
+        case SessionTask.DIAGNOSE:
+            return list(_diagnosed(read_plain(DiagnosisAnswer, answer)))
+        case SessionTask.PROGRAMS:
+            return list(_programmed(read_plain(ProgramsAnswer, answer)))
+        case SessionTask.REPORT:
+            return list(_reported(read_plain(ReportAnswer, answer)))
+        case SessionTask.ACCEPTANCE:
+            return list(_accepted(read_plain(AcceptanceAnswer, answer)))
 
 
-def _calibrated(answer: Mapping[str, Any]) -> Iterator[str]:
+def _calibrated(answer: CalibrationAnswer) -> Iterator[str]:
     yield texts.FITTED.format(
-        count=answer["parameters_identified"],
-        nominal=answer["nominal_rms_um"],
-        left=answer["residual_rms_um"],
-        within=answer["residual_within_mounting_rms_um"],
-        noise=answer["noise_um"],
+        count=answer.parameters_identified,
+        nominal=answer.nominal_rms_um,
+        left=answer.residual_rms_um,
+        within=answer.residual_within_mounting_rms_um,
+        noise=answer.noise_um,
     )
-    if answer["misfit"]["missing_physics"]:
-        yield texts.PHYSICS_MISSING.format(rms=answer["misfit"]["rms_um"])
-    for outlier in answer["outliers"][:_MOST]:
-        yield texts.OUTLIER.format(text=outlier["text"])
-    unseen = answer["directions_lost"]
-    for text in unseen[:_MOST]:
+    if answer.misfit.missing_physics:
+        yield texts.PHYSICS_MISSING.format(rms=answer.misfit.rms_um)
+    for outlier in answer.outliers[:_MOST]:
+        yield texts.OUTLIER.format(text=outlier.text)
+    for text in answer.directions_lost[:_MOST]:
         yield texts.UNSEEN.format(text=text)
-    for text in answer["gaps"][:_MOST]:
+    for text in answer.gaps[:_MOST]:
         yield texts.GAP.format(text=text)
-    if not unseen:
+    if not answer.directions_lost:
         yield texts.ALL_SEEN
-    if not answer["plan_check"]["enough"]:
-        yield texts.TOO_FEW.format(tests=answer["plan_check"]["tests"], left=answer["plan_check"]["left"])
+    if not answer.plan_check.enough:
+        yield texts.TOO_FEW.format(tests=answer.plan_check.tests, left=answer.plan_check.left)
 
 
-def _diagnosed(answer: Mapping[str, Any]) -> Iterator[str]:
-    form = texts.MISMATCH if answer["mismatch"] else texts.NO_MISMATCH
-    yield form.format(rms=answer["misfit_rms_um"], noise=answer["noise_um"])
+def _diagnosed(answer: DiagnosisAnswer) -> Iterator[str]:
+    form = texts.MISMATCH if answer.mismatch else texts.NO_MISMATCH
+    yield form.format(rms=answer.misfit_rms_um, noise=answer.noise_um)
     for verdict, words in texts.VERDICT_WORDS.items():
-        names = [source["name"] for source in answer["sources"] if source["verdict"] == verdict]
+        names = [cause.name for cause in answer.sources if cause.verdict == verdict]
         if names:
             yield texts.CAUSES.format(verdict=words, names=", ".join(names))
-    yield answer["unexplained"]["text"]
-    if answer["next_test"]:
-        yield texts.MEASURE_NEXT.format(text=answer["next_test"]["text"])
+    yield answer.unexplained.text
+    if answer.next_test is not None:
+        yield texts.MEASURE_NEXT.format(text=answer.next_test.text)
 
 
-def _programmed(answer: Mapping[str, Any]) -> Iterator[str]:
-    programs = answer["programs"]
-    yield texts.PROGRAMMED.format(count=len(programs), dialect=answer["dialect"])
-    greatest = [one["greatest_correction_um"] for one in programs if one["greatest_correction_um"] is not None]
+def _programmed(answer: ProgramsAnswer) -> Iterator[str]:
+    yield texts.PROGRAMMED.format(count=len(answer.programs), dialect=answer.dialect)
+    greatest = [one.greatest_correction_um for one in answer.programs if one.greatest_correction_um is not None]
     if greatest:
         yield texts.CORRECTED.format(most=max(greatest))
 
 
-def _reported(answer: Mapping[str, Any]) -> Iterator[str]:
-    verdict = answer["verdict"]
-    yield texts.REPORT_VERDICT[verdict["kind"]]
-    yield verdict["headline"]
-    yield from verdict["reasons"][:_MOST]
-    yield from verdict["to_do"][:_MOST]
+def _reported(answer: ReportAnswer) -> Iterator[str]:
+    verdict = answer.verdict
+    yield texts.REPORT_VERDICT[verdict.kind]
+    yield verdict.headline
+    yield from verdict.reasons[:_MOST]
+    yield from verdict.to_do[:_MOST]
 
 
-def _accepted(answer: Mapping[str, Any]) -> Iterator[str]:
-    yield texts.ACCEPTANCE_VERDICT[answer["verdict"]["kind"]]
+def _accepted(answer: AcceptanceAnswer) -> Iterator[str]:
+    yield texts.ACCEPTANCE_VERDICT[answer.verdict.kind]
     yield from worst_lines(answer)
-
-
-_LINES = {
-    SessionTask.CALIBRATE: _calibrated,
-    SessionTask.DIAGNOSE: _diagnosed,
-    SessionTask.PROGRAMS: _programmed,
-    SessionTask.REPORT: _reported,
-    SessionTask.ACCEPTANCE: _accepted,
-}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.errors import MachineError
 
@@ -109,12 +109,12 @@ class VirtualCell:
                 self._running is not None and self._clock() < self._running.begin_s + self._running.run.path.duration_s
             )
 
-    def status(self) -> dict[str, Any]:
+    def status(self) -> dict[str, object]:
         """What the cell does, as plain values."""
         with self._lock:
             running = self._running
         ball = self.machine.mounted
-        told: dict[str, Any] = {
+        told: dict[str, object] = {
             "state": "running" if self.running else "idle",
             "ball": None if ball is None else ball.name,
             "mounting": self.machine.mountings or None,

@@ -18,7 +18,7 @@ import re
 import selectors
 import socket
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.errors import MachineError, StationError
 from dbbstation.plan.circle import Direction
@@ -53,7 +53,7 @@ class CellCommands:
         self._programs = programs
         self.quit = threading.Event()
 
-    def __call__(self, line: str) -> dict[str, Any]:
+    def __call__(self, line: str) -> dict[str, object]:
         """Obey one line; return the answer.
 
         Raises:
@@ -98,7 +98,7 @@ class ControlServer:
         url: where it listens.
     """
 
-    def __init__(self, obey: Callable[[str], dict[str, Any]]) -> None:
+    def __init__(self, obey: Callable[[str], dict[str, object]]) -> None:
         self._obey = obey
         self._server = socket.create_server((LOOPBACK, 0))
         self._server.setblocking(False)  # noqa: FBT003 (the socket module's own signature)
@@ -150,7 +150,7 @@ class ControlServer:
                 self._forget(client)
                 return
 
-    def _answer(self, line: str) -> dict[str, Any]:
+    def _answer(self, line: str) -> dict[str, object]:
         try:
             return {"ok": True, **self._obey(line)}
         except StationError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import socket
-from typing import Any
 from urllib.parse import urlsplit
 
 from dbbstation.errors import MachineError
@@ -41,7 +40,7 @@ class ControlClient:
         self.url = url
         self._address = ("127.0.0.1", port)
 
-    def ask(self, *words: str) -> dict[str, Any]:
+    def ask(self, *words: str) -> dict[str, object]:
         """Send a command, return its answer.
 
         Raises:
@@ -56,7 +55,7 @@ class ControlClient:
                     if not chunk:
                         break
                     came += chunk
-            answer: dict[str, Any] = json.loads(came)
+            answer: dict[str, object] = json.loads(came)
         except (OSError, ValueError) as error:
             raise MachineError(
                 f"the virtual machine does not answer `{' '.join(words)}`: {error}",

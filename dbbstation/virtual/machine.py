@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -144,7 +144,7 @@ class VirtualMachine:
         """Return the error of the next reading [mm]."""
         return float(self._noise.normal(0.0, self.sizes.noise_mm)) if self.sizes.noise_mm else 0.0
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, object]:
         """Everything that is wrong, by source, set and parameter, in the parameters' units.
 
         Of balls that were put up under the spindle also how they stand at the tool tip, as a micrometer would read it.

@@ -30,6 +30,7 @@ def test_every_command_prints_the_keys_that_others_rely_on(printed):
 @pytest.mark.slow
 def test_every_command_prints_what_its_schema_says(printed, run):
     schemas = {name: json.loads(run("check", "--schema", name).out) for name in sorted(set(RESULTS) & set(printed))}
+    assert set(schemas) == set(printed)
     found = {name: faults(printed[name].data, schema, schema.get("$defs", {})) for name, schema in schemas.items()}
     assert found == {name: [] for name in schemas}
 

@@ -15,7 +15,7 @@ from dbbstation.diagnosis.workspace import workspace
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.model.uncertainty import position_uncertainty_mm, predicted_poses, prediction_summary
+from dbbstation.model.uncertainty import pose_errors, position_uncertainty_mm, predicted_poses
 from dbbstation.report.model_part import parameters
 from dbbstation.results.of_calibration import calibration_figures
 from dbbstation.results.of_diagnosis import diagnosis_figures
@@ -72,11 +72,11 @@ def test_errors_over_the_workspace_are_those_that_predict_gives(diagnosed, refer
     before, after = (identified_model(fit, {}, {}) for fit in (diagnosed.before, diagnosed.after))
     assert {source.name for source in default_sources()} > {"bar-offset"}
     (was, _), (now, u_mm) = predicted_poses(before, poses), predicted_poses(after, poses)
-    expected = prediction_summary(now, was, u_mm)
+    expected = pose_errors(now, was, u_mm)
     told = plain(diagnosis_figures(diagnosed, {}))["workspace"]
-    assert told["common_shift_um"] == pytest.approx(expected["common_shift_um"])
-    assert told["error_with_shift_rms_um"] == pytest.approx(expected["error_rms_um"])
-    assert told["error_rms_um"] == pytest.approx(expected["error_about_mean_rms_um"])
+    assert told["common_shift_um"] == pytest.approx(expected.common_shift_um)
+    assert told["error_with_shift_rms_um"] == pytest.approx(expected.error_rms_um)
+    assert told["error_rms_um"] == pytest.approx(expected.error_about_mean_rms_um)
     assert told["error_with_shift_rms_um"] ** 2 == pytest.approx(
         told["error_rms_um"] ** 2 + np.sum(np.square(told["common_shift_um"]))
     )

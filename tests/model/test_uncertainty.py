@@ -11,9 +11,9 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import (
+    pose_errors,
     position_uncertainty_mm,
     predicted_poses,
-    prediction_summary,
     range_uncertainty_mm,
 )
 from dbbstation.sources.contract import Fitted, Motion
@@ -144,10 +144,10 @@ def test_a_summary_tells_the_common_shift_from_the_rest():
     """Two poses off by 3 and 5 µm along X: 4 µm together, 1 µm about that."""
     commanded = np.zeros((2, 6))
     actual = commanded + np.array([[0.003], [0.005]]) * np.eye(6)[0]
-    told = prediction_summary(commanded, actual, np.array([[1e-3, 2e-3, np.nan], [2e-3, 1e-3, np.nan]]))
-    assert told["common_shift_um"] == pytest.approx([4.0, 0.0, 0.0])
-    assert told["error_rms_um"] == pytest.approx(np.sqrt(17.0))
-    assert told["error_about_mean_rms_um"] == pytest.approx(1.0)
-    assert told["greatest_error_um"] == pytest.approx(5.0)
-    assert told["greatest_uncertainty_by_axis_um"] == {"x": pytest.approx(2.0), "y": pytest.approx(2.0), "z": None}
-    assert told["greatest_uncertainty_um"] is None
+    told = pose_errors(commanded, actual, np.array([[1e-3, 2e-3, np.nan], [2e-3, 1e-3, np.nan]]))
+    assert told.common_shift_um == pytest.approx([4.0, 0.0, 0.0])
+    assert told.error_rms_um == pytest.approx(np.sqrt(17.0))
+    assert told.error_about_mean_rms_um == pytest.approx(1.0)
+    assert told.greatest_error_um == pytest.approx(5.0)
+    assert told.greatest_uncertainty_by_axis_um == {"x": pytest.approx(2.0), "y": pytest.approx(2.0), "z": None}
+    assert told.greatest_uncertainty_um is None

@@ -16,6 +16,7 @@ from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
+from dbbstation.service.answers import VerdictAnswer
 from dbbstation.service.front import Front
 from dbbstation.service.job import SessionJob
 from dbbstation.service.memory import Memory
@@ -93,7 +94,6 @@ def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path
         ("Measure again.",),
         job_file.parent / "monday-2026-11-20-results" / "report.html",
     )
-    verdict = {"kind": "within", "headline": "All within.", "reasons": [], "to_do": []}
     for kind, missing, word in (
         ("within", (), Conformity.WITHIN),
         ("within", ("high cw",), Conformity.UNDECIDED),
@@ -101,7 +101,7 @@ def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path
         ("cannot tell", (), Conformity.UNDECIDED),
         ("none", (), Conformity.UNDECIDED),
     ):
-        told = answer_of(verdict | {"kind": kind}, missing, None)
+        told = answer_of(VerdictAnswer(kind, "All within.", (), ()), missing, None)
         assert told.word is word
         assert ("Not measured: high cw." in told.reasons) is bool(missing)
     # Another plan than the session has: a new session is begun.

@@ -188,7 +188,8 @@ def acceptance(_app: StationApp) -> RowScreen:
         {"test": "high", **held(7.6, 0.6, 8.0, "cannot tell", "high"), "before": None},
     ]
     worst = {**held(7.6, 0.6, 8.0, "cannot tell", "high"), "before": before[0]}
-    answer = {"verdict": {"kind": "cannot tell"}, "tolerances": [worst], "tolerances_by_test": tests}
+    verdict = {"kind": "cannot tell", "headline": "It cannot be told.", "reasons": [], "to_do": []}
+    answer = {"verdict": verdict, "tolerances": [worst], "tolerances_by_test": tests}
     page = SHOP / "verified-results" / "acceptance.html"
     after.results[SessionTask.ACCEPTANCE] = Result(WorkProgress.DONE, "", 4.2, answer, "", page)
     programs = SHOP / "monday" / "programs"

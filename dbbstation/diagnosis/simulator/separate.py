@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +16,26 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.answer import SimulatorComparison
 
 
-def separating_input(answer: SimulatorComparison) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class Separation:
+    """What to record to tell two terms apart.
+
+    Attributes:
+        text: in words.
+        terms: both.
+        part: stretch of the recordings in which they differ most.
+        sigmas: standard deviations by which they differ there.
+        repeats: of that stretch until they are told apart.
+    """
+
+    text: str
+    terms: tuple[str, str]
+    part: str
+    sigmas: float
+    repeats: int
+
+
+def separating_inputs(answer: SimulatorComparison) -> list[Separation]:
     """Proposals for each pair of terms that the recordings do not tell apart.
 
     The answers of both to the inputs that there were are compared beside the parameters: in which stretch of time they differ most, in
@@ -45,15 +65,7 @@ def separating_input(answer: SimulatorComparison) -> list[dict[str, Any]]:
                 f"{name} or {other}: their answers differ most in {every[best][0]}, by {np.sqrt(squares[best]):.2g} standard deviations. "
                 f"Record inputs as there, {_repeated(repeats)}, or larger ones."
             )
-            proposals.append(
-                {
-                    "text": text,
-                    "terms": [name, other],
-                    "part": every[best][0],
-                    "sigmas": float(np.sqrt(squares[best])),
-                    "repeats": repeats,
-                }
-            )
+            proposals.append(Separation(text, (name, other), every[best][0], float(np.sqrt(squares[best])), repeats))
     return proposals
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.bar import BarFile
 from dbbstation.files.formats.jig import JigFile
@@ -36,7 +36,7 @@ SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _NEW
 """Schema of each format by its name with its newest version, which has all keys of those before."""
 
 
-def json_schema(name: str) -> dict[str, Any]:
+def json_schema(name: str) -> dict[str, object]:
     """Return the JSON Schema of a format, units and plausible ranges included.
 
     Args:

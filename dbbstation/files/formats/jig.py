@@ -178,12 +178,16 @@ def read_jig(path: Path) -> JigFile:
     return jig
 
 
-def jig_text(data: dict[str, Any]) -> str:
+def jig_text(jig: JigFile) -> str:
     """Return the text of a jig file, balls of the usual kind without saying so."""
     balls = {
-        name: {k: v for k, v in ball.items() if (k, v) != ("placed", BY_CMM)} for name, ball in data["balls"].items()
+        name: {key: value for key, value in ball.model_dump(exclude_none=True).items() if (key, value) != _USUAL}
+        for name, ball in jig.balls.items()
     }
-    return yaml_text({"format": format_of(JigFile), **data, "balls": balls})
+    return yaml_text({**jig.model_dump(exclude_none=True), "format": format_of(JigFile), "balls": balls})
+
+
+_USUAL = ("placed", BY_CMM)
 
 
 def checked_jig(text: str, file: str) -> JigFile:

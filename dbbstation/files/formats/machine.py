@@ -3,7 +3,7 @@
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,7 +203,7 @@ def machine_text(machine: Machine) -> str:
     return yaml_text({"format": format_for(MachineFile, data), **data})
 
 
-def machine_data(parts: MachineParts) -> dict[str, Any]:
+def machine_data(parts: MachineParts) -> dict[str, object]:
     """Return the keys of a machine in the order of the format, those without a value left out."""
     return parts.model_dump(exclude_none=True, exclude={"format"})
 

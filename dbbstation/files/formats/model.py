@@ -257,7 +257,7 @@ def model_text(model: IdentifiedModel, provenance: Provenance | None = None) -> 
     return yaml_text({**data, "format": format_for(ModelFile, data)})
 
 
-def model_data(model: IdentifiedModel) -> dict[str, Any]:
+def model_data(model: IdentifiedModel) -> dict[str, object]:
     """Return a model as its file holds it."""
     count = len(model.covariance_rows)
     fault = None if model.covariance.shape == (count, count) else f"{model.covariance.shape} for {count} rows"
@@ -285,7 +285,7 @@ def model_data(model: IdentifiedModel) -> dict[str, Any]:
     return {"format": format_for(ModelFile, data), **data}
 
 
-def _source_data(fitted: Fitted, machine: Machine) -> dict[str, Any]:
+def _source_data(fitted: Fitted, machine: Machine) -> dict[str, object]:
     parameters = fitted.source.parameters(machine)
     return {
         "name": fitted.source.name,

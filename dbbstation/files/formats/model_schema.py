@@ -1,6 +1,6 @@
 """`dbb-model/4`, which has all of the versions before: an identified machine model with the uncertainty and provenance of its numbers."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -79,7 +79,7 @@ class ModelFile(Schema):
     null_space: tuple[tuple[float, ...], ...] | None = None
     """The same in numbers: combinations of the covariance's rows, each at its plausible size in the parameters' units; absent
     where nothing was lost, and in files of older programs."""
-    report: dict[str, Any]
+    report: dict[str, object]
     """What the fit reported, by name."""
     sessions: dict[str, Sha256Hex]
     """SHA-256 of each session file that the model comes from, by folder name."""

@@ -177,7 +177,7 @@ def plan_text(plan: InlinePlan) -> str:
     return yaml_text(plan_data(plan))
 
 
-def plan_data(plan: InlinePlan) -> dict[str, Any]:
+def plan_data(plan: InlinePlan) -> dict[str, object]:
     """Return a plan as its file holds it, the jig inline."""
     data = plan.plan.model_dump(exclude_none=True)
     for ball in data["balls"].values():

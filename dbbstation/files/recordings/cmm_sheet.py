@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.formats.jig import JigFile, checked_jig, jig_text
+from dbbstation.files.formats.jig import BallSchema, JigFile, checked_jig, jig_text
 from dbbstation.files.formats.mapping import LENGTH, UNITS
 from dbbstation.files.recordings.cmm_long import is_long, wide
 from dbbstation.files.recordings.dmis import read_dmis
@@ -141,7 +141,7 @@ def jig_of_sheet(
             file may say, such as a ball that lies at another bore.
     """
     faults: list[Problem] = []
-    balls: dict[str, Any] = {}
+    balls: dict[str, BallSchema] = {}
     for one in measured:
         name = names.get(one.name) or _known_name(one, before)
         known = before.balls.get(name)
@@ -158,16 +158,14 @@ def jig_of_sheet(
         elif not all(map(math.isfinite, one.centre_mm)):
             faults.append(Problem(file, one.line, 0, f"`{name}` has no z", "say which column it is: --column z=NAME"))
         else:
-            centre = tuple(float(f"{value:.7f}") for value in one.centre_mm)  # 0.1 nm: no digits of the conversion
-            balls[name] = {"bore": bore, "holder": holder, "centre_mm": centre, "uncertainty_um": float(f"{u_um:.6g}")}
+            x, y, z = (float(f"{value:.7f}") for value in one.centre_mm)  # 0.1 nm: no digits of the conversion
+            balls[name] = BallSchema.model_construct(
+                bore=bore, holder=holder, centre_mm=(x, y, z), uncertainty_um=float(f"{u_um:.6g}")
+            )
     if faults:
         raise InputError(faults)
-    plate = before.jig.model_dump(exclude_none=True)
-    plate.pop("cmm_temp_c", None)
-    data = before.model_dump(exclude_none=True) | {
-        "jig": plate | ({} if cmm_temp_c is None else {"cmm_temp_c": cmm_temp_c})
-    }
-    return checked_jig(jig_text(data | {"balls": balls}), file)
+    plate = before.jig.model_copy(update={"cmm_temp_c": cmm_temp_c})
+    return checked_jig(jig_text(before.model_copy(update={"jig": plate, "balls": balls})), file)
 
 
 _KEYS = ("ball", "bore", "holder", *AXES, "u", "ux", "uy", "uz")

@@ -80,9 +80,9 @@ class EventLog:
         """Link of every event."""
         return tuple(event.link for event in self.events)
 
-    def state(self, count: int | None = None) -> dict[str, Any]:
+    def state(self, count: int | None = None) -> dict[str, object]:
         """Return what the session file says after the first `count` events; None: after all."""
-        state: dict[str, Any] = {}
+        state: dict[str, object] = {}
         runs: dict[tuple[str, str, int], Mapping[str, Any]] = {}
         for event in self.events[:count]:
             state |= event.set_to
@@ -98,14 +98,14 @@ def run_key(run: Mapping[str, Any]) -> tuple[str, str, int]:
     return run["test"], run["direction"], run["repeat"]
 
 
-def change(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+def change(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, object]:
     """Return the members of an event that leads from one state to another; empty where they are the same."""
     keys = [key for key in (*after, *(key for key in before if key not in after)) if key != "runs"]
     set_to = {key: after.get(key) for key in keys if before.get(key) != after.get(key)}
     old = {run_key(run): run for run in before.get("runs", ())}
     new = {run_key(run): run for run in after.get("runs", ())}
     put = [run for key, run in new.items() if old.get(key) != run]
-    found: dict[str, Any] = {"set": set_to} if set_to else {}
+    found: dict[str, object] = {"set": set_to} if set_to else {}
     if list(old | new) != list(new) or len(new) != len(after.get("runs", ())):
         return {**found, "all_runs": list(after.get("runs", ()))}
     return {**found, "runs": put} if put else found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.quantities import twice
 from dbbstation.files.recordings.bar_reach import unlike_bar
@@ -56,7 +56,7 @@ def check_bar(
 def _check_file(
     document: YamlDocument,
     location: Location,
-    entry: dict[str, Any],
+    entry: dict[str, object],
     folder: Path,
     faults: list[Problem],
 ) -> None:

@@ -22,13 +22,13 @@ _MOST_NAMED = 6
 """Changes that are named; a session file that was exchanged has hundreds."""
 
 
-def session_state(data: Mapping[str, Any]) -> dict[str, Any]:
+def session_state(data: Mapping[str, Any]) -> dict[str, object]:
     """Return what the data of a session file say, one way of writing it: lists, no empty values, no format, no mark of the log."""
     seal = data.get("seal")
     plain = {key: value for key, value in data.items() if key != "format"}
     if isinstance(seal, dict):
         plain["seal"] = {key: value for key, value in seal.items() if key != "log"}
-    state: dict[str, Any] = _plain(plain)
+    state: dict[str, object] = _plain(plain)
     return state
 
 
@@ -115,7 +115,7 @@ def _unmarked(state: Mapping[str, Any], log: EventLog) -> Standing:
     return Standing(Stands.UNLIKE, (f"{what}: {EVENTS_FILE} has {len(log.events)} events of this session",))
 
 
-def _unsealed(state: Mapping[str, Any]) -> dict[str, Any]:
+def _unsealed(state: Mapping[str, Any]) -> dict[str, object]:
     bare = {key: value for key, value in state.items() if key != "seal"}
     bare["runs"] = [
         {key: run[key] for key in run if key not in {"sha256", "chain_sha256"}} for run in state.get("runs", ())
@@ -139,7 +139,7 @@ def differences(before: Mapping[str, Any], after: Mapping[str, Any], *, but_runs
     return (*found[:_MOST_NAMED], f"and {more} more") if more > 0 else tuple(found)
 
 
-def _by_run(state: Mapping[str, Any]) -> dict[str, Any]:
+def _by_run(state: Mapping[str, Any]) -> dict[str, object]:
     """The state with runs by their names, so that a change is told of the run that it is of."""
     runs = state.get("runs", ())
     if not runs:
@@ -148,7 +148,7 @@ def _by_run(state: Mapping[str, Any]) -> dict[str, Any]:
     return {**state, "runs": named}
 
 
-def with_readings(state: Mapping[str, Any], data: Mapping[str, Any]) -> dict[str, Any]:
+def with_readings(state: Mapping[str, Any], data: Mapping[str, Any]) -> dict[str, object]:
     """Return a state with the readings that a session file has."""
     readings = session_state(data).get(READINGS)
     bare = {key: value for key, value in state.items() if key != READINGS}

@@ -61,24 +61,28 @@ def now() -> datetime:
     return datetime.now(UTC).replace(microsecond=0)
 
 
-def marked(state: Mapping[str, Any], log: EventLog) -> dict[str, Any]:
+def marked(state: Mapping[str, Any], log: EventLog) -> dict[str, object]:
     """Return a state with the mark of how far its log goes, as the session file has it."""
     if not log.events or not isinstance(state.get("seal"), dict):
         return dict(state)
-    mark = {"events": len(log.events), "sha256": log.links[-1]}
-    return {"runs": [], **state, "seal": {**state["seal"], "log": mark}}
+    return {"runs": [], **_with_mark(state, state, len(log.events), log.links[-1])}
 
 
-def first_log(data: Mapping[str, Any], at: datetime | None) -> tuple[bytes, dict[str, Any]]:
+def first_log(data: Mapping[str, Any], at: datetime | None) -> tuple[bytes, dict[str, object]]:
     """Return the log of a session that is made, and what its session file says.
 
     Args:
         data: what the session file says, without the mark of the log.
         at: when; None where that means nothing.
     """
-    state = session_state(data)
+    state: Mapping[str, Any] = session_state(data)
     line = line_of("", "created", at, change({}, state))
-    return line, {**data, "seal": {**state["seal"], "log": {"events": 1, "sha256": line[:64].decode()}}}
+    return line, _with_mark(data, state, 1, line[:64].decode())
+
+
+def _with_mark(data: Mapping[str, Any], state: Mapping[str, Any], events: int, sha256: str) -> dict[str, object]:
+    """Return data with the seal of a state, and in it how far the log goes: number of events, link of the last."""
+    return {**data, "seal": {**state["seal"], "log": {"events": events, "sha256": sha256}}}
 
 
 def document_in_force(file: Path, faults: list[Problem]) -> tuple[YamlDocument | None, EventLog | None]:
@@ -155,7 +159,7 @@ class SessionStore:
         if faults:
             raise InputError(faults)
         found, data = self._on_disk(faults)
-        self.data: dict[str, Any] = data or {}
+        self.data: dict[str, object] = data or {}
         if (data is None or anew) and self.log.events:
             self._rebuild(found)
             return
@@ -191,7 +195,7 @@ class SessionStore:
     def _write_both(
         self,
         data: Mapping[str, Any],
-        state: dict[str, Any],
+        state: dict[str, object],
         what: str,
         members: Mapping[str, Any],
         text: Callable[[Mapping[str, Any]], str],
@@ -228,7 +232,7 @@ class SessionStore:
         (self._file.parent / EVENTS_FILE).unlink(missing_ok=True)
         self.log = EventLog(self._file.parent / EVENTS_FILE)
 
-    def changed_meanwhile(self) -> dict[str, Any] | None:
+    def changed_meanwhile(self) -> dict[str, object] | None:
         """Return what the session file says where somebody has written it since; None where nobody has.
 
         One that cannot be read, or is gone, is put aside: the next writing puts the right one there.
@@ -271,7 +275,7 @@ class SessionStore:
             remedy=f"nothing was written over it; {_rebuild(self._file)}",
         )
 
-    def _on_disk(self, faults: list[Problem]) -> tuple[bytes | None, dict[str, Any] | None]:
+    def _on_disk(self, faults: list[Problem]) -> tuple[bytes | None, dict[str, object] | None]:
         """Return bytes and data of the session file; no data, with the reason in `faults`, where it is none or is gone.
 
         Raises:
@@ -316,5 +320,5 @@ def _valid(data: Mapping[str, Any]) -> bool:
     return document is not None and validate(document, SessionFile, []) is not None
 
 
-def _bare(state: Mapping[str, Any]) -> dict[str, Any]:
+def _bare(state: Mapping[str, Any]) -> dict[str, object]:
     return {key: value for key, value in state.items() if key != READINGS}

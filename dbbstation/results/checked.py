@@ -1,0 +1,92 @@
+"""What is wrong with files, and what was found beside: the result of `check`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from dbbstation.errors import Problem
+from dbbstation.results.findings import FindingResult
+from dbbstation.results.sampling import SampledCircle
+from dbbstation.results.serialise import Absent
+
+
+@dataclass(frozen=True)
+class CheckedRun:
+    """A run of a session.
+
+    Attributes:
+        run: its name.
+        findings: of its circle.
+    """
+
+    run: str
+    findings: tuple[FindingResult, ...]
+
+
+@dataclass(frozen=True)
+class CheckedFile:
+    """A file, or a session.
+
+    Attributes:
+        file: as given.
+        format: that it has.
+        ok: whether nothing is wrong with it.
+        summary: what it is.
+        runs: of a session whose runs were judged; absent else.
+    """
+
+    file: str
+    format: str
+    ok: bool
+    summary: str
+    runs: Annotated[tuple[CheckedRun, ...] | None, Absent] = None
+
+
+@dataclass(frozen=True)
+class DryRunResult:
+    """The programs of a plan, tried on a machine.
+
+    Attributes:
+        plan: file of the plan.
+        machine: file of the machine.
+        programs: how many were tried.
+        ok: whether `program` would write all of them.
+    """
+
+    plan: str
+    machine: str
+    programs: int
+    ok: bool
+
+
+@dataclass(frozen=True)
+class SampledPlanResult:
+    """What an instrument sees of a plan.
+
+    Attributes:
+        plan: file of the plan.
+        circles: one for each test.
+    """
+
+    plan: str
+    circles: tuple[SampledCircle, ...]
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """What `check` found.
+
+    Attributes:
+        files: each of them.
+        dry_runs: of every plan on the machine.
+        sampling: of every plan by the instrument.
+        problems: what is wrong.
+        warnings: what is worth knowing.
+    """
+
+    files: tuple[CheckedFile, ...]
+    dry_runs: tuple[DryRunResult, ...]
+    sampling: tuple[SampledPlanResult, ...]
+    problems: tuple[Problem, ...]
+    warnings: tuple[Problem, ...]

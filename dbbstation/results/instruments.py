@@ -1,0 +1,78 @@
+"""Instruments that are known: the result of `instruments`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from dbbstation.results.serialise import Absent
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from dbbstation.instrument.protocol import Protocol
+
+
+@dataclass(frozen=True)
+class InstrumentResult:
+    """An instrument.
+
+    Attributes:
+        name: of the instrument.
+        profile: variant that is shown; empty where there is one.
+        title: in words.
+        line: settings of its serial line, as its protocol file has them.
+        mode: how readings are had from it.
+        readings_per_second: at its usual rate.
+        not_verified: statements about it that nobody has verified.
+        has_checksum: whether a message has one.
+        counts_samples: whether it numbers its readings.
+        range_mm: least and greatest reading.
+        profiles: variants that it has.
+        protocol: everything that its file says; absent in the list.
+    """
+
+    name: str
+    profile: str
+    title: str
+    line: Mapping[str, object]
+    mode: str
+    readings_per_second: float
+    not_verified: tuple[str, ...]
+    has_checksum: bool
+    counts_samples: bool
+    range_mm: tuple[float, ...]
+    profiles: tuple[str, ...]
+    protocol: Annotated[Mapping[str, object] | None, Absent] = None
+
+
+@dataclass(frozen=True)
+class InstrumentsResult:
+    """All instruments that are known."""
+
+    instruments: tuple[InstrumentResult, ...]
+
+
+def instrument_result(protocol: Protocol, profiles: Iterable[str], *, whole: bool = False) -> InstrumentResult:
+    """Return an instrument.
+
+    Args:
+        protocol: of the instrument.
+        profiles: variants that it has.
+        whole: with everything that its file says.
+    """
+    return InstrumentResult(
+        name=protocol.name,
+        profile=protocol.profile,
+        title=protocol.title,
+        line=protocol.line.model_dump(),
+        mode=protocol.ask.mode,
+        readings_per_second=protocol.fastest_hz(),
+        not_verified=tuple(one.says for one in protocol.references if not one.verified),
+        has_checksum=protocol.has_checksum,
+        counts_samples=protocol.counter_modulus is not None,
+        range_mm=tuple(protocol.length.range_mm),
+        profiles=tuple(profiles),
+        protocol=protocol.model_dump(mode="json") if whole else None,
+    )

@@ -1,0 +1,121 @@
+"""Balls of a jig as a CMM measured them, and how well holders put them back: the results of `jig`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.plan.repeatability import LEVEL
+
+if TYPE_CHECKING:
+    from dbbstation.plan.repeatability import Repeatability, Scatter
+
+
+@dataclass(frozen=True)
+class MeasuredBall:
+    """A ball.
+
+    Attributes:
+        centre_mm: X, Y, Z in the jig's frame.
+        change_um: against the jig before, X, Y, Z; None where that has no such ball.
+    """
+
+    centre_mm: tuple[float, ...]
+    change_um: tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
+class SheetResult:
+    """What `jig sheet` wrote.
+
+    Attributes:
+        jig: the file.
+        balls: by name.
+        not_in_the_sheet: balls of the jig before that are not in the new one.
+    """
+
+    jig: str
+    balls: Mapping[str, MeasuredBall]
+    not_in_the_sheet: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class HolderScatter:
+    """A standard deviation with its interval.
+
+    Attributes:
+        s_um: standard deviation [µm].
+        low_um: lower end of its interval [µm].
+        high_um: upper end [µm].
+        standard_uncertainty_um: of the standard deviation [µm].
+        degrees_of_freedom: that it rests on.
+    """
+
+    s_um: float
+    low_um: float
+    high_um: float
+    standard_uncertainty_um: float
+    degrees_of_freedom: int
+
+
+@dataclass(frozen=True)
+class HolderResult:
+    """How well a holder puts its ball back.
+
+    Attributes:
+        repeatability_um: standard deviation per axis, as a jig file has it [µm].
+        together: of all coordinates.
+        axes: of x, y and, where it was measured, z.
+        level: probability of the intervals.
+        rms_distance_um: root mean square of the distance from the mean place [µm].
+        mean_distance_um: mean of that distance [µm].
+        places: number of places.
+        mountings: in all.
+        p_axes_alike: probability of a ratio of variances as great as this if all axes scatter alike.
+        of_cmm_um: standard deviation of the CMM's readings that was taken off [µm].
+    """
+
+    repeatability_um: float
+    together: HolderScatter
+    axes: Mapping[str, HolderScatter]
+    level: float
+    rms_distance_um: float
+    mean_distance_um: float
+    places: int
+    mountings: int
+    p_axes_alike: float
+    of_cmm_um: float
+
+
+@dataclass(frozen=True)
+class HoldersResult:
+    """What `jig holders` found.
+
+    Attributes:
+        holders: by name.
+        jig: file that it was written to; None for none.
+    """
+
+    holders: Mapping[str, HolderResult]
+    jig: str | None
+
+
+def holder_result(one: Repeatability) -> HolderResult:
+    """Return how well a holder puts its ball back."""
+    return HolderResult(
+        repeatability_um=one.together.s_um,
+        together=_scatter(one.together),
+        axes={axis: _scatter(scatter) for axis, scatter in zip("xyz", one.axes, strict=False)},
+        level=LEVEL,
+        rms_distance_um=one.rms_distance_um,
+        mean_distance_um=one.mean_distance_um,
+        places=one.places,
+        mountings=one.mountings,
+        p_axes_alike=one.axes_differ,
+        of_cmm_um=one.of_cmm_um,
+    )
+
+
+def _scatter(one: Scatter) -> HolderScatter:
+    return HolderScatter(one.s_um, one.low_um, one.high_um, one.u_um, one.freedom)

@@ -35,6 +35,12 @@ if TYPE_CHECKING:
     help="With --simulator: simulations that may be run [default: what ten minutes hold].",
 )
 @click.option(
+    "--anew",
+    is_flag=True,
+    help="With --simulator: run all simulations anew; those run before, of the same files and values, are kept in the user's cache "
+    "folder and not run again otherwise.",
+)
+@click.option(
     "--corrected",
     type=click.Path(path_type=Path, dir_okay=False),
     help="With --simulator: write measured, simulated, refitted and corrected values here.",
@@ -83,6 +89,7 @@ def mismatch(
     simulated: str | None,
     simulator: Path | None,
     most_runs: int | None,
+    anew: bool,
     corrected: Path | None,
     variables: str | None,
     run: str | None,
@@ -132,7 +139,7 @@ def mismatch(
         simulator,
         {"--measured": measured, "--simulated": simulated, "--variables": variables, "--run": run, "--time": time}
         | {"--known": known, "--free": free, "--no-offset": no_offset or None},
-        {"--most-runs": most_runs, "--corrected": corrected},
+        {"--most-runs": most_runs, "--corrected": corrected, "--anew": anew or None},
     )
     if simulator is not None:
         from dbbstation.cli.mismatch_simulator import mismatch_with_simulator
@@ -144,6 +151,7 @@ def mismatch(
             numbers,
             most_runs=most_runs,
             hold_out=not no_held_out,
+            keeps=not anew,
             out=out,
             corrected=corrected,
             figure=figure,

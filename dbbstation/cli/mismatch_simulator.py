@@ -25,6 +25,7 @@ def mismatch_with_simulator(
     *,
     most_runs: int | None,
     hold_out: bool,
+    keeps: bool,
     out: Path | None,
     corrected: Path | None,
     figure: Path | None,
@@ -52,11 +53,13 @@ def mismatch_with_simulator(
         refuse_existing_table(corrected, force=force)
     loaded = load_simulator(simulator, recordings, own_files, numbers)
     model = loaded.model
-    with Runs(loaded, most=most_runs) as runs:
+    with Runs(loaded, most=most_runs, keeps=keeps) as runs:
         values = [parameter.value for parameter in model.parameters]
         one_s = runs.allow([SimulationRequest(k, model.of_run(k, values)) for k in range(len(model.runs))])
-        limit = f"; that is what {MOST_SECONDS / 60.0:.0f} minutes hold" if most_runs is None else ""
-        say(f"note: a simulation takes {one_s:.2g} s, {runs.most} are allowed at the most{limit} (--most-runs)")
+        limit = f"{runs.most} are allowed at the most"
+        if most_runs is None:
+            limit = f"{MOST_SECONDS / 60.0:.0f} minutes are allowed, which about {runs.most} fit into"
+        say(f"note: a simulation takes {one_s:.2g} s, {limit} (--most-runs)")
         with stage_bar("comparison", STAGES if hold_out else STAGES_WHOLE) as progress:
 
             def told(text: str, done: int = 0, of: int = 0) -> None:
@@ -67,7 +70,7 @@ def mismatch_with_simulator(
                 progress(spent, done, of)
 
             answer = find(model, runs, own=loaded.own, hold_out=hold_out, progress=told)
-        result = simulator_result(answer, SimulationsRun(runs.ran, runs.most, one_s))
+        result = simulator_result(answer, SimulationsRun(runs.ran, runs.most, one_s, runs.found))
     if out is not None:
         write_text(out, missing_code(answer), force=force)
         result = replace(result, out=str(out))
@@ -163,7 +166,10 @@ def _print_whether(result: SimulatorResult) -> None:
                 "  ", " "
             )
         )
-    echo(f"noise of one row: {result.noise.sigma:.3g} {unit}".rstrip())
+    noise = ", ".join(f"{o.name} {o.noise:.3g} {o.unit}".rstrip() for o in result.outputs)
+    if len(result.outputs) == 1:
+        noise = f"{result.noise.sigma:.3g} {unit}".rstrip()
+    echo(f"noise of one row: {noise}")
     if not result.settled and not result.stopped:
         echo("The search did not settle: what it ended at is not the only set of terms that it came by.")
 

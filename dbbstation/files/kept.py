@@ -242,6 +242,11 @@ def _unfit(file: Path, folder: Path) -> str:
     """Return why an index must not stand where it would; empty where it may."""
     if real_path(file).is_relative_to(real_path(folder)):
         return "the cache folder lies in the folder of the sessions; set XDG_CACHE_HOME to another"
+    return folder_problem(file)
+
+
+def folder_problem(file: Path) -> str:
+    """Return why nothing can be kept in a file, which need not be there; empty where it can."""
     kind = _file_system(real_path(file))
     return f"the cache folder lies on a share ({kind}); set XDG_CACHE_HOME to a local one" if kind in SHARES else ""
 

@@ -29,7 +29,7 @@ from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, Family, log_odds
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import compress, solve
-from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance
+from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance, spread_by_kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Iterable, Sequence
@@ -229,6 +229,8 @@ class Bank:
         uneven = 0.0 if self.whitening is None else float(np.log(self.whitening.diagonal()).sum())
         squares = 0.5 * float(rest @ rest) / innovation**2
         parameters = self.noise.parameters + (1 if np.isfinite(self.tails) else 0)
+        if self.channel.levels is not None:
+            parameters += int(self.channel.levels.max())
         cost = akaike_cost(parameters, len(target)) + (float(np.log(len(target))) if self.grows_with else 0.0)
         return -len(target) * float(np.log(innovation)) + uneven - squares - float(np.log(seen).sum()) - cost
 
@@ -242,6 +244,8 @@ class Bank:
 
     def _spread_of(self, left: NDArray[np.float64]) -> tuple[NDArray[np.float64], str]:
         """Spread of each kept row that makes whitened rows most probable: a constant part, those known, and those that grow."""
+        if self.channel.levels is not None:
+            return spread_by_kind(np.square(left * self.spread), self.channel.levels[self.channel.kept]), ""
         grows, known, follows = self.channel.grows, self.channel.known_noise, self.channel.noise_follows
         if grows is None and known is None and not follows:
             return self.spread, ""

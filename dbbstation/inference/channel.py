@@ -148,6 +148,8 @@ class Channel:
             shape (n,).
         known_noise: standard deviation of noise that a row is known to have beyond that of the others, in the unit of the residual,
             shape (n,); None: no row is known to have more.
+        levels: number of the kind of each row, from 0, where kinds of rows, such as outputs, have each a noise of a size of its own, shape
+            (n,); None: all rows have the same.
         clock: of all rows, where some were left out or where they show a step by and by; None: they show it at once.
         direction: of travel as the rows show it, shape (n,); None: nothing is looked for in time that turns with it.
     """
@@ -170,6 +172,7 @@ class Channel:
     grows: NDArray[np.float64] | None = None
     noise_follows: tuple[tuple[str, NDArray[np.float64]], ...] = ()
     known_noise: NDArray[np.float64] | None = None
+    levels: NDArray[np.int64] | None = None
     clock: Clock | None = None
     direction: NDArray[np.float64] | None = None
 

@@ -44,6 +44,23 @@ def most_probable_variance(
     return float(priced[k]), even + squares @ np.square(every[k])
 
 
+def spread_by_kind(powers: NDArray[np.float64], kinds: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Standard deviation of each row, over that of all, where each kind of rows has its own, shape (m,).
+
+    Args:
+        powers: squares of rows, shape (m,).
+        kinds: number of the kind of each row, from 0, shape (m,).
+    """
+    count = np.maximum(np.bincount(kinds), 1)
+    mean = np.bincount(kinds, powers) / count
+    own = np.maximum(mean, QUIET**2 * float(mean.max(initial=0.0)))[kinds]
+    return np.asarray(np.sqrt(own / max(float(np.mean(own)), 1e-300)))
+
+
+QUIET = 1e-4
+"""Least noise of a kind of rows, over the largest: what is quieter is a column of digits."""
+
+
 def most_probable_tails(new: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     """Root of the weight of each row, shape (m,), and degrees of freedom of Student's t that what is new in rows follows best.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dbbstation.diagnosis.simulator.separate import separating_inputs
+from dbbstation.diagnosis.simulator.nodes import spread_of
 from dbbstation.inference.verdict import Verdict
 from dbbstation.results.inference import all_quantified, finite, gains_result, quantified, residual_result
 from dbbstation.results.simulator import (
@@ -42,8 +42,10 @@ def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -
         simulator=model.name,
         unit=model.outputs[0].unit,
         outputs=tuple(
-            SimulatedOutput(output.name, output.unit, float(scale))
-            for output, scale in zip(model.outputs, answer.work.scales, strict=True)
+            SimulatedOutput(output.name, output.unit, float(scale), settled.noise.sigma * float(spread * scale))
+            for output, scale, spread in zip(
+                model.outputs, answer.work.scales, spread_of(answer.work, settled), strict=True
+            )
         ),
         runs=tuple(SimulatedRun(run.name, len(run)) for run in model.runs),
         mismatch=bool(answer.terms) or not answer.left.is_noise,
@@ -61,7 +63,17 @@ def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -
         parameters=tuple(_parameter(one) for one in answer.parameters),
         left=residual_result(answer.left),
         next=tuple(
-            SeparatingInput(one.text, one.terms, one.part, one.sigmas, one.repeats) for one in separating_inputs(answer)
+            SeparatingInput(
+                one.text,
+                one.terms,
+                one.part,
+                one.sigmas,
+                one.repeats,
+                one.trial.about if one.trial else None,
+                one.trial_sigmas,
+                one.recorded_sigmas,
+            )
+            for one in answer.separations
         ),
         not_asked=dict(answer.not_asked),
         simulations=simulations,

@@ -19,11 +19,13 @@ class SimulatedOutput:
         name: of the output.
         unit: of it.
         divided_by: its residuals, to be compared with those of other outputs.
+        noise: standard deviation of one row of it, in its unit.
     """
 
     name: str
     unit: str
     divided_by: float
+    noise: float
 
 
 @dataclass(frozen=True)
@@ -175,6 +177,9 @@ class SeparatingInput:
         part: stretch of the recordings in which they differ most.
         sigmas: standard deviations by which they differ there.
         repeats: of that stretch until they are distinguished.
+        input: under which they would differ most, in words; None where none that was tried does better than those recorded.
+        input_sigmas: standard deviations by which they would differ under it, in a recording as long.
+        recorded_sigmas: the same under the inputs as recorded.
     """
 
     text: str
@@ -182,6 +187,9 @@ class SeparatingInput:
     part: str
     sigmas: float
     repeats: int
+    input: str | None
+    input_sigmas: float
+    recorded_sigmas: float
 
 
 @dataclass(frozen=True)
@@ -192,11 +200,13 @@ class SimulationsRun:
         run: that many.
         most: that were allowed; None where nobody set a limit.
         one_s: time of one [s].
+        kept: that had been run before and were not run again.
     """
 
     run: int
     most: int | None
     one_s: float
+    kept: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)

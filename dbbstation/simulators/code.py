@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,7 @@ _PLAIN = {
     TermForm.SIGN: "{a} * x / math.sqrt(x**2 + {s} ** 2)",
     TermForm.HINGE: "{a} * max(x - {s}, 0.0)",
     TermForm.LIMIT: "{a} * min(max(x, -{s}), {s})",
+    TermForm.GAP: "-min(max(x, -{a}), {a})",
     TermForm.PRODUCT: "{a} * x * z",
     TermForm.PERIODIC: "{a} * math.cos({turns} * x) + {b} * math.sin({turns} * x)",
 }
@@ -49,12 +51,16 @@ def missing_code(answer: SimulatorComparison) -> str:
         f'"""What {answer.model.name} lacks, as found from its recordings. Add each term at its port."""',
         "",
         "import math",
+        *(["import runpy"] if any(term.own is not None for term in answer.terms) else []),
         "",
         "import numpy as np",
     ]
     verdicts = {finding.name: finding for finding in answer.findings}
     for term in answer.terms:
         finding = verdicts.get(term.name)
+        if term.own is not None:
+            kind = type(term.own)
+            lines += ["", "", f"{OWN} = runpy.run_path({inspect.getfile(kind)!r})[{kind.__qualname__!r}]()"]
         lines += ["", "", *_function(term, str(finding.verdict) if finding else "", _values(finding))]
     return "\n".join(lines) + "\n"
 
@@ -82,13 +88,22 @@ def _function(term: Term, verdict: str, values: Sequence[str]) -> list[str]:
     if remembers:
         return [*head, remembers]
     if term.form is TermForm.OWN:
-        numbers = ", ".join(repr(float(number)) for number in term.numbers)
-        return [*head, f"    return own_value(t, signals, ({numbers},))  # physics of your own"]
+        return [*head, f"    return {OWN}.value(t, signals, {_own_numbers(term)!r})"]
     if term.form is TermForm.CURVE:
         return [*head, *_curve(term)]
     b = repr(float(term.amplitudes[1])) if len(term.amplitudes) > 1 else ""
     turns = f"2.0 * math.pi * {term.fixed[1]} / {term.fixed[0]!r}" if term.form is TermForm.PERIODIC else ""
     return [*head, "    return " + _PLAIN[term.form].format(a=a, s=shape, b=b, turns=turns)]
+
+
+OWN = "own"
+"""What the code calls physics of the user's own."""
+
+
+def _own_numbers(term: Term) -> dict[str, float]:
+    """Numbers of physics of the user's own, by name."""
+    assert term.own is not None  # noqa: S101 - asked for by the caller
+    return {p.name: float(number) for p, number in zip(term.own.parameters(), term.numbers, strict=True)}
 
 
 def _curve(term: Term) -> list[str]:

@@ -7,6 +7,7 @@ import sys
 from dataclasses import dataclass
 from functools import lru_cache
 from inspect import isabstract
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,11 +20,11 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
 from dbbstation.files.gateway import content_of
 from dbbstation.files.own_classes import classes_in_files, module_name, own_instances
+from dbbstation.files.places import real_path
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -58,9 +59,12 @@ class LoadedSimulator:
 
     @property
     def content(self) -> str:
-        """Hash of the simulator's files: simulations of other content are others."""
+        """Hash of the simulator's Python files, of those beside it that it imports, and of physics of the user's own."""
+        folder = real_path(self.python).parent
+        imported = {Path(file) for module in list(sys.modules.values()) if (file := getattr(module, "__file__", None))}
+        beside = sorted(path for path in imported if path.is_relative_to(folder) and path.suffix == ".py")
         digest = hashlib.sha256()
-        for path in (self.path, self.python, *self.own_files):
+        for path in (self.python, *self.own_files, *beside):
             digest.update(hashlib.sha256(content_of(path)).digest())
         return digest.hexdigest()
 

@@ -15,6 +15,7 @@ from dbbstation.computing.processes import deaf, processes
 from dbbstation.diagnosis.simulator.ports import simulated
 from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
 from dbbstation.errors import CalibrationError
+from dbbstation.simulators.kept import KeptSimulations
 from dbbstation.simulators.loading import know, simulator_of
 
 if TYPE_CHECKING:
@@ -44,15 +45,30 @@ class Runs:
         loaded: simulator with its recordings.
         count: of processes; None: one for each core; 0: this one does it all, and nothing limits its time.
         most: simulations that may be run; None: what ten minutes hold.
+        keeps: whether simulations are kept on disk, and those that are kept there are not run again.
+
+    Attributes:
+        ran: simulations that were run.
+        found: simulations that had been kept.
+        most: that may be run; an estimate that is made better while they run, where only their time is limited.
+        seconds: that they took.
     """
 
-    def __init__(self, loaded: LoadedSimulator, count: int | None = None, most: int | None = None) -> None:
+    def __init__(
+        self, loaded: LoadedSimulator, count: int | None = None, most: int | None = None, *, keeps: bool = False
+    ) -> None:
         self._loaded, self._model = loaded, loaded.model
         self._count = (os.cpu_count() or 1) if count is None else count
         self._known: dict[SimulationRequest, SimulationOutcome] = {}
         self._pool: ProcessPoolExecutor | None = None
         self._stack = ExitStack()
-        self.ran, self.most, self.seconds = 0, most, 0.0
+        self.ran, self.found, self.most, self.seconds = 0, 0, most, 0.0
+        self._by_time = False
+        self._kept = KeptSimulations(loaded.content, loaded.model) if keeps else None
+        if self._kept is not None:
+            self._stack.callback(self._kept.close)
+        outputs = len(self._model.outputs)
+        self._shapes = {k: (outputs, len(run)) for k, run in enumerate(self._model.runs)}
 
     def __enter__(self) -> Self:
         """Start the processes."""
@@ -74,15 +90,34 @@ class Runs:
             CalibrationError: one raised, returned what it should not, or took too long; with its input.
         """
         fresh = [ask for ask in dict.fromkeys(asks) if ask not in self._known]
-        if self.most is not None and self.ran + len(fresh) > self.most:
-            what = f"{self.ran} of {self.most} simulations are spent"
-            raise BudgetSpentError(what, where=str(self._loaded.path), remedy="allow more with --most-runs")
+        if self._kept is not None and fresh:
+            kept = self._kept.known(fresh, self._shapes)
+            self._known |= kept
+            self.found += len(kept)
+            fresh = [ask for ask in fresh if ask not in kept]
+        self._refuse_beyond(len(fresh))
         before = monotonic()
-        for ask, answer in zip(fresh, self._simulated(fresh), strict=True):
-            self._known[ask] = answer
+        new = list(zip(fresh, self._simulated(fresh), strict=True))
+        self._known |= new
+        if self._kept is not None:
+            self._kept.keep(new)
         self.seconds += monotonic() - before
         self.ran += len(fresh)
+        if self._by_time and self.ran:
+            self.most = max(int(self.ran * MOST_SECONDS / max(self.seconds, SHORTEST_S * self.ran)), self.ran)
         return [self._known[ask] for ask in asks]
+
+    def _refuse_beyond(self, more: int) -> None:
+        """Refuse more simulations than are allowed, by number or, where none was given, by time."""
+        if self._by_time:
+            if not more or self.seconds < MOST_SECONDS:
+                return
+            what = f"{MOST_SECONDS / 60.0:.0f} minutes of simulations are spent, {self.ran} of them"
+        elif self.most is None or self.ran + more <= self.most:
+            return
+        else:
+            what = f"{self.ran} of {self.most} simulations are spent"
+        raise BudgetSpentError(what, where=str(self._loaded.path), remedy="allow more with --most-runs")
 
     @property
     def left_s(self) -> float | None:
@@ -99,8 +134,8 @@ class Runs:
         self._simulated(again)
         one = max((monotonic() - before) / max(len(again), 1), SHORTEST_S)
         if self.most is None:
-            self.most = int(MOST_SECONDS / one) * max(self._count, 1)
-        self(first)
+            # How long simulations take is known better the more were run: what is allowed is the time.
+            self._by_time, self.most = True, int(MOST_SECONDS / one) * max(self._count, 1)
         self.seconds = one * self.ran
         return one
 

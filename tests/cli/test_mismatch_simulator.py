@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.files.shipped import shipped_folder
+from tests.cli.test_schemas_of_results import faults
 
 FOLDER = shipped_folder("fixtures") / "simulators"
 ASKED = ("mismatch", FOLDER / "pendulum.csv", "--simulator", FOLDER / "pendulum.yaml")
@@ -41,6 +42,13 @@ class Decay(Simulator):
             level += step * (ports.flow(t[k], {"level": level}) - parameters["rate"] * level)
         return {"level": np.array(found)}
 """
+
+
+@pytest.fixture(autouse=True)
+def kept(tmp_path, monkeypatch):
+    """Simulations are kept in a folder of the test."""
+    monkeypatch.setattr("dbbstation.simulators.kept.simulations_folder", lambda: tmp_path / "kept")
+    return tmp_path / "kept"
 
 
 @pytest.fixture
@@ -146,8 +154,19 @@ def test_the_help_names_the_simulator(run):
     assert "--simulator" in run("mismatch", "--help").out
 
 
-def test_json_is_json(run, decay):
-    assert json.loads(run(*decay(), "--json").out)["simulator"] == "decay"
+def test_json_is_what_its_schema_says_and_simulations_are_run_once_only(run, decay):
+    asked = (*decay(), "--json")
+    first = run(*asked).data
+    assert first["simulator"] == "decay"
+    schema = json.loads(run("check", "--schema", "mismatch-simulator").out)
+    assert faults(first, schema, schema.get("$defs", {})) == []
+    assert first["simulations"]["kept"] == 0
+
+    second = run(*asked).data
+    assert second["simulations"]["run"] < 0.1 * first["simulations"]["run"]
+    assert second["simulations"]["kept"] > 0.9 * first["simulations"]["run"]
+    assert second["findings"] == first["findings"]
+    assert second["parameters"] == first["parameters"]
 
 
 OUTLET = """from dbbstation.diagnosis.simulator.own import Parameter, PortSource
@@ -174,12 +193,16 @@ def test_physics_of_ones_own_competes_at_its_port(run, decay, tmp_path):
     rows = "\n".join(f"{a:.3f},{b:.6f}" for a, b in zip(t, levels, strict=True))
     (tmp_path / "run.csv").write_text(f"t_s,level_m\n{rows}\n")
     (tmp_path / "outlet.py").write_text(OUTLET)
-    outcome = run(*asked, "--source-file", tmp_path / "outlet.py", "--json")
+    out = tmp_path / "missing.py"
+    outcome = run(*asked, "--source-file", tmp_path / "outlet.py", "--json", "--out", out)
     assert outcome.code == 0, outcome.err
     (found,) = [f for f in outcome.data["findings"] if f["name"].startswith("outlet")]
     assert found["verdict"] == "identified"
     # The simulator's Euler steps of 20 ms are off by about a hundredth.
     assert found["values"]["size"]["value"] == pytest.approx(0.3, rel=0.015)
+    # The term as code runs where it is pasted: outflow by the root of a level of 4 m.
+    (function,) = [value for name, value in runpy.run_path(str(out)).items() if name.startswith("flow_outlet")]
+    assert function(0.0, {"level": 4.0}) == pytest.approx(-2.0 * found["values"]["size"]["value"], rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from dbbstation.diagnosis.simulator.fit import not_told_apart
 from dbbstation.diagnosis.simulator.held import held_out_error, parts
 from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
 from dbbstation.diagnosis.simulator.search import compared, search
+from dbbstation.diagnosis.simulator.separate import separations
 from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.left_over import left_over
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.nodes import Node
     from dbbstation.diagnosis.simulator.own import PortSource
     from dbbstation.diagnosis.simulator.search import SearchOutcome
+    from dbbstation.diagnosis.simulator.separate import Separation
     from dbbstation.diagnosis.simulator.terms import Term
     from dbbstation.diagnosis.simulator.work import Run
     from dbbstation.inference.folds import HeldOutError
@@ -69,6 +71,7 @@ class SimulatorComparison:
         as_simulated: measured less simulated values with the parameters as stated, shape (n,).
         nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term.
         not_asked: candidates that could not be asked, and why.
+        separations: what would tell terms apart that these recordings do not.
         stopped: why it ended early; empty where it did not.
     """
 
@@ -82,6 +85,7 @@ class SimulatorComparison:
     as_simulated: NDArray[np.float64]
     nonlinear: Mapping[str, float]
     not_asked: Mapping[str, str]
+    separations: tuple[Separation, ...] = ()
     stopped: str = ""
 
     @property
@@ -172,17 +176,19 @@ def _said(
     except BudgetSpentError:
         nonlinear = {term.name: np.inf for term in found.state.terms}
     findings = tuple(_judged(one, found, nonlinear) for one in read_off(settled, Trial(held_out, refits)))
+    findings = tuple(sorted(findings, key=lambda one: (one.verdict.rank, -one.log_factor)))
     return SimulatorComparison(
         model=nodes.work.model,
         base=base,
         found=found,
-        findings=tuple(sorted(findings, key=lambda one: (one.verdict.rank, -one.log_factor))),
+        findings=findings,
         parameters=_parameters(base, found),
         left=left_over(settled),
         held_out=held_out,
         as_simulated=as_simulated,
         nonlinear=nonlinear,
         not_asked=node.asked[1],
+        separations=separations(nodes, found, findings),
         stopped=stopped,
     )
 

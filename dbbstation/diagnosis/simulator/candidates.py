@@ -152,18 +152,31 @@ def _at(port: SimulatorPort, signals: Mapping[str, NDArray[np.float64]], span: t
         widths = tuple((0.5 * float(np.ptp(values)) * np.geomspace(0.01, 0.5, LENGTHS)).tolist())
         found.append(_candidate(port, TermForm.SLIP, (name,), ("size", "half width"), (port.unit, unit), grid=widths))
         if unit == port.unit:
-            whiles = tuple(np.geomspace(span[0], max(0.1 * span[1], 2.0 * span[0]), LENGTHS + 1).tolist())
-            tried = {TermForm.DELAY: whiles, TermForm.LAG: whiles, TermForm.PLAY: widths}
-            for form, what, of in (
-                (TermForm.DELAY, "dead time", "s"),
-                (TermForm.LAG, "time constant", "s"),
-                (TermForm.PLAY, "half width", unit),
-            ):
-                found.append(replace(_candidate(port, form, (name,), (what,), (of,)), tried=tried[form]))
+            found += _in_place(port, name, values, span, widths)
     for one, other in combinations(signals, 2):
         units = _per(_per(port.unit, port.signals[one]), port.signals[other])
         found.append(_candidate(port, TermForm.PRODUCT, (one, other), ("coefficient",), (units,)))
     return found
+
+
+def _in_place(
+    port: SimulatorPort,
+    name: str,
+    values: NDArray[np.float64],
+    span: tuple[float, float],
+    widths: tuple[float, ...],
+) -> list[Candidate]:
+    """Forms that put something else in the place of a signal, shape (calls,)."""
+    unit = port.signals[name]
+    whiles = tuple(np.geomspace(span[0], max(0.1 * span[1], 2.0 * span[0]), LENGTHS + 1).tolist())
+    forms = [
+        (TermForm.DELAY, "dead time", "s", whiles),
+        (TermForm.LAG, "time constant", "s", whiles),
+        (TermForm.PLAY, "half width", unit, widths),
+    ]
+    if values.min() < 0.0 < values.max():
+        forms.append((TermForm.GAP, "half width", unit, widths))
+    return [replace(_candidate(port, form, (name,), (what,), (of,)), tried=tried) for form, what, of, tried in forms]
 
 
 def _candidate(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.fit import near
-from dbbstation.diagnosis.simulator.nodes import noise_of
+from dbbstation.diagnosis.simulator.nodes import noise_of, spread_of
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
 from dbbstation.diagnosis.table.mismatch import FOLD_ROWS
 from dbbstation.inference.folds import ENOUGH_BLOCKS, FOLDS, Fold, HeldOutError, beside
@@ -70,6 +70,7 @@ def held_out_error(
     """
     work, channel = nodes.work, found.node.channel
     as_simulated = work.residuals([stated])[0]
+    weight = 1.0 / spread_of(work, found.settled)[work.output]
     every, folds = parts(work), []
     for done, (name, rows) in enumerate(every):
         progress("held-out part", done, len(every))
@@ -78,12 +79,12 @@ def held_out_error(
         one = search(nodes, base, partial(_without, out=out, found=found), refits=False)
         weigh, sigma = noise_of(one.settled)
         _, refitted = near(work, base.fitted, lambda r, out=out: r[~out], max(base.size, 1e-300))  # type: ignore[misc]  # bound now
-        with_all = float(np.sum(np.square(one.residual[rows])))
+        with_all = float(np.sum(np.square(weight[rows] * one.residual[rows])))
         gains: dict[tuple[str, ...], float] = {}
         for term in one.node.names:
             less = nodes.without(one.node, term, weigh, sigma)
             _, left = near(work, less.fitted, weigh, sigma)
-            gains[(term,)] = float(np.sum(np.square(left[rows]))) - with_all
+            gains[(term,)] = float(np.sum(np.square(weight[rows] * left[rows]))) - with_all
         before, middle, after = (_rms(values[rows]) for values in (as_simulated, refitted, one.residual))
         folds.append(Fold(name, int(rows.sum()), before, middle, after, gains))
     return HeldOutError(tuple(folds))

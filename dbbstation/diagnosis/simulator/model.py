@@ -119,6 +119,21 @@ class Model:
         return tuple((p.key, float(value)) for p, value in pairs if p.run is None or p.run == run)
 
 
+@dataclass(frozen=True, eq=False)
+class TrialInput:
+    """Inputs that nobody recorded yet.
+
+    Attributes:
+        run: number of the recording whose times they have.
+        about: what they are, in words.
+        inputs: `t` [s], and inputs by name, shape (n,).
+    """
+
+    run: int
+    about: str
+    inputs: Mapping[str, NDArray[np.float64]]
+
+
 @dataclass(frozen=True)
 class SimulationRequest:
     """One simulation.
@@ -128,12 +143,14 @@ class SimulationRequest:
         parameters: by key.
         terms: what acts at the ports.
         records: whether signals at the ports are wanted.
+        trial: inputs that it takes in place of those of the recording; None: it takes these.
     """
 
     run: int
     parameters: tuple[tuple[str, float], ...]
     terms: tuple[Term, ...] = ()
     records: bool = False
+    trial: TrialInput | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.candidates import Candidate, candidates
-from dbbstation.diagnosis.simulator.fit import SimulatorFit, fit, plain
+from dbbstation.diagnosis.simulator.fit import SimulatorFit, fit
 from dbbstation.diagnosis.simulator.laws import SHARE, curve_answers, discrepancy, form_uncertainty, laws
 from dbbstation.diagnosis.simulator.terms import TermForm
-from dbbstation.diagnosis.simulator.work import AGREE, FittedState
+from dbbstation.diagnosis.simulator.work import AGREE, FittedState, RanAwayError
 from dbbstation.diagnosis.table.data import rounding_of
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.named_values import named_values
@@ -131,6 +131,7 @@ class Node:
             time=work.time,
             static=(),
             least_noise=min(rounding_of(work.measured[rows]) / work.scale[rows.start] for rows in work.blocks),
+            levels=work.output if len(work.model.outputs) > 1 else None,
         )
 
     def _law(self, one: Candidate, columns: NDArray[np.float64], numbers: Sequence[float]) -> Law:
@@ -166,6 +167,9 @@ class Node:
         return tuple(values[name].value for name in one.names)
 
 
+SHARES = (1.0, 0.3, 0.1)
+"""Shares of what the linear comparison proposes at which a refit is begun, one where the one before runs away."""
+
 MOST_SHARE = 2.0
 """Share of the largest size tried that a fit may begin at: beyond, the answer was not taken."""
 
@@ -197,18 +201,29 @@ class Nodes:
         self.known[node.names] = node
         return node
 
-    def with_more(self, node: Node, one: Candidate, settled: Settled, weigh: Weigh, sigma: float) -> Node:
-        """A node with one more term, from what a comparison says of it."""
+    def with_more(self, node: Node, one: Candidate, settled: Settled, weigh: Weigh, sigma: float) -> Node | None:
+        """A node with one more term, from what a comparison says of it; None where simulations with it run away."""
         names = node.names | {one.name}
         if names not in self.known:
             self.progress(f"refit with {one.name}")
-            term = one.term.with_numbers(_inside(one, node.numbers_of(settled, one)))
-            state = FittedState(node.fitted.state.values, (*node.fitted.state.terms, term))
-            self.known[names] = self._fitted(node, state, (*node.inside, one), weigh, sigma)
-        return self.known[names]
+            numbers = np.array(_inside(one, node.numbers_of(settled, one)))
+            amplitudes = len(one.term.amplitudes)
+            for share in SHARES:
+                begun = np.concatenate([share * numbers[:amplitudes], numbers[amplitudes:]])
+                term = one.term.with_numbers(begun.tolist())
+                state = FittedState(node.fitted.state.values, (*node.fitted.state.terms, term))
+                try:
+                    self.known[names] = self._fitted(node, state, (*node.inside, one), weigh, sigma)
+                    break
+                except RanAwayError:
+                    continue
+        return self.known.get(names)
 
-    def instead(self, node: Node, more: Sequence[Candidate], settled: Settled) -> Node:
-        """A node with the best set of terms of a comparison, where it lacks some that are in a node and has others."""
+    def instead(self, node: Node, more: Sequence[Candidate], settled: Settled) -> Node | None:
+        """A node with the best set of terms of a comparison, where it lacks some that are in a node and has others.
+
+        None where simulations with it run away.
+        """
         names = settled.best.names & node.names | {one.name for one in more}
         if names not in self.known:
             self.progress(f"refit with {', '.join(sorted(names))}")
@@ -216,7 +231,10 @@ class Nodes:
             kept = [(one, term) for one, term in terms if one.name in names]
             new = [one.term.with_numbers(_inside(one, node.numbers_of(settled, one))) for one in more]
             state = FittedState(node.fitted.state.values, (*(term for _, term in kept), *new))
-            self.known[names] = self._fitted(node, state, (*(one for one, _ in kept), *more), *noise_of(settled))
+            try:
+                self.known[names] = self._fitted(node, state, (*(one for one, _ in kept), *more), *noise_of(settled))
+            except RanAwayError:
+                return None
         return self.known[names]
 
     def without(self, node: Node, name: str, weigh: Weigh, sigma: float) -> Node:
@@ -257,6 +275,7 @@ def noise_of(settled: Settled) -> tuple[Weigh, float]:
     return settled.bank.whitened, settled.noise.innovation
 
 
-def plain_noise(node: Node) -> tuple[Weigh, float]:
-    """Rows as they are, with the standard deviation of what a node leaves."""
-    return plain, node.size
+def spread_of(work: SimulationRuns, settled: Settled) -> NDArray[np.float64]:
+    """Noise of each output that a comparison found, over that of all rows, shape (o,)."""
+    kinds, spread = work.output[settled.channel.kept], settled.bank.spread
+    return np.array([float(np.mean(spread[kinds == k])) for k in range(len(work.model.outputs))])

@@ -99,7 +99,8 @@ def simulated(simulator: Simulator, model: Model, ask: SimulationRequest) -> Sim
     run = model.runs[ask.run]
     with np.errstate(all="ignore"):
         try:
-            outputs = simulator.simulate(dict(run.inputs), dict(ask.parameters), ports)
+            inputs = run.inputs if ask.trial is None else ask.trial.inputs
+            outputs = simulator.simulate(dict(inputs), dict(ask.parameters), ports)
         except (ArithmeticError, ValueError) as error:
             if isinstance(error, ValueError) and "math" not in str(error):
                 raise

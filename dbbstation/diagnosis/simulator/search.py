@@ -116,10 +116,15 @@ def _wanted(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
         more = []  # the recordings do not want anything more for sure
     if more and not node.names <= settled.best.names:
         # Linear answers about a good fit are right: what is better than some of its terms stands in their place.
-        return nodes.instead(node, [outside[name] for name in more], settled)
+        better = nodes.instead(node, [outside[name] for name in more], settled)
+        if better is not None:
+            return better
     if more:
         first = max(more, key=settled.best.log_factor)
-        tried = [nodes.with_more(node, one, settled, weigh, sigma) for one in _rivals(node, settled, outside[first])]
+        rivals = [nodes.with_more(node, one, settled, weigh, sigma) for one in _rivals(node, settled, outside[first])]
+        tried = [one for one in rivals if one is not None]
+        if not tried:
+            return None  # with any of them the simulation runs away
         costs = [_cost(nodes, one, settled) for one in tried]
         best = tried[int(np.argmin(costs))]
         nodes.progress(f"put in {', '.join(best.names - node.names)}")

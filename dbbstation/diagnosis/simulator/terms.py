@@ -45,13 +45,14 @@ class TermForm(StrEnum):
     DELAY = "delay"  # x a while ago, less x; a is that while
     LAG = "lag"  # x through a first-order lag, less x; a is its time constant
     PLAY = "play"  # x through a play, less x; a is its half width
+    GAP = "dead zone"  # x beyond a half width, and nothing within, less x; a is the half width
     OWN = "own"  # physics of the user's own
 
 
-IN_PLACE = frozenset({TermForm.DELAY, TermForm.LAG, TermForm.PLAY})
+IN_PLACE = frozenset({TermForm.DELAY, TermForm.LAG, TermForm.PLAY, TermForm.GAP})
 """Forms that put something else in the place of a signal. Their amplitude cannot be negative and is not a factor."""
 
-MEMORIES = frozenset({TermForm.MEMORY, TermForm.SLIP, *IN_PLACE})
+MEMORIES = frozenset({TermForm.MEMORY, TermForm.SLIP, TermForm.DELAY, TermForm.LAG, TermForm.PLAY})
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,8 @@ def _momentary(term: Term) -> Evaluate:
     if term.form is TermForm.CONSTANT:
         return lambda _t, _signals: a
     x = term.signals[0]
+    if term.form is TermForm.GAP:
+        return lambda _t, signals: -min(max(signals[x], -a), a)
     if term.form is TermForm.PRODUCT:
         z = term.signals[1]
         return lambda _t, signals: a * signals[x] * signals[z]

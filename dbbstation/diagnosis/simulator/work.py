@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.simulator.model import Model, SimulationOutcome
+    from dbbstation.diagnosis.simulator.model import Model, SimulationOutcome, TrialInput
     from dbbstation.diagnosis.simulator.terms import Term
 
     Run = Callable[[Sequence[SimulationRequest]], list[SimulationOutcome]]
@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 
 class BudgetSpentError(CalibrationError):
     """All simulations that were allowed have been run."""
+
+
+class RanAwayError(CalibrationError):
+    """A simulation ran away: its outputs are not finite."""
 
 
 ANSWER = 0.01
@@ -102,12 +106,14 @@ class SimulationRuns:
         run: simulates; what was simulated before is not simulated again.
         scales: unit of the residual of each output, in that of the output, shape (o,).
         doses: that gave answers of the right size, by number.
+        trial: inputs in place of those of the only run of the model; None: the runs have their own.
     """
 
     model: Model
     run: Run
     scales: NDArray[np.float64]
     doses: dict[tuple[str, ...], float] = field(default_factory=dict)
+    trial: TrialInput | None = None
 
     def __post_init__(self) -> None:
         ends = np.cumsum([0, *(len(run) for run in self.model.runs for _ in self.model.outputs)])
@@ -116,6 +122,7 @@ class SimulationRuns:
         outputs = [o.name for o in self.model.outputs]
         self.measured = np.concatenate([run.measured[name] for run in self.model.runs for name in outputs])
         self.scale = np.concatenate([np.full(len(run), s) for run in self.model.runs for s in self.scales])
+        self.output = np.concatenate([np.full(len(run), k) for run in self.model.runs for k in range(len(outputs))])
 
     @property
     def size(self) -> int:
@@ -126,11 +133,16 @@ class SimulationRuns:
         """Simulated values of all rows at each state, in units of the outputs, shape (n,).
 
         Raises:
-            CalibrationError: one ran away, if `strict`.
+            RanAwayError: one ran away, if `strict`.
         """
         runs = range(len(self.model.runs))
         asks = [
-            SimulationRequest(run, self.model.of_run(run, state.values), state.terms)
+            SimulationRequest(
+                run if self.trial is None else self.trial.run,
+                self.model.of_run(run, state.values),
+                state.terms,
+                trial=self.trial,
+            )
             for state in states
             for run in runs
         ]
@@ -142,7 +154,7 @@ class SimulationRuns:
                 where = next(
                     ask for ask, a in zip(asks[k * len(runs) :], own, strict=False) if not np.isfinite(a.outputs).all()
                 )
-                raise CalibrationError(
+                raise RanAwayError(
                     "the simulation ran away: its outputs are not finite", where=told(self.model, where), remedy=MEND
                 )
         return found
@@ -242,7 +254,8 @@ def told(model: Model, ask: SimulationRequest) -> str:
     """A simulation in words: its run, parameters and terms."""
     values = ", ".join(f"{key} = {value:.6g}" for key, value in ask.parameters)
     terms = "".join(f"; {term.name}: {', '.join(f'{n:.4g}' for n in term.numbers)}" for term in ask.terms)
-    return f"{model.runs[ask.run].name} with {values}{terms}"
+    inputs = ask.trial.about if ask.trial else model.runs[ask.run].name
+    return f"{inputs} with {values}{terms}"
 
 
 MEND = "narrow the bounds of the parameters, or mend `simulate` for these values"

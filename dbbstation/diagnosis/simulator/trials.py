@@ -1,0 +1,115 @@
+"""Inputs that would tell terms apart: trials made from the recorded inputs, each simulated with one term and with the other.
+
+What both do to the outputs is compared beside the parameters and the other terms, whose answers are asked for under the same inputs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.fit import directions_of
+from dbbstation.diagnosis.simulator.model import TrialInput
+from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.model import Model
+    from dbbstation.diagnosis.simulator.terms import Term
+
+FACTORS = (0.5, 2.0)
+"""Sizes and speeds of the recorded inputs that are tried, over what they were."""
+
+PERIODS = (2, 8, 32)
+"""Turns of a sine over a recording that are tried: a slow one, one of the middle, a fast one."""
+
+QUARTER = 0.25
+"""Of a recording: a step is up for the middle half."""
+
+
+def trial_inputs(model: Model) -> list[TrialInput]:
+    """Inputs made from those of the longest recording, that itself first; none where the simulator has no inputs."""
+    run = max(range(len(model.runs)), key=lambda k: len(model.runs[k]))
+    recorded = model.runs[run]
+    t = recorded.inputs["t"]
+    own = {name: values for name, values in recorded.inputs.items() if name != "t" and np.ptp(values) > 0.0}
+    if not own:
+        return []
+    share = (t - t[0]) / (t[-1] - t[0])
+
+    def made(about: str, of: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> TrialInput:
+        return TrialInput(run, about, {**recorded.inputs, **{name: of(values) for name, values in own.items()}})
+
+    def between(values: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(values.min() + np.ptp(values) * height)
+
+    found = [made("the inputs as recorded", lambda values: values)]
+    for factor in FACTORS:
+        found.append(made(f"{factor:g} times the inputs", lambda values, f=factor: f * values))  # type: ignore[misc]  # bound now
+        found.append(
+            made(
+                f"the inputs played {factor:g} times as fast",
+                lambda values, f=factor: np.interp((f * share) % 1.0, share, values),  # type: ignore[misc]  # bound now
+            )
+        )
+    found.append(
+        made("one step up and down of their whole range", lambda v: between(v, 1.0 * (np.abs(share - 0.5) < QUARTER)))
+    )
+    for turns in PERIODS:
+        period = (t[-1] - t[0]) / turns
+        found.append(
+            made(
+                f"a sine of {period:.3g} s over their whole range",
+                lambda v, n=turns: between(v, 0.5 - 0.5 * np.cos(2.0 * np.pi * n * share)),  # type: ignore[misc]  # bound now
+            )
+        )
+    sweep = np.pi * PERIODS[-1] * share**2
+    found.append(
+        made("a sine over their whole range, from slow to fast", lambda v: between(v, 0.5 - 0.5 * np.cos(sweep)))
+    )
+    return found
+
+
+def apart(
+    work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Sequence[Term], noise: NDArray[np.float64]
+) -> float:
+    """By how many standard deviations two terms would be told apart under an input.
+
+    Args:
+        work: simulations of the recordings.
+        trial: the input.
+        state: that was found.
+        pair: both terms, with their numbers.
+        noise: of each output, that of rows that count as one, in units of its residual, shape (o,).
+    """
+    model = work.model
+    own = [k for k, p in enumerate(model.parameters) if p.run in {None, trial.run}]
+    parameters = tuple(replace(p, run=None if p.run is None else 0) for p in (model.parameters[k] for k in own))
+    one = SimulationRuns(
+        replace(model, parameters=parameters, runs=(model.runs[trial.run],)), work.run, work.scales, trial=trial
+    )
+    names = {term.name for term in pair}
+    others = tuple(term for term in state.terms if term.name not in names)
+    base = FittedState(tuple(state.values[k] for k in own), others)
+    sides = [FittedState(base.values, (*others, term)) for term in pair]
+    rows = one.residuals([base, *sides], strict=False)
+    if not all(np.isfinite(row).all() for row in rows):
+        return 0.0
+    weight = 1.0 / noise[one.output]
+    effects = [weight * (rows[0] - row) for row in rows[1:]]
+    size = float(np.sqrt(np.mean(np.square(rows[0] - rows[1])))) or 1.0
+    found = one.answers(base, directions_of(one, base), size)
+    columns = np.column_stack([weight[:, None] * found.columns, effects[1]])
+    return float(np.linalg.norm(beside(columns, effects[0])))
+
+
+def beside(columns: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What columns, shape (n, p), cannot take up of rows, shape (n,)."""
+    norm = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    values = np.linalg.lstsq(columns / norm, wanted, rcond=1e-10)[0]
+    return np.asarray(wanted - (columns / norm) @ values)

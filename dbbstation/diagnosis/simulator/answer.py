@@ -71,7 +71,7 @@ class SimulatorComparison:
         as_simulated: measured less simulated values with the parameters as stated, shape (n,).
         nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term.
         not_asked: candidates that could not be asked, and why.
-        separations: what would tell terms apart that these recordings do not.
+        separations: what would distinguish terms that these recordings do not.
         stopped: why it ended early; empty where it did not.
     """
 

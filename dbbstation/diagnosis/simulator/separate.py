@@ -1,4 +1,4 @@
-"""What would tell apart terms that these recordings do not: the input under which their answers differ most."""
+"""What would distinguish terms that these recordings do not: the input under which their answers differ most."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ MOST_REPEATS = 1000
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """What would tell two terms apart.
+    """What would distinguish two terms.
 
     Attributes:
         terms: both names.
         part: stretch of the recordings in which they differ most.
         sigmas: standard deviations by which they differ there.
-        repeats: of that stretch until they are told apart.
+        repeats: of that stretch until they are distinguished.
         trial: input under which they would differ most; None where the simulator has no inputs, or none of those tried does better.
         trial_sigmas: standard deviations by which they would differ under it, in a recording as long.
         recorded_sigmas: the same under the inputs as recorded.
@@ -67,7 +67,7 @@ class Separation:
 
 
 def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> tuple[Separation, ...]:
-    """Proposals for each pair of terms that the recordings do not tell apart.
+    """Proposals for each pair of terms that the recordings do not distinguish.
 
     The answers of both are compared beside the parameters: in which stretch of the recordings they differ most, in units of noise, and
     how often that must be repeated until they are `OUT` standard deviations apart; and under which of the trial inputs they would

@@ -1,4 +1,4 @@
-"""Inputs that would tell terms apart: trials made from the recorded inputs, each simulated with one term and with the other.
+"""Inputs that would distinguish terms: trials made from the recorded inputs, each simulated with one term and with the other.
 
 What both do to the outputs is compared beside the parameters and the other terms, whose answers are asked for under the same inputs.
 """
@@ -78,7 +78,7 @@ def trial_inputs(model: Model) -> list[TrialInput]:
 def apart(
     work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Sequence[Term], noise: NDArray[np.float64]
 ) -> float:
-    """By how many standard deviations two terms would be told apart under an input.
+    """By how many standard deviations two terms would be distinguished under an input.
 
     Args:
         work: simulations of the recordings.

@@ -1,4 +1,4 @@
-"""Several outputs: one amplitude, each output its noise; and which input would tell two terms apart."""
+"""Several outputs: one amplitude, each output its noise; and which input would distinguish two terms."""
 
 import numpy as np
 import pytest

@@ -6,7 +6,10 @@ import json
 
 import pytest
 
+from dbbstation.results.demo import DemoCalibration, DemoDiagnosis, DemoEvaluation, DemoReport
 from dbbstation.results.schemas import RESULTS
+from dbbstation.results.serialise import read_plain
+from dbbstation.service.answers import AcceptanceAnswer, CalibrationAnswer, DiagnosisAnswer, ProgramsAnswer
 from tests.cli.golden_json import GOLDEN, keys_of, lines_of, without_place
 from tests.cli.json_schema import faults
 
@@ -33,6 +36,26 @@ def test_every_command_prints_what_its_schema_says(printed, run):
     assert set(schemas) == set(printed)
     found = {name: faults(printed[name].data, schema, schema.get("$defs", {})) for name, schema in schemas.items()}
     assert found == {name: [] for name in schemas}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("command", "part"),
+    [
+        ("calibrate", CalibrationAnswer),
+        ("diagnose", DiagnosisAnswer),
+        ("program", ProgramsAnswer),
+        ("report", AcceptanceAnswer),
+        ("calibrate", DemoCalibration),
+        ("diagnose", DemoDiagnosis),
+        ("evaluate", DemoEvaluation),
+        ("report", DemoReport),
+    ],
+)
+def test_what_the_station_and_the_demonstration_show_is_printed(printed, command, part):
+    """They read parts of results; a key that they lack, or another type, is an error of theirs."""
+    read = read_plain(part, printed[command].data)
+    assert set(vars(read)) <= set(printed[command].data)
 
 
 def test_a_key_that_is_renamed_is_noticed():

@@ -66,10 +66,18 @@ class CircleWatch:
         self._since_s: float | None = None
         self._came = not waits_for_feed_in
         self._told = False
+        self._mirrored_mm = circle.bar_mm - circle.feed_in_mm
+        self._reach_mm = (0.5 - HYSTERESIS) * circle.feed_in_mm
+        self.backwards = False
+        """Whether the length came from as far inside as the feed-in point is outside: a gauge that counts the wrong way round."""
 
     def seen(self, t_s: float, length_mm: float) -> bool:
         """Return True once, when the bar has kept the circle's length for `SETTLED_S`."""
         outside = self._edges.outside(length_mm)
+        if outside is True:
+            self.backwards = False
+        elif abs(length_mm - self._mirrored_mm) < self._reach_mm:
+            self.backwards = True
         if outside is not False or length_mm < self._far_mm:
             self._since_s = None
             self._came = self._came or outside is True

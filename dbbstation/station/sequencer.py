@@ -38,6 +38,7 @@ from dbbstation.station.states import (
     Trigger,
     commands_allowed,
 )
+from dbbstation.trace.cut import COUNTS_BACKWARDS
 from dbbstation.trace.reachable import Reachable
 
 if TYPE_CHECKING:
@@ -376,6 +377,8 @@ class Sequencer:
             f"the machine went onto the circle {what}: this circle is not recorded; let it end, send the machine to the "
             "feed-in point and run the program again"
         )
+        if self._watch.backwards:
+            problem = f"the length grew where the machine fed in: {COUNTS_BACKWARDS}; this circle is not recorded"
         self._flush()
         self._out.append(events.FeedInMissed(self._announced(), problem))
 

@@ -197,6 +197,13 @@ def edges_of(recording: Recording, circle: Circle) -> tuple[float, float]:
     last = _first_below(t[::-1], length[::-1], circle)
     if first is None or last is None:
         missing = "feed-in" if first is None else "feed-out"
+        if _counts_backwards(t, length, circle):
+            raise TraceError(
+                f"no {missing} found: the length is {length[0]:.3f} mm at the start and {float(np.median(length)):.3f} mm on the "
+                f"circle, and a feed-in of {circle.feed_in_mm:g} mm makes it shorter, not longer",
+                where=recording.name,
+                remedy=f"{COUNTS_BACKWARDS}, and run it again",
+            )
         raise TraceError(
             f"no {missing} found: from its {'start' if first is None else 'end'} the length, {length.min():.3f} to "
             f"{length.max():.3f} mm, does not fall by half of the feed-in of {circle.feed_in_mm:g} mm",
@@ -215,6 +222,16 @@ def edges_of(recording: Recording, circle: Circle) -> tuple[float, float]:
             remedy="record the whole path, or correct feed and overshoot in the plan",
         )
     return edge_in, edge_out
+
+
+COUNTS_BACKWARDS = "the gauge counts the wrong way round: turn its counting direction at the display or encoder"
+"""What a length means that grows where the machine feeds in, and what to do."""
+
+
+def _counts_backwards(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle) -> bool:
+    """Whether both ends of a trace stand below its middle by a feed-in: mirrored about the bar's length."""
+    ends = (float(np.median(length[np.abs(t - end) <= STANDING_S])) for end in (t[0], t[-1]))
+    return all(abs(float(np.median(length)) - end - circle.feed_in_mm) < 0.5 * circle.feed_in_mm for end in ends)
 
 
 def _first_below(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle) -> int | None:

@@ -65,8 +65,8 @@ _TALL_ROWS = 32
 
 DARK, LIGHT = "textual-dark", "textual-light"
 
-_NOT_OPERATED = frozenset({"overview", "large", "results", "temperature", "command_palette"})
-"""What an operator of a job cannot reach."""
+_NOT_OPERATED = {"overview": "o", "large": "f", "results": "e", "temperature": "t", "command_palette": "ctrl+p"}
+"""What an operator of a job cannot reach, and by which key others do."""
 
 
 class Sequence(Protocol):
@@ -350,6 +350,10 @@ class StationApp(App[None]):
             give_verdict(folder, command)
 
         def written(_: None) -> None:
+            word = "accepted" if command.accepted else "rejected"
+            why = f": {command.reason}" if command.reason else ""
+            run = f"{command.test}-{command.direction}-{command.repeat}"
+            self.board.messages.append(Message(Weight.NOTE, f"{run} {word}{why}"))
             runner.start()
 
         def failed(error: Exception) -> None:
@@ -420,7 +424,8 @@ class StationApp(App[None]):
         """Say what the screen shows and what each key does."""
         explained = next((each for each in reversed(self.screen_stack) if isinstance(each, ExplainedScreen)), None)
         if explained is not None and not isinstance(self.screen, ModalScreen):
-            self.push_screen(HelpScreen(explained.help_name))
+            without = () if self._operated is None else _NOT_OPERATED.values()
+            self.push_screen(HelpScreen(explained.help_name, tuple(without)))
 
     def action_messages(self) -> None:
         """Show the messages with all their words."""

@@ -13,7 +13,7 @@ from dbbstation.tui.help_texts import HELP, HELP_CLOSES, KEY_NAMES
 from dbbstation.tui.panel import lines
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from textual.app import ComposeResult
     from textual.binding import BindingType
@@ -26,13 +26,15 @@ class HelpScreen(ModalScreen[None]):
 
     Args:
         name: under which the texts have that screen.
+        without: keys of every screen that cannot be pressed here.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,f1,question_mark,q", "dismiss", "Close")]
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, without: Collection[str] = ()) -> None:
         super().__init__()
         self._help = name
+        self._without = frozenset(without)
 
     def compose(self) -> ComposeResult:
         """Show the texts."""
@@ -42,7 +44,9 @@ class HelpScreen(ModalScreen[None]):
             yield Static(Content(HELP_CLOSES))
             yield Static(_keys(here.keys))
             yield Static(Content.styled(everywhere.title, "bold"))
-            yield Static(_keys({key: text for key, text in everywhere.keys.items() if key not in here.keys}))
+            yield Static(
+                _keys({key: text for key, text in everywhere.keys.items() if key not in {*here.keys, *self._without}})
+            )
             for paragraph in here.shows:
                 yield Static(Content(paragraph))
 

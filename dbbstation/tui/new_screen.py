@@ -235,6 +235,7 @@ class NewScreen(RowScreen):
 
     def _show(self) -> None:
         missing = self.choice.missing()
+        self.banner(virtual=self.choice.line.virtual)
         self.put([self._row(part, missing=part in missing) for part in ROWS])
         if missing:
             self.say(texts.NEW_MISSING.format(parts=", ".join(texts.MISSING_PARTS[part] for part in missing)))

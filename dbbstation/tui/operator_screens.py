@@ -126,6 +126,7 @@ class JobScreen(RowScreen):
             Content.assemble(f"{texts.JOB_ROWS[one]:{_NAME}} ", (self._value(one) or texts.UNNAMED, "bold"))
             for one in job.may_change
         ]
+        self.banner(virtual=choice.line.virtual)
         self.put(rows)
         self.say(texts.JOB_SAYS.format(job=job.name))
         self.about(lines(*(Content(text) for text in self._about())))

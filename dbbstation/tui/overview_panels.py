@@ -13,6 +13,7 @@ from dbbstation.quality.finding import against_limit
 from dbbstation.service.board import Mark, RunDecision
 from dbbstation.service.messages import problem_alone
 from dbbstation.station.commands import GoTo
+from dbbstation.station.states import State
 from dbbstation.tui import texts
 from dbbstation.tui.findings_panel import STYLES as FINDING_STYLES
 from dbbstation.tui.panel import Panel, lines
@@ -86,6 +87,8 @@ class LeftLine(Panel):
 
     def text(self, board: Board) -> Content:
         """Return the sentence."""
+        if board.state is State.FINISHED:
+            return Content(texts.THROUGH)
         if GoTo not in board.allowed and board.state is not None:
             return Content(texts.NOT_NOW.format(state=board.state))
         if not board.left:

@@ -145,6 +145,7 @@ class PrepareScreen(RowScreen):
         for name, text in self._list.items():
             done = name in self._confirmed
             rows.append(Content.assemble(("[x] " if done else "[ ] ", "bold"), (text, "" if done else "$text-warning")))
+        self.banner(virtual=self._choice.line.virtual)
         self.put(rows)
         self._tell()
         left = len(self._list) - len(self._confirmed)

@@ -11,7 +11,7 @@ from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.service.seated import seat
 from dbbstation.station.states import State
 from dbbstation.tui.panel import Panel, lines
-from dbbstation.tui.texts import NOT_SEATED_LONG, NOT_SEATED_SHORT, SEATED
+from dbbstation.tui.texts import NOT_SEATED_LONG, NOT_SEATED_SHORT, SEATED, SEATED_BACKWARDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -81,6 +81,8 @@ def seat_words(found: BarAtFeedIn) -> str:
     """Say how the bar stands at the feed-in point."""
     if found.seated:
         return SEATED
+    if found.backwards:
+        return SEATED_BACKWARDS
     form = NOT_SEATED_SHORT if found.long_mm < 0.0 else NOT_SEATED_LONG
     return form.format(mm=abs(found.long_mm))
 

@@ -11,6 +11,7 @@ from textual.widgets.option_list import Option
 
 from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.help_texts import HELP
+from dbbstation.tui.texts import VIRTUAL_BANNER
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,6 +46,13 @@ class RowScreen(ExplainedScreen):
         now = self.query_one("#row-now", Static)
         now.update(Content(text))
         now.set_class(wrong, "-wrong")
+
+    def banner(self, *, virtual: bool) -> None:
+        """Show the title, with a banner where the machine is virtual."""
+        if self.stands:
+            sign = Content.styled(VIRTUAL_BANNER, "reverse bold $text-warning") if virtual else Content("")
+            title = Content(f" dbbstation · {HELP[self.help_name].title}")
+            self.query_one("#row-title", Static).update(sign + title)
 
     def about(self, text: Content) -> None:
         """Show a text below the rows."""

@@ -55,6 +55,7 @@ TIME_LEFT = (
     "{left} of {count} runs are left; their circles take {time} at the planned feeds, putting up balls comes on top."
 )
 NOTHING_LEFT = "All {count} runs of the plan are accepted."
+THROUGH = "The plan is through. X takes a verdict back: what does not count any more is measured again."
 NOT_NOW = "While the station is {state}, tests are looked at here; going to another and other verdicts have to wait."
 NO_RUN = "{test} {direction}: no run yet."
 RUN_FIGURES = "{run}: centre X {x:+.1f} Y {y:+.1f}, mean {mean:+.1f}, circularity {circularity:.1f} µm."
@@ -343,5 +344,6 @@ WAY_BACK_PROGRAMS = "Way back: the programs that ran before lie in {path}."
 
 RATE = ", {rate:.0f} times a second"
 SEATED = "seated"
+SEATED_BACKWARDS = "short: counts the wrong way?"
 NOT_SEATED_SHORT = "{mm:.1f} mm short of feed-in"
 NOT_SEATED_LONG = "{mm:.1f} mm beyond feed-in"

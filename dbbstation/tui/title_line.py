@@ -26,12 +26,32 @@ class TitleLine(Panel):
 
     def text(self, board: Board) -> Content:
         """Return the line."""
-        parts = [Content.styled(VIRTUAL_BANNER, "reverse bold $text-warning")] if board.virtual else []
-        parts.append(Content.styled(f" {self._plan}", "bold"))
+        banner = Content.styled(VIRTUAL_BANNER, "reverse bold $text-warning") if board.virtual else Content("")
+        run: list[Content] = []
         if board.announced is not None and board.finished is None:
-            parts.append(Content(f"run {board.announced.number} of {board.announced.count}"))
-            parts.append(Content.styled(board.announced.run.label, "bold"))
-        parts.append(Content(str(board.state) if board.state else "opening"))
-        if board.virtual:
-            return parts[0] + Content(" · ").join(parts[1:])
-        return Content(" · ").join(parts)
+            run = [
+                Content(f"run {board.announced.number} of {board.announced.count}"),
+                Content.styled(board.announced.run.label, "bold"),
+            ]
+        state = Content(str(board.state) if board.state else "opening")
+        # What stands at the end is the most important; where there is no room the plan's name is shortened first.
+        room = (self.content_size.width or _NARROWEST) - len(banner) - 1
+        rest = Content(" · ").join([*run, state])
+        plan = _shortened(self._plan, room - len(rest) - len(" · "))
+        if not plan and len(rest) > room:
+            rest = Content(" · ").join([*run[1:], state])
+        return banner + (Content.styled(f" {plan}", "bold") + Content(" · ") if plan else Content(" ")) + rest
+
+
+_NARROWEST = 80
+"""Columns of the smallest terminal, before the line has a size."""
+
+_SHORTEST = 4
+"""Characters of a name that still say anything."""
+
+
+def _shortened(name: str, room: int) -> str:
+    """Return a name, or its beginning, in so many columns; empty where nothing of use fits."""
+    if len(name) <= room:
+        return name
+    return f"{name[: room - 1].rstrip()}…" if room >= _SHORTEST else ""

@@ -111,6 +111,7 @@ def test_leaving_gives_the_instrument_back(protocol: Protocol, tmp_path: Path) -
         (150.8, "0.7 mm short of feed-in"),
         (149.4, "2.1 mm short of feed-in"),
         (153.0, "1.5 mm beyond feed-in"),
+        (148.5, "short: counts the wrong way?"),
     ],
 )
 def test_before_a_run_the_reading_says_whether_the_bar_is_seated(length_mm: float, says: str) -> None:

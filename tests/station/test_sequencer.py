@@ -282,6 +282,16 @@ def test_start_in_mid_circle_says_that_the_circle_is_missed(plan: Plan) -> None:
     assert sequencer.state is State.ARMED
 
 
+def test_a_gauge_that_counts_the_wrong_way_round_is_told_of_while_the_machine_turns(plan: Plan) -> None:
+    sequencer = made(plan)
+    sequencer.begin()
+    sequencer.command(Start())
+    circle = plan.tests["a"].circle
+    mirrored = [replace(one, length_mm=2.0 * circle.bar_mm - one.length_mm) for one in run_readings(circle)[:900]]
+    (missed,) = [one for one in sequencer.readings(mirrored) if isinstance(one, events.FeedInMissed)]
+    assert "the gauge counts the wrong way round: turn its counting direction" in missed.problem
+
+
 def test_a_start_that_was_forgotten_is_told_while_the_machine_turns(plan: Plan) -> None:
     sequencer = made(plan)
     sequencer.begin()

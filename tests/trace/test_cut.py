@@ -149,6 +149,13 @@ def test_feed_in_missing():
         cut(Recording("a run", recording.t_s[late], recording.length_mm[late]), CIRCLE)
 
 
+def test_a_gauge_that_counts_the_wrong_way_round_is_named():
+    recording = trace()
+    with pytest.raises(TraceError, match="makes it shorter, not longer") as caught:
+        cut(replace(recording, length_mm=300.0 - recording.length_mm), CIRCLE)
+    assert "turn its counting direction" in caught.value.remedy
+
+
 def test_feed_out_missing():
     recording = trace()
     early = recording.t_s < 40

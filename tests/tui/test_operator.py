@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from textual.widgets import Static
 
 from dbbstation.errors import InputError
 from dbbstation.files.formats.settings import read_settings
@@ -138,6 +139,11 @@ def test_four_screens_and_nothing_that_is_wrong_is_accepted(job_file: Path) -> N
             await pilot.press("a", "x", "s", "o", "f", "e", "t")
             assert isinstance(app.screen, OperateScreen)
             assert runner.sent == []
+            await pilot.press("f1")
+            helped = " ".join(str(part.render()) for part in app.screen.query(Static))
+            assert "All messages with all their words." in helped
+            assert "All tests of the plan on a map" not in helped
+            await pilot.press("escape")
             await pilot.press("enter")
             assert runner.sent == [Repeat()]
             session = shutil.copytree(FIXTURES / "sessions" / "virtual", job_file.parent / "monday-1")

@@ -11,7 +11,7 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.identified import IdentifiedModel
-from dbbstation.quality.knowledge import COEFFICIENTS, HIGHER, Expected, form_columns
+from dbbstation.quality.knowledge import COEFFICIENTS, HIGHER, Expected, form_columns, local_columns
 from dbbstation.sources.contract import Need, Owner
 from dbbstation.trace.average import averaged
 
@@ -56,15 +56,19 @@ def expected_circle(
     fit = np.linalg.pinv(np.column_stack([np.cos(theta), np.sin(theta), np.ones(len(theta))]))
     start = np.radians(sparse.raw.circle.start_deg)
     to_form = 1e3 * np.linalg.pinv(form_columns(theta - start))
+    to_local = 1e3 * np.linalg.pinv(local_columns(theta)) if len(theta) >= SECTORS else None
     long_mm = reading.length_mm - sparse.raw.circle.bar_mm
     off = fit @ long_mm
     covariance = np.zeros((3, 3))
     again = np.zeros((COEFFICIENTS, COEFFICIENTS))
     effects: dict[tuple[str, str], NDArray[np.float64]] = {}
+    local: dict[tuple[str, str], NDArray[np.float64]] = {}
     shapes = form_columns(theta - start)[:, HIGHER]
     for cause in _acting(reading, motion, model, identified, causes, shapes, observation.test):
         effects[cause.key] = effect = to_form @ cause.columns_mm
         again += cause.scatters * effect @ effect.T
+        if to_local is not None and not cause.at_a_pose:
+            local[cause.key] = to_local @ cause.columns_mm
         if cause.at_a_pose:
             covariance += (fit @ cause.columns_mm) @ (fit @ cause.columns_mm).T
     # A raised bar sees cos e of a horizontal shift.
@@ -80,6 +84,7 @@ def expected_circle(
         reversals_deg=_reversals_deg(observation, model),
         form_um=to_form @ long_mm,
         effects_um=effects,
+        local_um=local,
         again_um2=again,
         place_um=1e3 * float(np.hypot(mounting_mm, observation.setup.ball_uncertainty_mm)),
     )

@@ -69,12 +69,16 @@ EXPLAINS = (
     (Name.HELD, Name.LOST),
     (Name.FEED,),
     (Name.CIRCLE,),
-    (Name.TEST, Name.DIRECTION, Name.RADIUS),
-    (Name.SPIKE, Name.BUMP, Name.BORE, Name.CLOSURE, Name.DRIFT, Name.NOISE),
+    (Name.SPIKE, Name.BUMP, Name.CLOSURE, Name.DRIFT, Name.NOISE),
+    (Name.TEST, Name.DIRECTION),
+    (Name.LOCAL,),
+    (Name.RADIUS,),
     (Name.OTHER_DIRECTION, Name.REPEAT),
+    (Name.BORE,),
 )
 """Findings in the order in which one brings others about: a feed that is not the programmed one also moves the end of the turn and
-differs from the other direction, and neither of these changes the feed. Those that stand together are ranked by how many times their
+differs from the other direction, and neither of these changes the feed. A drift moves centre and mean. A ball that moved between both directions stands in the wrong
+place too; one that stood there from the beginning differs from no other direction. Those that stand together are ranked by how many times their
 limit they are: a limit is the same probability for all."""
 
 
@@ -91,7 +95,8 @@ SHOWN_BY = {
     "whether the ball stands where it stood": frozenset({Name.OTHER_DIRECTION, Name.REPEAT}),
 }
 """Faults that leave a circle as smooth as a good one, and the findings of which each one shows the fault. Other faults show in every run.
-The finding `bore` is none of them: without a model its limit is the machine's own errors, millimetres, and would show neither."""
+The finding `bore` is none of them: in the first test of a machine without a model its limit is the machine's own errors, millimetres,
+and would show neither."""
 
 DO = {
     Name.HELD: "the plunger sticks or the stroke ends; free it, check the plug, run the circle again",
@@ -99,14 +104,15 @@ DO = {
     Name.FEED: "set the override on the control to 100 %, run the circle again",
     Name.TEST: "check bore, holder, tilt and which program was started, run the circle again",
     Name.DIRECTION: "this circle or the one before ran the wrong way round: check which program was started (G2 or G3)",
-    Name.RADIUS: "check which bar is in, the radius in the program and the tool length",
+    Name.RADIUS: "check which bar is in, radius and plane (G17) in the program and the tool length, run the circle again",
     Name.SPIKE: "check plug, cable and earth of the gauge, run the circle again",
     Name.BUMP: "look for chips, a cable that pulls and what touches the bar there, run the circle again",
-    Name.BORE: "check bore and holder, press the holder home, run the circle again",
+    Name.BORE: "check bore, holder, how the plate sits and the zero point, press the holder home, run the circle again",
     Name.CLOSURE: "tighten holder and ball, let bar and machine warm through, run the circle again",
     Name.DRIFT: "tighten holder and ball, let bar and machine warm through, run the circle again",
     Name.NOISE: "clean balls and cups, look for what shakes, run the circle again",
     Name.OTHER_DIRECTION: "ball or holder moved since the other direction: press them home, run both again",
+    Name.LOCAL: "clean balls and cups, look for what touches the bar there, run both again",
     Name.REPEAT: "ball or holder moved since the run before: press them home, run it again",
 }
 """What to do at the machine, in the shop's words."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.knowledge import ACROSS, COEFFICIENTS, Others, Seen, across
-from dbbstation.quality.limits import FEWEST_OTHERS, length_limit, length_quantile, median_length, quantile
+from dbbstation.quality.limits import FEWEST_OTHERS, SCATTERING, length_limit, length_quantile, median_length, quantile
 from dbbstation.quality.stated import covariance_apart, drifted_um, limit_along, limit_of_length, unseen_um2
 
 if TYPE_CHECKING:
@@ -16,13 +16,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-
-SCATTERING = 3
-"""Dimensions in which runs of one circle scatter at the least: where the ball came to lie in X and Y, and how long the bar is.
-The other four numbers scatter less; were they counted in full, a limit would be taken for better known than it is."""
+    from dbbstation.quality.knowledge import Expected
 
 
-def direction(one: Seen, others: Others) -> Finding:
+def direction(one: Seen, others: Others, expected: Expected | None = None) -> Finding:
     """Whether the circle was run in the direction that its name says.
 
     A bar does not see which way the machine turns: feed-in and feed-out look alike, and either overlap passes its places twice.
@@ -31,8 +28,13 @@ def direction(one: Seen, others: Others) -> Finding:
     repeat. Lag and friction of drives change sign with the direction too, and would look like a mirror image; but they come
     back after half a turn, where both the speed and the direction of the bar are reversed: they have even undulations only
     [linear in the speed, or in its sign]. Odd ones, the centre above all, are compared.
+
+    Args:
+        one: the run.
+        others: what other runs of its session show.
+        expected: where its circle should lie, by whatever says so best; None where nothing does.
     """
-    by_place = _by_place(one)
+    by_place = _by_place(one, expected)
     if by_place is not None:
         return by_place
     against = others.opposite or others.earlier
@@ -72,9 +74,8 @@ def _across_limits(
     return min(limit, most), min(limit, most)
 
 
-def _by_place(one: Seen) -> Finding | None:
+def _by_place(one: Seen, expected: Expected | None) -> Finding | None:
     """Judge by the expected centre; None where it cannot decide."""
-    expected = one.run.expected
     if expected is None or not expected.place_known or one.analysis is None:
         return None
     start = np.radians(one.run.circle.start_deg)

@@ -25,6 +25,7 @@ class Name(StrEnum):
     BORE = "bore"
     OTHER_DIRECTION = "other direction"
     REPEAT = "repeat"
+    LOCAL = "local difference"
 
 
 class FindingVerdict(StrEnum):

@@ -11,10 +11,12 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.quality.between import direction, other_direction, repeat
 from dbbstation.quality.finding import Finding, Name
 from dbbstation.quality.knowledge import Others, Run, Seen, across, apart_um, seen
+from dbbstation.quality.local import local_difference, locally_apart_um
 from dbbstation.quality.place import bore, radius
 from dbbstation.quality.single import by_itself
 from dbbstation.quality.stated import sigmas_apart
 from dbbstation.quality.swapped import of_its_test
+from dbbstation.quality.together import expected_beside, together
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -79,19 +81,22 @@ class SessionRuns:
                 self._directions.append((one, other, apart_um(one, other), sigmas_apart(one, other)))
         self._repeats = [(one, other, apart_um(one, other), sigmas_apart(one, other)) for one, other in repeats]
 
+    @with_one_thread
     def judge(self, one: Seen) -> Judgement:
         """Judge one run, of these or another of the same session."""
         others = self._others(one)
         findings = list(by_itself(one, others))
         if one.analysis is not None:
-            expected = one.run.expected
+            both = together(one, others)
+            expected, by_others = one.run.expected, expected_beside(both)
             findings += [
-                direction(one, others),
-                of_its_test(one, others),
-                radius(one.analysis, expected),
-                bore(one.analysis, expected),
+                direction(one, others, by_others or expected),
+                of_its_test(one, both),
+                radius(one.analysis, by_others or expected, by_others=by_others is not None),
+                bore(one.analysis, by_others or expected, by_others=by_others is not None),
                 other_direction(one, others),
                 repeat(one, others),
+                local_difference(one, others),
             ]
         order = list(Name)
         findings.sort(key=lambda finding: order.index(finding.name))
@@ -105,6 +110,7 @@ class SessionRuns:
             drift_um=tuple(
                 (a.passes.mean_um, a.passes.u_mean_um(a.noise.sigma_um)) for a in analyses if a.passes is not None
             ),
+            longer_s=tuple(o.longer_s for o in self._runs if o is not one and o.longer_s is not None),
             directions_um=tuple(apart for a, b, apart, _ in self._directions if one is not a and one is not b),
             repeats_um=tuple(apart for a, b, apart, _ in self._repeats if one is not a and one is not b),
             directions_stated=_stated(self._directions, one),
@@ -113,6 +119,11 @@ class SessionRuns:
                 float(np.linalg.norm(across(a) - across(b)))
                 for a, b, *_ in self._directions
                 if one is not a and one is not b
+            ),
+            local_um=tuple(
+                locally_apart_um(a, b)
+                for a, b, *_ in self._directions
+                if one is not a and one is not b and a.local_um.any() and b.local_um.any()
             ),
             opposite=self._opposite(one),
             earlier=self._earlier(one),

@@ -9,8 +9,8 @@ import numpy as np
 
 from dbbstation.circles.analysis import CircleAnalysis, analyse, feed_shown
 from dbbstation.errors import TraceError
-from dbbstation.inference.harmonics import amplitudes
-from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
+from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, amplitudes
+from dbbstation.trace.cut import cut, edges_of, lost_on_turn, unusable_on_turn
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,6 +23,23 @@ if TYPE_CHECKING:
 HIGHEST_HARMONIC = 3
 """Undulations per revolution up to which runs are compared: mean, centre, ellipse and triangle are what a wrong ball, bar, tilt
 or direction changes, and seven numbers of thousands of samples are known to hundredths of a micrometre."""
+
+LOCAL_HARMONIC = 29
+"""Undulations per revolution up to which runs are compared for what happened at one place: below those that noise is read from."""
+
+LOCAL_COEFFICIENTS = 2 * LOCAL_HARMONIC + 1
+"""Numbers of a form of so many undulations, as of `local_columns`."""
+
+
+def local_columns(theta_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what a reading is per orthonormal coefficient of a form with `LOCAL_HARMONIC` undulations, shape (n, 59).
+
+    Args:
+        theta_rad: commanded angles from +X towards +Y, shape (n,) [rad].
+    """
+    angles = np.outer(theta_rad, np.arange(1, LOCAL_HARMONIC + 1))
+    return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
+
 
 COEFFICIENTS = 2 * HIGHEST_HARMONIC + 1
 """Numbers of a form: its mean, and a cosine and a sine of each harmonic."""
@@ -60,6 +77,7 @@ class Expected:
         form_um: expected coefficients, as of `Seen.coefficients_um`, shape (7,) [µm].
         effects_um: what one standard deviation of each cause's parameters does to these coefficients, shape (7, p) each, by the
             cause and the set of values that it shares with other runs [µm].
+        local_um: the same of causes that act along a path or with time, on the coefficients of `local_columns`, shape (59, p) each [µm].
         again_um2: covariance of the difference of two runs of this circle, each on a mounting of its own, shape (7, 7) [µm²].
         place_um: standard deviation of the ball's place that the plan states, CMM and holder, per axis [µm].
     """
@@ -72,6 +90,7 @@ class Expected:
     reversals_deg: tuple[float, ...] = ()
     form_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(COEFFICIENTS))
     effects_um: Mapping[tuple[str, str], NDArray[np.float64]] = field(default_factory=dict)
+    local_um: Mapping[tuple[str, str], NDArray[np.float64]] = field(default_factory=dict)
     again_um2: NDArray[np.float64] = field(default_factory=lambda: np.zeros((COEFFICIENTS, COEFFICIENTS)))
     place_um: float = 0.0
 
@@ -139,8 +158,11 @@ class Seen:
         lost: samples missing on the turn, and there.
         unusable: of the missing ones, how many are recorded but cannot be used.
         feed_mm_min: feed that its overlap shows and its standard uncertainty [mm/min]; None where it shows none.
+        longer_s: by how much the way from feed-in to feed-out took longer than its length at the programmed feed; None where one of
+            them is missing or angles were recorded [s].
         coefficients_um: orthonormal Fourier coefficients of the readings less the bar's length, harmonics 0 to 3 by
             commanded angle from the start of the turn towards +Y: mean, cosines, sines, shape (7,) [µm].
+        local_um: the same up to `LOCAL_HARMONIC` undulations, as of `local_columns`, shape (59,) [µm]; zeros where samples are too few.
     """
 
     run: Run
@@ -148,8 +170,10 @@ class Seen:
     problem: str
     lost: tuple[int, int]
     feed_mm_min: tuple[float, float] | None = None
+    longer_s: float | None = None
     coefficients_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(COEFFICIENTS))
     unusable: int = 0
+    local_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(LOCAL_COEFFICIENTS))
 
     @property
     def u_um(self) -> float:
@@ -172,13 +196,22 @@ def seen(run: Run) -> Seen:
     try:
         analysis = analyse(cut(run.recording, run.circle), run.recording)
     except TraceError as error:
-        return Seen(run, None, f"{error.what}; {error.remedy}", lost, _feed_of(run), unusable=unusable)
+        return Seen(run, None, f"{error.what}; {error.remedy}", lost, _feed_of(run), _longer_s(run), unusable=unusable)
     raw = analysis.raw
     theta = np.radians(raw.theta_deg - raw.circle.start_deg)
-    found = amplitudes(1e3 * (raw.length_mm - raw.circle.bar_mm), theta, HIGHEST_HARMONIC)
+    long_um = 1e3 * (raw.length_mm - raw.circle.bar_mm)
+    found = amplitudes(long_um, theta, HIGHEST_HARMONIC)
+    orthonormal = _orthonormal(found)
+    local = np.zeros(LOCAL_COEFFICIENTS)
+    if len(raw) > SAMPLES_PER_HARMONIC * LOCAL_HARMONIC:
+        local = _orthonormal(amplitudes(long_um, np.radians(raw.theta_deg), LOCAL_HARMONIC))
+    return Seen(run, analysis, "", lost, analysis.feed_mm_min, _longer_s(run), orthonormal, unusable, local)
+
+
+def _orthonormal(found: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Coefficients of a form from its harmonics: mean, cosines, sines."""
     waves = found[1:] / np.sqrt(2.0)
-    orthonormal = np.concatenate([found[:1].real, waves.real, -waves.imag])
-    return Seen(run, analysis, "", lost, analysis.feed_mm_min, orthonormal, unusable)
+    return np.concatenate([found[:1].real, waves.real, -waves.imag])
 
 
 def _feed_of(run: Run) -> tuple[float, float] | None:
@@ -186,6 +219,21 @@ def _feed_of(run: Run) -> tuple[float, float] | None:
         return feed_shown(run.recording, run.circle)
     except TraceError:
         return None
+
+
+def _longer_s(run: Run) -> float | None:
+    if run.recording.theta_deg is not None:
+        return None
+    try:
+        begun_s, ended_s = edges_of(run.recording, run.circle)
+    except TraceError:
+        return None
+    return ended_s - begun_s - due_s(run.circle)
+
+
+def due_s(circle: Circle) -> float:
+    """Return how long the way from the middle of the feed-in to that of the feed-out takes at the programmed feed [s]."""
+    return circle.swept_deg / circle.turning_deg_s + circle.feed_in_mm / (circle.feed_mm_min / 60.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,11 +244,13 @@ class Others:
         noise_um: noise of each [µm].
         closure_um: closure of each and its uncertainty by noise [µm].
         drift_um: drift over the turn of each, likewise [µm].
+        longer_s: by how much each took longer than due [s].
         directions_um: root mean square of the difference of both directions, of each other circle, likewise [µm].
         repeats_um: the same of repeats.
         directions_stated: how far both directions of each other circle differ, in standard deviations of what is stated.
         repeats_stated: the same of repeats.
         across_um: difference of both directions, of each other circle, off the axis through the start of the turn [µm].
+        local_um: root mean square by which both directions of each other circle differ at places [µm].
         opposite: same test in the other direction, on the same mounting where there is one; None where there is none.
         earlier: same test and direction, the repeat before; None where there is none.
         every: all other runs.
@@ -209,11 +259,13 @@ class Others:
     noise_um: tuple[float, ...] = ()
     closure_um: tuple[tuple[float, float], ...] = ()
     drift_um: tuple[tuple[float, float], ...] = ()
+    longer_s: tuple[float, ...] = ()
     directions_um: tuple[tuple[float, float], ...] = ()
     repeats_um: tuple[tuple[float, float], ...] = ()
     directions_stated: tuple[float, ...] = ()
     repeats_stated: tuple[float, ...] = ()
     across_um: tuple[float, ...] = ()
+    local_um: tuple[float, ...] = ()
     opposite: Seen | None = None
     earlier: Seen | None = None
     every: tuple[Seen, ...] = ()

@@ -27,6 +27,11 @@ FEWEST_OTHERS = 3
 """Other runs, or pairs of runs, that must be there for their scatter to say what is usual: of two nobody knows which is spoilt."""
 
 
+SCATTERING = 3
+"""Dimensions in which runs of one circle scatter at the least: where the ball came to lie in X and Y, and how long the bar is.
+The other four numbers scatter less; were they counted in full, a limit would be taken for better known than it is."""
+
+
 def quantile(freedom: float, share: float = SHARE) -> float:
     """Size in standard deviations that a sound value passes, up or down, with probability `share` [Student].
 

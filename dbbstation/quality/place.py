@@ -13,14 +13,23 @@ if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis
     from dbbstation.quality.knowledge import Expected
 
+BY_OTHERS = " by the other tests"
+"""What texts say of an expectation that other tests of the session give."""
 
-def radius(one: CircleAnalysis, expected: Expected | None) -> Finding:
-    """Mean reading against the expected one."""
+
+def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
+    """Mean reading against the expected one.
+
+    Args:
+        one: the circle.
+        expected: what is known of its mean reading; None where nothing is.
+        by_others: whether other tests of the session say so.
+    """
     if expected is None:
         return undecided(Name.RADIUS, "no expected radius is known", "µm")
     off_um = one.mean_radial_error_um - 1e3 * expected.radial_mm
     u_um = float(np.hypot(1e3 * np.sqrt(expected.covariance_mm2[2, 2]), one.noise.sigma_um / np.sqrt(len(one.raw))))
-    stated = f"the bar reads {one.mean_radial_error_um:+.1f} µm on average, expected {1e3 * expected.radial_mm:+.1f} µm"
+    stated = f"the bar reads {one.mean_radial_error_um:+.1f} µm on average, expected {1e3 * expected.radial_mm:+.1f} µm{BY_OTHERS if by_others else ''}"
     return found(
         Name.RADIUS,
         abs(off_um),
@@ -31,8 +40,8 @@ def radius(one: CircleAnalysis, expected: Expected | None) -> Finding:
     )
 
 
-def bore(one: CircleAnalysis, expected: Expected | None) -> Finding:
-    """Centre against the expected one."""
+def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
+    """Centre against the expected one; arguments as of `radius`."""
     if expected is None:
         return undecided(Name.BORE, "no expected centre is known", "µm")
     if not expected.place_known:
@@ -44,7 +53,8 @@ def bore(one: CircleAnalysis, expected: Expected | None) -> Finding:
     along = off_um / size if size > 0.0 else np.array([1.0, 0.0])
     # The ellipse that a sound centre stays in, in the direction in which this one is off.
     limit = length_quantile(2) / float(np.sqrt(along @ np.linalg.solve(covariance, along)))
-    stated = f"the centre is {size:.1f} µm from where it is expected, {off_um[0]:+.1f} in X and {off_um[1]:+.1f} in Y"
+    where = f"expected{BY_OTHERS if by_others else ''}"
+    stated = f"the centre is {size:.1f} µm from where it is {where}, {off_um[0]:+.1f} in X and {off_um[1]:+.1f} in Y"
     return found(
         Name.BORE,
         size,

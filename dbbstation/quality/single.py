@@ -10,6 +10,7 @@ from dbbstation.circles.noise import LEAST_UM
 from dbbstation.quality.bump import bump
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.held import held
+from dbbstation.quality.knowledge import Others, due_s
 from dbbstation.quality.limits import FEWEST_OTHERS, joined, quantile, scale_of
 from dbbstation.quality.spike import spike
 from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE
@@ -19,8 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.circles.analysis import CircleAnalysis
-    from dbbstation.plan.circle import Circle
-    from dbbstation.quality.knowledge import Expected, Others, Seen
+    from dbbstation.quality.knowledge import Expected, Seen
 
 
 def lost_samples(one: Seen) -> Finding:
@@ -133,10 +133,10 @@ def _beyond(u: float, freedom: float, others: Sequence[tuple[float, float]]) -> 
     Args:
         u: standard uncertainty of the value.
         freedom: its degrees of freedom.
-        others: value and standard uncertainty of each other run.
+        others: value and standard uncertainty of each other run; of few of them nobody knows which is spoilt.
     """
     parts = [(u, freedom)]
-    if others:
+    if len(others) >= FEWEST_OTHERS:
         scale, known = scale_of([value / own for value, own in others])
         # Few runs scatter by more than their noise by chance alone.
         if scale > 1.0 + CHANCE_SIGMAS / np.sqrt(2.0 * known):
@@ -151,29 +151,70 @@ CHANCE_SIGMAS = 1.645
 scatter is hardly known, would let pass whatever comes."""
 
 
-def feed(circle: Circle, shown_mm_min: tuple[float, float] | None) -> Finding:
-    """Feed that the overlap shows against the programmed one, by the limits that cutting has."""
-    if shown_mm_min is None:
-        return undecided(Name.FEED, "the overlap is too short or too round to show the feed", "mm/min")
-    shown, u = shown_mm_min
-    programmed = circle.feed_mm_min
+def feed(one: Seen, others: Others) -> Finding:
+    """Feed that the overlap shows against the programmed one, by the limits that cutting has.
+
+    An overlap that is too round to show it leaves the duration: a control that stops at corners takes longer, by what other runs
+    took, or by `LONGEST_STOP_S` at most. What took longer than that was slower somewhere on its way.
+    """
+    if one.feed_mm_min is None:
+        return _feed_by_duration(one, others)
+    shown, u = one.feed_mm_min
+    programmed = one.run.circle.feed_mm_min
     limit = max(FEED_TOLERANCE * programmed, FEED_SIGMAS * u)
     stated = f"the overlap shows {shown:.1f} ± {u:.1f} mm/min, programmed are {programmed:g}"
-    return found(
-        Name.FEED,
-        abs(shown - programmed),
-        limit,
-        "mm/min",
-        stated,
-        f"{stated}: set the override on the control to 100 % and run it again; a feed that was wanted goes into the plan",
-        f"feed {shown:.0f} of {programmed:g} mm/min",
+    short = f"feed {shown:.0f} of {programmed:g} mm/min"
+    return found(Name.FEED, abs(shown - programmed), limit, "mm/min", stated, f"{stated}: {AFTER_OTHER_FEED}", short)
+
+
+def _feed_by_duration(one: Seen, others: Others) -> Finding:
+    circle, why = one.run.circle, "the overlap is too short or too round to show the feed"
+    if one.longer_s is None:
+        return undecided(Name.FEED, why, "mm/min")
+    due = due_s(circle)
+    usual, scatter = LONGEST_STOP_S, 0.0
+    if len(others.longer_s) >= FEWEST_OTHERS:
+        usual = float(np.median(others.longer_s))
+        scatter, _ = scale_of([longer - usual for longer in others.longer_s])
+    limit = max(FEED_TOLERANCE * due + UNEVEN_STOP_S, quantile(np.inf) * scatter)
+    over = one.longer_s - usual
+    if over <= limit:
+        return undecided(
+            Name.FEED, f"{why}; feed-in to feed-out took {due + one.longer_s:.1f} s, {due:.1f} s were due", "mm/min"
+        )
+    programmed = circle.feed_mm_min
+    shown = programmed * due / (due + over)
+    stated = (
+        f"feed-in to feed-out took {due + one.longer_s:.1f} s, {due + usual:.1f} s at the most at {programmed:g} mm/min"
     )
+    return Finding(
+        Name.FEED,
+        programmed - shown,
+        programmed * limit / (due + limit),
+        "mm/min",
+        FindingVerdict.WRONG,
+        f"{stated}: {AFTER_OTHER_FEED}",
+        f"feed {shown:.0f} of {programmed:g} mm/min on average",
+    )
+
+
+LONGEST_STOP_S = 4.0
+"""Time that a control stops at the two corners of the path, together, where no other runs show it: programs of the station wait there for
+0.3 s each, and none is known that waits for two seconds [s]."""
+
+UNEVEN_STOP_S = 0.6
+"""By how much the stops at both corners may differ from run to run: passed without a stop, or stopped at for 0.3 s each [s]."""
+
+AFTER_OTHER_FEED = (
+    "set the override on the control to 100 % and run it again; a feed that was wanted goes into the plan"
+)
+"""What to do about a feed that is not the programmed one."""
 
 
 def no_circle(one: Seen) -> tuple[Finding, ...]:
     """Findings of a recording that shows no circle."""
     whole = Finding(Name.CIRCLE, None, None, "", FindingVerdict.WRONG, one.problem)
-    shown = feed(one.run.circle, one.feed_mm_min)
+    shown = feed(one, Others())
     return (whole, lost_samples(one), *((shown,) if shown.wrong else ()))
 
 
@@ -191,5 +232,5 @@ def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
         bump(one.analysis, reversals),
         spike(one.analysis, reversals),
         held(one.analysis.raw),
-        feed(one.run.circle, one.feed_mm_min),
+        feed(one, others),
     )

@@ -13,16 +13,32 @@ import numpy as np
 from dbbstation.quality.limits import length_quantile, scaled_length_quantile
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import TypeAlias
+
     from numpy.typing import NDArray
 
     from dbbstation.quality.knowledge import Expected, Seen
 
+    Effects: TypeAlias = Mapping[tuple[str, str], NDArray[np.float64]]
+
 
 def apart_by_causes(one: Expected, other: Expected) -> NDArray[np.float64]:
     """Return the covariance of the difference of two forms by all causes that are known, shape (7, 7) [µm²]."""
-    covariance = np.zeros((len(one.form_um), len(one.form_um)))
-    for key in dict.fromkeys([*one.effects_um, *other.effects_um]):
-        mine, theirs = one.effects_um.get(key), other.effects_um.get(key)
+    return apart_by(one.effects_um, other.effects_um, len(one.form_um))
+
+
+def apart_by(one_um: Effects, other_um: Effects, count: int) -> NDArray[np.float64]:
+    """Return the covariance of the difference of two forms by causes, shape (n, n) [µm²].
+
+    Args:
+        one_um: effects of each cause on the one form, shape (n, p) each [µm].
+        other_um: likewise on the other.
+        count: n, coefficients of a form.
+    """
+    covariance = np.zeros((count, count))
+    for key in dict.fromkeys([*one_um, *other_um]):
+        mine, theirs = one_um.get(key), other_um.get(key)
         if mine is not None and theirs is not None and mine.shape == theirs.shape:
             covariance += (mine - theirs) @ (mine - theirs).T
             continue

@@ -19,14 +19,16 @@ from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, und
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN, length_quantile
 from dbbstation.quality.stated import drifted_um, unseen_um2
+from dbbstation.quality.together import SIZES, expected_um, log_likelihood, read_um
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
     from dbbstation.plan.circle import Circle
-    from dbbstation.quality.knowledge import Expected, Others, Planned, Run, Seen
+    from dbbstation.quality.knowledge import Expected, Seen
+    from dbbstation.quality.together import Together
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,14 @@ class _Explained:
     label: str
 
 
-def of_its_test(one: Seen, others: Others) -> Finding:
-    """Return whether another circle of the plan explains the readings better than the circle of the run's own test."""
-    every = [*_measured(one, others), *_predicted(one)]
+def of_its_test(one: Seen, both: Together | None) -> Finding:
+    """Return whether another circle of the plan explains the readings better than the circle of the run's own test.
+
+    Args:
+        one: the run.
+        both: it and the runs of other tests; None where there are none.
+    """
+    every = [*_measured(one, both), *_predicted(one)]
     if not every:
         return undecided(
             Name.TEST, "no other circle of the plan has been measured, and no model says what they look like"
@@ -71,57 +78,21 @@ def of_its_test(one: Seen, others: Others) -> Finding:
     )
 
 
-def _measured(one: Seen, others: Others) -> Iterator[_Explained]:
+def _measured(one: Seen, both: Together | None) -> Iterator[_Explained]:
     """Circles of other tests that were measured; what they show of the machine says what the run's own circle should look like."""
-    them = [o for o in others.every if o.run.test != one.run.test and o.run.expected is not None]
-    if one.run.expected is None or not them:
+    if both is None:
         return
-    runs = [one, *them]
-    off = np.concatenate([_read(each) - _absolute(each.run) for each in runs])
-    machine, rest = _together(runs)
-    n = len(one.coefficients_um)
-    as_own = [_log_likelihood(off, size**2 * machine + rest) for size in SIZES]
-    without = [_log_likelihood(off[n:], (size**2 * machine + rest)[n:, n:]) for size in SIZES]
+    n = COEFFICIENTS
+    as_own, without = both.log_likelihoods()
     # How large this machine's errors are nobody knows: the size that suits the run's own circle best, against the mean of all.
-    common = float(logsumexp(without)) - float(np.log(len(SIZES))) - max(as_own)
-    for other in them:
+    common = float(logsumexp(without)) - float(np.log(len(SIZES))) - float(as_own.max())
+    for other in both.runs[1:]:
         assert other.run.expected is not None  # noqa: S101 - chosen so
         signs = along_travel(other.run.circle)
         alike = signs[:, None] * other.run.expected.again_um2 * signs + unseen_um2(one, other) * np.eye(n)
         alike[0, 0] += drifted_um(one, other) ** 2
-        apart = _read(one) - _read(other)
-        yield _Explained(common + _log_likelihood(apart, alike), _fits(apart, alike), f"run {other.run.label}")
-
-
-SIZES = np.geomspace(0.03, 3.0, 9)
-"""Errors of a machine as shares of their usual or stated size: from one calibrated to hundredths of a millimetre to one put together
-without care."""
-
-
-def _together(runs: Sequence[Seen]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Covariance of the forms of n runs along their travel, by the machine's causes and by all else, shape (7 n, 7 n) each [µm²]."""
-    n = len(runs[0].coefficients_um)
-    machine, rest = np.zeros((n * len(runs), n * len(runs))), np.zeros((n * len(runs), n * len(runs)))
-    effects = [_effects(each) for each in runs]
-    for key in dict.fromkeys(key for each in effects for key in each):
-        width = max(each[key].shape[1] for each in effects if key in each)
-        stacked = np.vstack([each.get(key, np.zeros((n, width))) for each in effects])
-        if key[1]:
-            rest += stacked @ stacked.T
-        else:
-            machine += stacked @ stacked.T
-    # What the overlaps show of a drift may have gone on through the session.
-    rate = float(np.sqrt(np.mean([each.drift_um_s**2 for each in runs])))
-    drift = np.concatenate([rate * (each.run.started_s or 0.0) * np.eye(n)[0] for each in runs])
-    rest += np.outer(drift, drift)
-    own = np.repeat([0.5 * unseen_um2(each, each) for each in runs], n)
-    return machine, rest + np.diag(own)
-
-
-def _effects(one: Seen) -> dict[tuple[str, str], NDArray[np.float64]]:
-    signs = along_travel(one.run.circle)
-    effects = {} if one.run.expected is None else one.run.expected.effects_um
-    return {key: signs[:, None] * effect for key, effect in effects.items()}
+        apart = read_um(one) - read_um(other)
+        yield _Explained(common + log_likelihood(apart, alike), _fits(apart, alike), f"run {other.run.label}")
 
 
 def _predicted(one: Seen) -> Iterator[_Explained]:
@@ -130,42 +101,19 @@ def _predicted(one: Seen) -> Iterator[_Explained]:
     if own is None:
         return
     noise = unseen_um2(one, one) * np.eye(len(own.form_um))
-    as_own = _read(one) - _absolute(one.run)
-    likelihood = _log_likelihood(as_own, _whole(own, one.run.circle) + noise)
+    as_own = read_um(one) - expected_um(one.run)
+    likelihood = log_likelihood(as_own, _whole(own, one.run.circle) + noise)
     for planned in one.run.planned:
         if planned.test == one.run.test:
             continue
-        as_other = _read(one) - _absolute(planned)
+        as_other = read_um(one) - expected_um(planned)
         covariance = _whole(planned.expected, planned.circle) + noise
-        ratio = _log_likelihood(as_other, covariance) - likelihood
+        ratio = log_likelihood(as_other, covariance) - likelihood
         yield _Explained(ratio, _fits(as_other, covariance), f"test {planned.label}")
 
 
 def _fits(off: NDArray[np.float64], covariance: NDArray[np.float64]) -> bool:
     return float(off @ np.linalg.solve(covariance, off)) <= length_quantile(len(off)) ** 2
-
-
-def _log_likelihood(off: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
-    """Logarithm of a normal density, without the constant that all have."""
-    _, log_determinant = np.linalg.slogdet(covariance)
-    return -0.5 * (float(log_determinant) + float(off @ np.linalg.solve(covariance, off)))
-
-
-def _read(one: Seen) -> NDArray[np.float64]:
-    """Coefficients of the readings themselves, along the travel: bars and circles of another length are distinguished by the mean."""
-    return along_travel(one.run.circle) * one.coefficients_um + _length_um(one.run.circle)
-
-
-def _absolute(one: Run | Planned) -> NDArray[np.float64]:
-    """The same as expected."""
-    form = np.zeros(COEFFICIENTS) if one.expected is None else one.expected.form_um
-    return along_travel(one.circle) * form + _length_um(one.circle)
-
-
-def _length_um(circle: Circle) -> NDArray[np.float64]:
-    length = np.zeros(COEFFICIENTS)
-    length[0] = 1e3 * circle.bar_mm
-    return length
 
 
 def _whole(expected: Expected, circle: Circle) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.own_sources import every_source
 from dbbstation.files.recordings.judged import runs_of
@@ -498,6 +499,7 @@ def false_alarms(folder: Path, seed: int, wanted: int) -> None:
         sys.stdout.write(f"{wanted} good circles on drifting days, {name}: {dict(counted)}\n")
 
 
+@with_one_thread
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--clean", type=int, default=200)

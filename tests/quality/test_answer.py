@@ -36,10 +36,15 @@ def test_every_finding_has_its_place_and_what_to_do():
 
 
 def test_a_first_circle_is_good_only_as_far_as_can_be_seen(whole):
-    first = answered(whole, "b ccw 1")
+    first = answered(whole, "a ccw 1")
     assert (first.word, first.causes) == (Advice.CANNOT_TELL, ())
-    # The other direction will tell both.
-    assert first.unseen == ("whether it ran the wrong way round", "whether the ball stands where it stood")
+    assert first.unseen == (
+        "whether it is the circle of another test",
+        "whether it ran the wrong way round",
+        "whether the ball stands where it stood",
+    )
+    # The other direction will tell the last; test a says on which side of the axis b lies.
+    assert answered(whole, "b ccw 1").unseen == ("whether the ball stands where it stood",)
     assert answered(whole, "b cw 1").word is Advice.GOOD
     decided = [Finding(name, 0.0, 1.0, "µm", FindingVerdict.GOOD, "") for name in Name]
     assert answer(decided).word is Advice.GOOD

@@ -1,0 +1,97 @@
+"""A place where a run differs from another of its test: dirt between ball and cup, a bar that touched something, a push.
+
+What sits in the circle's form is seen in no single run: a wide bump looks like form. Two runs of one circle have the same form. Against a
+repeat all of it is compared. Against the other direction lag, play and friction differ, and all but come back after half a turn, where
+speed and direction of the struts are reversed: odd undulations are compared. A bump at one place has as much of odd as of even ones.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.quality.finding import Finding, Name, found, undecided
+from dbbstation.quality.knowledge import LOCAL_COEFFICIENTS, LOCAL_HARMONIC, local_columns
+from dbbstation.quality.limits import FEWEST_OTHERS, SCATTERING, length_limit
+from dbbstation.quality.stated import apart_by, limit_along
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.quality.knowledge import Others, Seen
+
+LOWEST = 3
+"""Undulations from which runs are compared here: two are a shift's second order, and nearly all that reversals differ by; below lie
+place and length."""
+
+OTHER_REVERSALS = 0.25
+"""Share of the even undulations by which odd ones may be there without a cause that is known: play and friction of kinds that nobody named
+come back after nearly half a turn. Of the causes that are known it is 0.22 on the fifteen circles of `table2` where all struts have 10 to
+30 µm of play. A bump of 10 µm and 60 degrees' width has four times as much."""
+
+ORDERS = np.concatenate([[0], np.arange(1, LOCAL_HARMONIC + 1), np.arange(1, LOCAL_HARMONIC + 1)])
+"""Undulations of each coefficient of `local_columns`."""
+
+
+def local_difference(one: Seen, others: Others) -> Finding:
+    """Return how much a run differs at places from another of its test, by three to 29 undulations.
+
+    Enough other pairs of directions whose odd undulations differ by more widen it. The limit is the ellipsoid of what noise and the causes that are known leave in the direction in which both differ, at stated or usual
+    size; a share of what reversals show; and what a drift leaves: D over a turn is a sawtooth, whose k-th undulation has the amplitude
+    D / (pi k).
+
+    Args:
+        one: the run.
+        others: which other runs belong to it.
+    """
+    against = others.opposite or others.earlier
+    if against is None or one.analysis is None or against.analysis is None:
+        return undecided(Name.LOCAL, "no other run of this test has been measured", "µm")
+    if not (
+        one.local_um.any() and against.local_um.any() and one.analysis.noise.known and against.analysis.noise.known
+    ):
+        return undecided(Name.LOCAL, "too few samples for undulations that are short", "µm")
+    differs, counts = one.local_um - against.local_um, _compared(one, against)
+    alike = one.run.circle.direction is against.run.circle.direction
+    value = locally_apart_um(one, against)
+    by_reversals = 0.0 if alike else OTHER_REVERSALS * float(np.linalg.norm(differs[(ORDERS > LOWEST) & ~counts]))
+    sawtooth = float(np.linalg.norm(1.0 / ORDERS[counts])) / (2.0 * np.pi)
+    drifts = [
+        abs(each.analysis.closure.height_um) for each in (one, against) if each.analysis and each.analysis.closure
+    ]
+    covariance = (one.u_um**2 + against.u_um**2) * np.eye(LOCAL_COEFFICIENTS)
+    if one.run.expected is not None and against.run.expected is not None:
+        covariance += apart_by(one.run.expected.local_um, against.run.expected.local_um, LOCAL_COEFFICIENTS)
+    limit = sawtooth * sum(drifts) + by_reversals + limit_along(covariance[np.ix_(counts, counts)], differs[counts])
+    if not alike and len(others.local_um) >= FEWEST_OTHERS:
+        limit = max(limit, length_limit(others.local_um, SCATTERING))
+    at_deg, height_um = _peak(np.where(ORDERS >= LOWEST, differs, 0.0))
+    place = f"{height_um:+.1f} µm from run {against.run.label} at {at_deg:.0f} degrees"
+    return found(
+        Name.LOCAL,
+        value,
+        limit,
+        "µm",
+        f"nowhere does the path leave that of run {against.run.label}: at most {place}",
+        f"the path is {place}: look for dirt between ball and cup and for what touches the bar there, and run both again",
+        f"the path is {place}",
+    )
+
+
+def locally_apart_um(one: Seen, against: Seen) -> float:
+    """Return the root mean square of the undulations in which two runs of one circle are compared [µm]."""
+    return float(np.linalg.norm((one.local_um - against.local_um)[_compared(one, against)]))
+
+
+def _compared(one: Seen, against: Seen) -> NDArray[np.bool_]:
+    alike = one.run.circle.direction is against.run.circle.direction
+    return (ORDERS >= LOWEST) & (alike | (ORDERS % 2 == 1))
+
+
+def _peak(differs_um: NDArray[np.float64]) -> tuple[float, float]:
+    """Angle from +X and height of the greatest difference [deg, µm]."""
+    theta_deg = np.arange(0.0, 360.0, 1.0)
+    path = local_columns(np.radians(theta_deg)) @ differs_um
+    top = int(np.argmax(np.abs(path)))
+    return float(theta_deg[top]), float(path[top])

@@ -10,6 +10,7 @@ import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import StationError
+from dbbstation.nc import rapids
 from dbbstation.nc.curve import CommandCurve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, PLANNED_WITHIN, cuts, move_mm
@@ -173,6 +174,8 @@ def compensate_toolpath(
     )
     corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
     done = _assembled(toolpath, pieces, commanded, runs, model.machine, corner_mm)
+    turned = toolpath.turn_deg[pieces.row[_written(toolpath, pieces)]] > 0.0
+    done = replace(done, corners_mm=rapids.corners_mm(done, turned, planner, model.machine.feed_limit_mm_min))
     slow = _slowest(toolpath, done, _Of(runs, runs[pieces.row[_written(toolpath, pieces)]]), planner, short)
     if slow is not None and prefer is Prefer.ACCURACY:
         done = _slowed(done, planner)
@@ -235,15 +238,10 @@ def _needed_mm(toolpath: Toolpath, planner: Planner, prefer: Prefer | None) -> N
     """
     limited = planner.limited(toolpath)
     mm_s = np.where(toolpath.kind == RowKind.FEED, np.nan_to_num(toolpath.feed) / 60.0, 0.0)
+    mm_s = np.minimum(mm_s, planner.turning_mm_s(toolpath))
     mm_s = np.where(limited, np.minimum(mm_s, planner.reached_mm_s(move_mm(toolpath))), mm_s)
     turns = limited if prefer is Prefer.POSITION_ONLY else cuts(toolpath)
     return np.where(turns, planner.needed_mm(mm_s), 0.0)
-
-
-def _move_mm(toolpath: Toolpath) -> NDArray[np.float64]:
-    """Length of the written move that each row belongs to, shape (n,) [mm]: LinuxCNC runs an arc as one."""
-    number = moves_of(toolpath)
-    return np.asarray(np.bincount(number, weights=toolpath.tip_mm)[number], dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

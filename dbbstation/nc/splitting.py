@@ -272,12 +272,25 @@ def with_begins(at_places: NDArray[np.float64], start: NDArray[np.float64]) -> N
 
 
 def looked_at(curve: CommandCurve, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Poses of the curve at the begin and at shares of each piece, the last of them 1, shape (k, 1 + len(shares), 6)."""
+    """Poses of the curve at the begin and at shares of the way of each piece, the last of them 1, shape (k, 1 + len(shares), 6)."""
     first = curve.toolpath.before[:1]
-    places = np.concatenate([[0.0], pieces.places(shares).reshape(-1)])
+    places = np.concatenate([[0.0], _along(curve.toolpath, pieces, shares).reshape(-1)])
     at = curve.at(places)
     start = at[0] if len(first) else np.full(6, np.nan)
     return with_begins(at[1:].reshape(len(pieces.end), len(shares), 6), start)
+
+
+def _along(toolpath: Toolpath, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places at shares of the way of each piece, shape (k, len(shares)): rows that a piece joins may have any lengths."""
+    places = pieces.places(shares)
+    across = np.flatnonzero(np.floor(pieces.begin) < pieces.row)
+    if len(across):
+        rows = np.arange(len(toolpath) + 1)
+        behind_mm = np.concatenate([[0.0], np.cumsum(toolpath.tip_mm)])
+        begin, end = (np.interp(each[across], rows, behind_mm) for each in (pieces.begin, pieces.end))
+        inside = np.interp(begin[:, None] + (end - begin)[:, None] * shares, behind_mm, rows)
+        places[across] = np.where(shares == 1.0, places[across], inside)
+    return places
 
 
 def _cells(

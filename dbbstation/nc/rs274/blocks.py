@@ -141,7 +141,7 @@ def _block(line: str, place: Place) -> ProgramBlock:
             _take_code(block, token)
         elif token.letter not in codes.LETTERS:
             what = f"words with the letter {token.letter} are not read ({token.letter}{token.value:g})"
-            raise place.fault(token.column, what, "post the program without it")
+            raise place.fault(token.column, what, codes.remedy_of_letter(token.letter))
         elif token.letter == "N" and (block.words or block.codes or block.comments):
             raise place.fault(token.column, "the line number N does not stand first", "write it at the line's begin")
         elif token.letter in block.words:

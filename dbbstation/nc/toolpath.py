@@ -98,6 +98,7 @@ class Toolpath:
         guard: not None where the program stops, says why and ends before it moves, if the work system in force or one of
             these, G92 or a tool length is not zero.
         ending: how the program ends.
+        units_said: whether the program says in which unit its lengths are.
         numbers: line numbers of the first and the last line that have one; a compensated program carries its checksum
             there.
         arc: of rows that are chords of an arc: X and Y of its centre [mm] and the angle that the chord spans [rad],
@@ -118,6 +119,7 @@ class Toolpath:
     start: NDArray[np.float64] | None = None
     guard: tuple[str, ...] | None = None
     ending: Ending = Ending.STOP
+    units_said: bool = True
     numbers: tuple[int, ...] = ()
     arc: NDArray[np.float64] | None = None
 
@@ -294,6 +296,7 @@ class ToolpathBuilder:
         increments: whether they are increments, which name no place.
         guard: as `Toolpath.guard`.
         ending: how the program ends.
+        units_said: whether the program says in which unit its lengths are.
     """
 
     def __init__(self, name: str, start: NDArray[np.float64] | None = None) -> None:
@@ -303,6 +306,7 @@ class ToolpathBuilder:
         self.increments = False
         self.guard: tuple[str, ...] | None = None
         self.ending = Ending.STOP
+        self.units_said = True
         self.numbers: tuple[int, ...] = ()
         self._start = start
         self._pose = np.full(6, np.nan) if start is None else np.asarray(start, dtype=np.float64)
@@ -404,6 +408,7 @@ class ToolpathBuilder:
             start=self._start,
             guard=self.guard,
             ending=self.ending,
+            units_said=self.units_said,
             numbers=self.numbers,
             arc=each([rows.arc for rows in self._rows], np.float64).reshape(-1, 3),
         )

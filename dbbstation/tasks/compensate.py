@@ -30,6 +30,12 @@ if TYPE_CHECKING:
     from dbbstation.tasks.models import Model
 
 
+UNITS_NOT_SAID = (
+    "the program says neither G20 nor G21: its lengths are taken for millimetres; a control that still has inches from the program before "
+    "would run it 25.4 times as large"
+)
+
+
 def compensate(
     program: str | PathLike[str],
     model: Model,
@@ -98,6 +104,8 @@ def compensate(
     telling = Telling(say=say)
     warnings = () if inverse.identified is None else model_warnings(inverse.identified)
     telling.note(*warnings)
+    if not path.units_said:
+        telling.note(UNITS_NOT_SAID)
     origin = origin_of({"program file": source}, inverse, provenance())
     done = compensated_program(path, writer, inverse, chord_mm=chord_um / 1e3, origin=origin)
     if out is not None:

@@ -199,3 +199,12 @@ def test_help_has_examples(command):
     result = run(command, "--help")
     assert result.exit_code == 0
     assert "Examples:" in result.output
+
+
+@pytest.mark.parametrize(("units", "notes"), [("G21 ", 0), ("", 1)])
+def test_a_program_without_units_is_taken_for_millimetres_and_that_is_said(units, notes, tmp_path, model_file):
+    part, out = tmp_path / "part.ngc", tmp_path / "true.ngc"
+    part.write_text(f"{units}G90\nG0 X-100 Y0 Z-1000 A0 B0 C0\nG1 X100 F1000\nM2\n")
+    result = run(compensate, part, "--model", model_file, "--out", out)
+    assert result.stderr.count("neither G20 nor G21: its lengths are taken for millimetres") == notes
+    assert "G21 G90" in out.read_text()

@@ -53,6 +53,7 @@ def read_program(text: str, file: str, *, start: NDArray[np.float64] | None = No
     senseless: BadLine | None = None
     interpreter = _Interpreter(ToolpathBuilder(file, start), start)
     interpreter.path.ending = Ending.TEXT  # unless a block says otherwise
+    interpreter.path.units_said = False
     for block in blocks(text, file, faults):
         if faults or senseless is not None:
             continue  # the other lines are looked at for what cannot be read
@@ -124,6 +125,7 @@ class _Interpreter:
         units = block.code(ModalGroup.UNITS)
         if units is None:
             return
+        self.path.units_said = True
         unit_mm = MM_PER_INCH if units == 20.0 else 1.0  # noqa: PLR2004
         if unit_mm != self._unit_mm and "F" in block.words:
             # LinuxCNC sets the feed before it changes units, so F would still count in the old ones.

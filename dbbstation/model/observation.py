@@ -11,6 +11,8 @@ from dbbstation.sources.contract import Motion, Setup
 from dbbstation.trace.columns import each, temperatures
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from numpy.typing import NDArray
 
     from dbbstation.trace.circle import RawCircle
@@ -94,6 +96,21 @@ class Observation:
             setup=self.setup,
             reading_mm=np.repeat(raw.length_mm[:1], STANDING),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """Motions of runs, each made when it is asked for: its poses are six numbers a sample.
+
+    Attributes:
+        observations: the runs.
+    """
+
+    observations: Sequence[Observation]
+
+    def __iter__(self) -> Iterator[Motion]:
+        """Yield the motion of each run."""
+        return (observation.motion() for observation in self.observations)
 
 
 def _held_back(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:

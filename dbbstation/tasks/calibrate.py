@@ -18,6 +18,7 @@ from dbbstation.calibration.reporting.evaluation import evaluate
 from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.errors import ModelError
 from dbbstation.files.own_sources import every_source
+from dbbstation.model.observation import Motions
 from dbbstation.results.of_calibration import calibration_figures, calibration_result, report_of
 from dbbstation.sources.laws.by_temperature import following_thermometers
 from dbbstation.sources.registry import sources_named
@@ -133,7 +134,7 @@ def _following_thermometers(
     fitted: tuple[ErrorSource, ...], recorded: Recorded, telling: Telling
 ) -> tuple[ErrorSource, ...]:
     """Sources that grow with time by their thermometers where those were logged; noted, since it is another model."""
-    forms = following_thermometers(fitted, [observation.motion() for observation in recorded.observations])
+    forms = following_thermometers(fitted, Motions(recorded.observations))
     telling.note(
         *(
             f"{form.name} follows the logged temperatures, not a law over time (--law-over-time)"

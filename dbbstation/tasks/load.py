@@ -143,12 +143,15 @@ def load_sessions(
         unjudged = session.in_state(RunState.COMPLETE, RunState.RECORDING)
         warnings += [f"{session.name}: run {run.label} is {run.state}, not accepted: left out" for run in unjudged]
         logged: list[tuple[float, Recording]] = []
-        for run, read in zip(wanted, session.load_all(wanted, progress), strict=True):
-            warnings += [str(warning) for warning in (*read.warnings, *session.loss(run, read.recording))]
-            began = session.started_s(run)
-            if began is not None and read.recording.temperature_degc:
-                logged.append((began, read.recording))
+        for done, run in enumerate(wanted):
+            progress(done, len(wanted))
             try:
+                # One recording at a time is in memory; its turn is what stays.
+                read = session.load(run)
+                warnings += [str(warning) for warning in (*read.warnings, *session.loss(run, read.recording))]
+                began = session.started_s(run)
+                if began is not None and read.recording.temperature_degc:
+                    logged.append((began, read.recording))
                 lost = 0 if run.counts is None else run.counts.lost
                 raw = cut(replace(read.recording, name=str(run.path)), session.circle(run), counted_lost=lost)
                 observations.append(_observation(session, run, raw))
@@ -156,6 +159,7 @@ def load_sessions(
                 problems += error.problems
             except StationError as error:
                 problems.append(Problem(str(run.path), 0, 0, error.what, error.remedy))
+        progress(len(wanted), len(wanted))
         warnings += _under_spindle(session, wanted)
         logs[session.name] = [*logged, *_left_out(session, exclude)] if logged else []
     if problems:

@@ -181,8 +181,10 @@ _MEASURED: WeakKeyDictionary[RawCircle, CircleFigures] = WeakKeyDictionary()
 
 
 def _figures(raw: RawCircle, length_mm: NDArray[np.float64]) -> CircleFigures:
-    measured = length_mm is raw.length_mm
-    path = measured_path(raw) if measured else path_about_ball(raw.theta_deg, horizontal_radius_mm(raw, length_mm))
+    # A path is two numbers a sample: who asks for figures only does not leave it in the memory.
+    path = _PATHS.get(raw) if length_mm is raw.length_mm else None
+    if path is None:
+        path = path_about_ball(raw.theta_deg, horizontal_radius_mm(raw, length_mm))
     return CircleFigures(
         centre_mm=(float(path.centre_mm[0]), float(path.centre_mm[1])),
         mean_radial_error_um=1e3 * float((length_mm - raw.circle.bar_mm).mean()),

@@ -39,11 +39,14 @@ class Recording(WithLogged):
     def __len__(self) -> int:
         return len(self.t_s)
 
-    @cached_property
+    @property
     def good(self) -> Recording:
         """The samples that can be used: all that a calculation may see."""
-        if self.usable is None or self.usable.all():
-            return self
+        # Not kept where it is the recording itself: one that names itself stays in the memory until the collector of garbage comes by.
+        return self if self.usable is None or self.usable.all() else self._usable_rows
+
+    @cached_property
+    def _usable_rows(self) -> Recording:
         rows = self.usable
         return Recording(
             name=self.name,

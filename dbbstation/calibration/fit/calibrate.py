@@ -203,6 +203,7 @@ def calibrate(
             f"the fit still moves, {change:.2g} times more than it should after {MOST_STEPS} steps",
             remedy="check that machine, plan and recordings belong together; leave out doubtful tests with --exclude",
         )
+    left.clear()  # a number a sample, before the residuals are two
     return Calibration(
         layout=layout,
         x=x,
@@ -252,7 +253,7 @@ def _approached(
 
 
 def _rms_mm(left: Sequence[NDArray[np.float64]]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
+    return float(np.sqrt(sum(float(one @ one) for one in left) / sum(map(len, left))))
 
 
 def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> NDArray[np.float64]:

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 SECTORS = 60
 """Sectors of a turn, six degrees each."""
 
+AT_ONCE = 6
+"""Sectors that are worked out together; a divisor of their number."""
+
 PER_SECTOR = 6
 """Nodes of a sector, at the zeros of Chebyshev's polynomial."""
 
@@ -126,14 +129,17 @@ def nodes_of(run: Observation) -> RunNodes | None:
     )
     count = np.bincount(sector, minlength=SECTORS)
     most = max(int(count.max()), PER_SECTOR + 1)
-    place = np.empty(len(raw), dtype=np.int64)
-    ordered = sector[order]
-    place[order] = ordered * most + np.arange(len(raw)) - (np.cumsum(count) - count)[ordered]
-    system = np.zeros((SECTORS * most, PER_SECTOR + 1))
-    system[place, :-1] = _interpolation(within)
-    system[place, -1] = raw.length_mm - raw.circle.bar_mm
-    by_sector = system.reshape(SECTORS, most, PER_SECTOR + 1)
-    triangle = np.asarray(np.linalg.qr(by_sector, mode="r"), dtype=np.float64)
+    ends = np.concatenate([[0], np.cumsum(count)])
+    triangle = np.empty((SECTORS, PER_SECTOR + 1, PER_SECTOR + 1))
+    # Some sectors at a time: weights of all nodes at all samples would take several times what the recording takes.
+    for begin in range(0, SECTORS, AT_ONCE):
+        some = order[ends[begin] : ends[begin + AT_ONCE]]
+        own = sector[some]
+        system = np.zeros((AT_ONCE, most, PER_SECTOR + 1))
+        place = own - begin, np.arange(len(some)) - (ends[own] - ends[begin])
+        system[(*place, slice(0, PER_SECTOR))] = _interpolation(within[some])
+        system[(*place, PER_SECTOR)] = raw.length_mm[some] - raw.circle.bar_mm
+        triangle[begin : begin + AT_ONCE] = np.linalg.qr(system, mode="r")
     return RunNodes(
         run=run,
         coarse=replace(run, raw=nodes),

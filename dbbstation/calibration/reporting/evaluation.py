@@ -85,10 +85,9 @@ def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evalua
         TraceError: a run that is no circle.
         ModelError: a source needs what the runs do not give.
     """
-    nominal = residuals(MachineModel(model.machine), observations)
-    left = residuals(model.of_the_machine(), observations)
-    before = [_figures_of(o, residual) for o, residual in zip(observations, nominal, strict=True)]
-    after = [_figures_of(o, residual) for o, residual in zip(observations, left, strict=True)]
+    # One after the other: residuals are a number a sample.
+    before, nominal_rms_um = _under(MachineModel(model.machine), observations)
+    after, left_rms_um = _under(model.of_the_machine(), observations)
     first = [_first_in_direction(observations, k) for k in range(len(observations))]
     runs = tuple(
         RunEvaluation(
@@ -103,12 +102,18 @@ def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evalua
         )
         for k, o in enumerate(observations)
     )
-    return Evaluation(runs, rms_um(left), rms_um(nominal))
+    return Evaluation(runs, left_rms_um, nominal_rms_um)
+
+
+def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[list[CircleFigures], float]:
+    """Return the figures of every run under a model, and the root mean square of what it leaves of all [µm]."""
+    left = residuals(model, observations)
+    return [_figures_of(o, residual) for o, residual in zip(observations, left, strict=True)], rms_um(left)
 
 
 def rms_um(residual_mm: Sequence[NDArray[np.float64]]) -> float:
     """Root mean square over all runs [µm]."""
-    return 1e3 * float(np.sqrt(np.mean(np.concatenate(residual_mm) ** 2)))
+    return 1e3 * float(np.sqrt(sum(float(one @ one) for one in residual_mm) / sum(map(len, residual_mm))))
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from dbbstation.errors import ModelError
 from dbbstation.sources.contract import Effect, ErrorSource, LinearSource, Motion, Need, Parameter
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -113,19 +113,19 @@ class FollowsTemperature(LinearSource):
         )
 
 
-def following_thermometers(sources: Sequence[ErrorSource], motions: Sequence[Motion]) -> tuple[ErrorSource, ...]:
+def following_thermometers(sources: Sequence[ErrorSource], motions: Iterable[Motion]) -> tuple[ErrorSource, ...]:
     """Sources, those that grow with time in the form that follows thermometers where all runs have what that needs."""
     return tuple(_logged(source, motions) or source for source in sources)
 
 
-def _logged(source: ErrorSource, motions: Sequence[Motion]) -> ErrorSource | None:
+def _logged(source: ErrorSource, motions: Iterable[Motion]) -> ErrorSource | None:
     form = source.by_temperature()
     if form is None or not_given(form, motions):
         return None
     return form
 
 
-def not_given(source: ErrorSource, motions: Sequence[Motion]) -> str:
+def not_given(source: ErrorSource, motions: Iterable[Motion]) -> str:
     """Return what a source lacks in motions, thermometers that move among it; empty where it can be looked for."""
     try:
         for motion in motions:

@@ -143,6 +143,7 @@ def fleet(
     for place, one in enumerate(named):
         if one.problem:
             outcomes[place] = _failed(one, one.problem)
+            say(f"failed: {one.name}: {one.problem}")
         elif not anew and (data := kept.known(one.name, keys[place])) is not None:
             outcomes[place] = _known(one, kept, data, fresh=False)
         else:
@@ -179,8 +180,9 @@ def _sessions(folders: Sequence[Path], telling: Telling) -> Iterator[_Named]:
         found = files_of(folder)
         for name, why in found.closed:
             telling.note(f"{name}: {why}")
-        for name in sorted(found.sessions, key=natural):
-            yield _read(name.removesuffix(f"/{SESSION_FILE}"), found.sessions[name].parent)
+        named = {name.removesuffix(f"/{SESSION_FILE}"): path.parent for name, path in found.sessions.items()}
+        for name in sorted(named, key=natural):
+            yield _read(name, named[name])
 
 
 def _read(name: str, folder: Path) -> _Named:

@@ -22,6 +22,8 @@ from dbbstation.files.gateway import content_of
 from dbbstation.files.own_classes import classes_in_files, module_name, own_instances
 from dbbstation.files.places import real_path
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
+from dbbstation.simulators.fmu import FmuSimulator
+from dbbstation.simulators.program import ProgramSimulator, files_of, whole_command
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.files.formats.simulator import ParameterSchema
+    from dbbstation.simulators.exchanged import ExchangedSimulator
 
 FEWEST_ROWS = 30
 """Rows that all recordings need together at the least, as for tables."""
@@ -41,7 +44,7 @@ class LoadedSimulator:
 
     Attributes:
         path: of `model.yaml`.
-        python: of the simulator.
+        source: Python file of the simulator, or what runs its program or FMU.
         file: what `model.yaml` says.
         model: what is compared.
         tables: recordings as they were read.
@@ -50,7 +53,7 @@ class LoadedSimulator:
     """
 
     path: Path
-    python: Path
+    source: Path | ExchangedSimulator
     file: SimulatorFile
     model: Model
     tables: tuple[TableFile, ...]
@@ -59,14 +62,23 @@ class LoadedSimulator:
 
     @property
     def content(self) -> str:
-        """Hash of the simulator's Python files, of those beside it that it imports, and of physics of the user's own."""
-        folder = real_path(self.python).parent
-        imported = {Path(file) for module in list(sys.modules.values()) if (file := getattr(module, "__file__", None))}
-        beside = sorted(path for path in imported if path.is_relative_to(folder) and path.suffix == ".py")
+        """Hash of the simulator's files, of Python files beside it that it imports, and of physics of the user's own."""
         digest = hashlib.sha256()
-        for path in (self.python, *self.own_files, *beside):
+        for path in (*self._files, *self.own_files):
             digest.update(hashlib.sha256(content_of(path)).digest())
         return digest.hexdigest()
+
+    @property
+    def _files(self) -> list[Path]:
+        if self.file.program is not None:
+            command = whole_command(self.file.program, self.path.parent)
+            return files_of(command)
+        if self.file.fmu is not None:
+            return [self.path.parent / self.file.fmu]
+        python = self.path.parent / str(self.file.python)
+        folder = real_path(python).parent
+        imported = {Path(file) for module in list(sys.modules.values()) if (file := getattr(module, "__file__", None))}
+        return [python, *sorted(one for one in imported if one.is_relative_to(folder) and one.suffix == ".py")]
 
 
 def load_simulator(
@@ -82,8 +94,7 @@ def load_simulator(
     tables = _tables(file, recordings, numbers, faults)
     if faults:
         raise InputError(faults[:MOST_FAULTS])
-    python = path.parent / file.python
-    simulator_of(python)
+    source = _source(path, file)
     parameters = [_parameter(name, name, one) for name, one in file.parameters.items()]
     several = len(tables) > 1
     for run in range(len(tables)):
@@ -96,7 +107,25 @@ def load_simulator(
         tuple(Output(name, one.unit, one.filter_s or 0.0) for name, one in file.outputs.items()),
         tuple(_recorded(file, table) for table in tables),
     )
-    return LoadedSimulator(path, python, file, model, tables, tuple(_own(own_files, file)), tuple(own_files))
+    return LoadedSimulator(path, source, file, model, tables, tuple(_own(own_files, file)), tuple(own_files))
+
+
+def _source(path: Path, file: SimulatorFile) -> Path | ExchangedSimulator:
+    """Python file of a simulator, which is executed, or its program or FMU.
+
+    Raises:
+        InputError: the Python file cannot be run, or has no simulator that can be made.
+    """
+    ports = {name: tuple(port.signals) for name, port in file.ports.items()}
+    if file.program is not None:
+        command = whole_command(file.program, path.parent)
+        return ProgramSimulator(command, ports, tuple(file.outputs), file.time_limit_s)
+    if file.fmu is not None:
+        fmu = (path.parent / file.fmu).absolute()
+        return FmuSimulator(fmu, file.variables, ports, tuple(file.outputs), file.time_limit_s)
+    python = path.parent / str(file.python)
+    simulator_of(python)
+    return python
 
 
 def simulator_of(python: Path) -> Simulator:

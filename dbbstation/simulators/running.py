@@ -7,6 +7,7 @@ import pickle
 from concurrent.futures import TimeoutError as TooLongError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
+from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -21,11 +22,11 @@ from dbbstation.simulators.loading import know, simulator_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from concurrent.futures import Future, ProcessPoolExecutor
-    from pathlib import Path
     from types import TracebackType
     from typing import Self
 
     from dbbstation.diagnosis.simulator.model import Model, SimulationOutcome, SimulationRequest
+    from dbbstation.simulators.exchanged import ExchangedSimulator
     from dbbstation.simulators.loading import LoadedSimulator
 
 MOST_SECONDS = 600.0
@@ -141,14 +142,14 @@ class Runs:
 
     def _simulated(self, asks: Sequence[SimulationRequest]) -> list[SimulationOutcome]:
         if self._pool is None:
-            return [_one(self._loaded.python, self._model, ask) for ask in asks]
+            return [_one(self._loaded.source, self._model, ask) for ask in asks]
         together = max(min(TOGETHER, len(asks) // (2 * self._count)), 1)
         parts = [asks[k : k + together] for k in range(0, len(asks), together)]
         loaded = self._loaded
         try:
             with deaf():
                 futures = [
-                    self._pool.submit(_several, loaded.python, loaded.own_files, self._model, pickle.dumps(part))
+                    self._pool.submit(_several, loaded.source, loaded.own_files, self._model, pickle.dumps(part))
                     for part in parts
                 ]
             return [
@@ -180,24 +181,27 @@ STARTING_S = 20.0
 """Time that a process may take until it simulates."""
 
 
-def _several(python: Path, own_files: tuple[Path, ...], model: Model, asks: bytes) -> list[SimulationOutcome]:
+def _several(
+    source: Path | ExchangedSimulator, own_files: tuple[Path, ...], model: Model, asks: bytes
+) -> list[SimulationOutcome]:
     """Simulations in a process of their own, which must know classes of the user's before it can read what is asked of them."""
     know(own_files)
-    return [_one(python, model, ask) for ask in pickle.loads(asks)]  # noqa: S301 - what the process above made
+    return [_one(source, model, ask) for ask in pickle.loads(asks)]  # noqa: S301 - what the process above made
 
 
-def _one(python: Path, model: Model, ask: SimulationRequest) -> SimulationOutcome:
+def _one(source: Path | ExchangedSimulator, model: Model, ask: SimulationRequest) -> SimulationOutcome:
     """One simulation.
 
     Raises:
         CalibrationError: it failed; says with which input, and in which line.
     """
-    simulator = simulator_of(python)
+    simulator = simulator_of(source) if isinstance(source, Path) else source
+    place = str(source) if isinstance(source, Path) else source.said
     try:
         return simulated(simulator, model, ask)
     except Exception as error:
-        line = line_in(error, str(python))
-        where = f"{python}:{line}" if line else str(python)
+        line = line_in(error, place) if isinstance(source, Path) else None
+        where = f"{place}:{line}" if line else place
         what = f"the simulation failed: {in_words(error)}"
         raise CalibrationError(
             what, where=f"{where}, {told(model, ask)}", remedy="mend `simulate` for this input"

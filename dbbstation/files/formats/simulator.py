@@ -89,8 +89,15 @@ class SimulatorFile(Schema):
     """Name and version of this format."""
     name: Annotated[str, Field(min_length=1)]
     """What people call it."""
-    python: Annotated[str, Field(min_length=1)]
+    python: Annotated[str, Field(min_length=1)] | None = None
     """Python file with a class that derives from `Simulator`, beside this file. It is executed."""
+    program: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1)] | None = None
+    """Program and its arguments, in place of `python`: it reads `inputs.csv` and `parameters.json` and writes `outputs.csv` in the folder
+    where it is run. It is executed."""
+    fmu: Annotated[str, Field(min_length=1)] | None = None
+    """FMU (FMI 2 or 3) beside this file, in place of `python`. It is executed by FMPy, an extra of the installation."""
+    variables: dict[str, str] = Field(default_factory=dict)
+    """Names of variables of the FMU, by the names here, where they differ; a signal is named `port.signal`, or `signal`."""
     time: Annotated[str, Field(min_length=1)]
     """Column of the recordings that says when, rising [s]."""
     inputs: dict[Name, str] = Field(default_factory=dict)
@@ -108,6 +115,8 @@ class SimulatorFile(Schema):
 
     @model_validator(mode="after")
     def _apart(self) -> Self:
+        if sum(one is not None for one in (self.python, self.program, self.fmu)) != 1:
+            raise PydanticCustomError("kind", "one of `python`, `program` and `fmu` is expected", {})
         if twice := sorted(set(self.parameters) & set(self.states)):
             raise PydanticCustomError("twice", "`{one}` is a parameter and a state", {"one": twice[0]})
         if "t" in self.inputs:
@@ -125,7 +134,10 @@ def parse_simulator(path: Path, faults: list[Problem]) -> SimulatorFile | None:
     if document is None or found is None:
         return None
     before = len(faults)
-    _look_through(path, document, found, faults)
+    if found.python is not None:
+        _look_through(path, document, found, found.python, faults)
+    elif found.fmu is not None and not (path.parent / found.fmu).is_file():
+        faults.append(document.problem(("fmu",), f"`{found.fmu}` is not there", "name an FMU beside this file"))
     return found if len(faults) == before else None
 
 
@@ -142,14 +154,14 @@ def read_simulator(path: Path) -> SimulatorFile:
     return found
 
 
-def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, faults: list[Problem]) -> None:
+def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, python: str, faults: list[Problem]) -> None:
     """Whether the Python file has one simulator, and calls the ports that there are."""
-    source = path.parent / found.python
+    source = path.parent / python
     own: list[Problem] = []
     data = read_bytes(source, own, LARGEST_PROGRAM)
     text = None if data is None else decode(data, str(source), own)
     if text is None:
-        what = f"`{found.python}` cannot be read: {own[0].what if own else 'it is no text'}"
+        what = f"`{python}` cannot be read: {own[0].what if own else 'it is no text'}"
         faults.append(document.problem(("python",), what, "name a Python file beside this one"))
         return
     try:
@@ -169,7 +181,7 @@ def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, faul
     for name in found.ports:
         if name not in called and not _computed(tree, ports):
             at: Location = ("ports", name)
-            what = f"port `{name}` is never called in {found.python}"
+            what = f"port `{name}` is never called in {python}"
             remedy = f"call `{ports}.{name}(t, signals)` where it acts"
             faults.append(document.problem(at, what, remedy, at_key=True))
 

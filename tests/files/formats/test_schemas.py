@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,7 +23,10 @@ EXAMPLES = {
     "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
     "dbb-settings/3": [FIXTURES / "settings" / "every-key.yaml"],
     "dbb-mapping/2": [FIXTURES / "mappings" / "every-key.yaml"],
-    "dbb-simulator/1": [FIXTURES / "simulators" / "pendulum.yaml"],
+    "dbb-simulator/1": [
+        *(FIXTURES / "simulators" / name for name in ("pendulum.yaml", "tank.yaml")),
+        Path(__file__).parents[2] / "simulators" / "tank-fmu.yaml",
+    ],
     "dbb-bar/1": [FIXTURES / "bars" / "zerodur.yaml"],
     "dbb-model/4": [FIXTURES / "models" / name for name in ("null-space.yaml", "acceleration.yaml")],
     "dbb-session/6": [SESSIONS / name / "session.yaml" for name in ("virtual", "logged", "begun", "under-spindle")],

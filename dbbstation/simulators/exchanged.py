@@ -1,0 +1,93 @@
+"""Simulators that are no Python class: they take what acts at their ports as inputs, and return the signals there.
+
+A term that follows the simulated state is then found by rounds: simulate, evaluate the term over the signals that came back, simulate
+with that, until it changes no more [waveform relaxation; Lelarasmee, Ruehli and Sangiovanni-Vincentelli, IEEE Trans. CAD 1 (1982) 131].
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.contract import Simulator
+from dbbstation.diagnosis.simulator.ports import SimulationFault
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.ports import Ports
+
+MOST_EXCHANGES = 100
+"""Rounds until what acts and what comes back agree, at the most."""
+
+SETTLED = 1e-9
+"""Largest change of what acts at a port in a round, over its largest value, from which on it has settled: far below the hundredth of the
+residual that a dose is answered by."""
+
+RUNS_AWAY = 1e12
+"""Factor by which what acts may grow over what it was at first: beyond, the rounds run away."""
+
+
+class ExchangedSimulator(Simulator):
+    """A simulator that takes what acts at its ports as inputs.
+
+    Args:
+        ports: names of the signals at each port, by its name.
+        outputs: names of the outputs.
+    """
+
+    def __init__(self, ports: Mapping[str, tuple[str, ...]], outputs: tuple[str, ...]) -> None:
+        self._ports, self._outputs = dict(ports), outputs
+
+    @property
+    @abstractmethod
+    def said(self) -> str:
+        """What it is called where it fails."""
+
+    @abstractmethod
+    def simulate_once(
+        self,
+        inputs: Mapping[str, NDArray[np.float64]],
+        parameters: Mapping[str, float],
+        acting: Mapping[str, NDArray[np.float64]],
+    ) -> Mapping[str, NDArray[np.float64]]:
+        """Return outputs by name, and signals as `port.signal`, shape (n,), where something acts at the ports, shape (n,)."""
+
+    def simulate(
+        self, inputs: Mapping[str, NDArray[np.float64]], parameters: Mapping[str, float], ports: Ports
+    ) -> Mapping[str, NDArray[np.float64]]:
+        """Simulate until what acts at the ports and the signals there agree."""
+        t = inputs["t"]
+        acting = {name: np.zeros(len(t)) for name in self._ports}
+        first = 0.0
+        for _ in range(MOST_EXCHANGES):
+            found = self.simulate_once(inputs, parameters, acting)
+            after = {name: self._acts(name, t, found, ports) for name in self._ports}
+            size = max((float(np.abs(values).max(initial=0.0)) for values in after.values()), default=0.0)
+            change = max((float(np.abs(after[name] - acting[name]).max(initial=0.0)) for name in after), default=0.0)
+            first = first or size
+            if change <= SETTLED * size:
+                return {name: found[name] for name in self._outputs if name in found}
+            if not np.isfinite(change) or size > RUNS_AWAY * first:
+                return {name: np.full(len(t), np.nan) for name in self._outputs}
+            acting = after
+        what = f"what acts at the ports and the signals there do not agree after {MOST_EXCHANGES} rounds"
+        raise SimulationFault(f"{what}; record fewer rows at a time, or write the simulator as a Python class")
+
+    def _acts(
+        self, name: str, t: NDArray[np.float64], found: Mapping[str, NDArray[np.float64]], ports: Ports
+    ) -> NDArray[np.float64]:
+        """What acts at a port where the signals are these, shape (n,)."""
+        signals = {}
+        for signal in self._ports[name]:
+            values = found.get(f"{name}.{signal}")
+            if values is None or values.shape != t.shape:
+                raise SimulationFault(f"there is no `{name}.{signal}` of {len(t)} rows among what it returns")
+            signals[signal] = values
+        if not all(np.isfinite(values).all() for values in signals.values()):
+            return np.full(len(t), np.nan)
+        return np.broadcast_to(np.asarray(getattr(ports, name)(t, signals), dtype=np.float64), t.shape)

@@ -1,0 +1,93 @@
+"""A simulator that is an FMU (FMI 2 or 3), run by FMPy, which is an extra of the installation.
+
+What acts at a port is an input of the FMU, of the port's name; signals are variables of it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.ports import SimulationFault
+from dbbstation.simulators.exchanged import ExchangedSimulator
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+
+class FmuSimulator(ExchangedSimulator):
+    """An FMU. Its outputs are taken at equal steps, and by straight lines between them where rows are not.
+
+    Args:
+        path: of the FMU.
+        variables: name of the FMU's variable, by our name, where they differ; signals are named `port.signal`, or `signal`.
+        ports: names of the signals at each port, by its name.
+        outputs: names of the outputs.
+        limit_s: longest time that a simulation may take [s].
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        variables: Mapping[str, str],
+        ports: Mapping[str, tuple[str, ...]],
+        outputs: tuple[str, ...],
+        limit_s: float,
+    ) -> None:
+        super().__init__(ports, outputs)
+        self._path, self._variables, self._limit_s = path, dict(variables), limit_s
+        self._signals = {f"{port}.{signal}": signal for port, signals in ports.items() for signal in signals}
+
+    @property
+    def said(self) -> str:
+        """Its path."""
+        return str(self._path)
+
+    def simulate_once(
+        self,
+        inputs: Mapping[str, NDArray[np.float64]],
+        parameters: Mapping[str, float],
+        acting: Mapping[str, NDArray[np.float64]],
+    ) -> Mapping[str, NDArray[np.float64]]:
+        """Simulate the FMU once.
+
+        Raises:
+            SimulationFault: FMPy is not installed, the FMU lacks a variable, fails, or takes too long.
+        """
+        try:
+            import fmpy  # noqa: PLC0415 - an extra
+        except ImportError:
+            raise SimulationFault("FMPy is not installed; `pip install 'dbbstation[fmu]'`") from None
+        t = inputs["t"]
+        driven = {self._of(name): values for name, values in {**inputs, **acting}.items() if name != "t"}
+        table = np.zeros(len(t), dtype=[("time", np.float64), *((name, np.float64) for name in driven)])
+        table["time"] = t
+        for name, values in driven.items():
+            table[name] = values
+        wanted = {name: self._of(name) for name in self._outputs} | {
+            name: self._variables.get(name, self._of(signal)) for name, signal in self._signals.items()
+        }
+        try:
+            found = fmpy.simulate_fmu(
+                str(self._path),
+                start_time=float(t[0]),
+                stop_time=float(t[-1]),
+                output_interval=float(np.min(np.diff(t))),
+                start_values={self._of(name): value for name, value in parameters.items()},
+                input=table if driven else None,
+                output=list(dict.fromkeys(wanted.values())),
+                timeout=self._limit_s,
+            )
+        except Exception as error:  # whatever FMPy and the FMU raise
+            raise SimulationFault(f"{self._path.name}: {error}") from error
+        if float(found["time"][-1]) < float(t[-1]) - 1e-6 * float(t[-1] - t[0]):
+            raise SimulationFault(f"{self._path.name} takes longer than {self._limit_s:g} s; raise `time_limit_s`")
+        return {name: np.interp(t, found["time"], found[variable]) for name, variable in wanted.items()}
+
+    def _of(self, name: str) -> str:
+        """The FMU's name of something."""
+        return self._variables.get(name, name)

@@ -1,0 +1,127 @@
+"""A simulator that is a program of any language: it reads `inputs.csv` and `parameters.json` and writes `outputs.csv`."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.ports import SimulationFault
+from dbbstation.simulators.exchanged import ExchangedSimulator
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+INPUTS, PARAMETERS, OUTPUTS = "inputs.csv", "parameters.json", "outputs.csv"
+"""Files in the folder in which the program is run."""
+
+LINES_TOLD = 3
+"""Last lines of what a program says on standard error that are told where it fails."""
+
+
+class ProgramSimulator(ExchangedSimulator):
+    """A program that is run once for every simulation, in an empty folder of its own.
+
+    Args:
+        command: program and arguments; files beside the model file are named by their whole path.
+        ports: names of the signals at each port, by its name.
+        outputs: names of the outputs.
+        limit_s: longest time that it may take [s].
+    """
+
+    def __init__(
+        self, command: tuple[str, ...], ports: Mapping[str, tuple[str, ...]], outputs: tuple[str, ...], limit_s: float
+    ) -> None:
+        super().__init__(ports, outputs)
+        self._command, self._limit_s = command, limit_s
+
+    @property
+    def said(self) -> str:
+        """Its command."""
+        return " ".join(self._command)
+
+    def simulate_once(
+        self,
+        inputs: Mapping[str, NDArray[np.float64]],
+        parameters: Mapping[str, float],
+        acting: Mapping[str, NDArray[np.float64]],
+    ) -> Mapping[str, NDArray[np.float64]]:
+        """Run the program once.
+
+        Raises:
+            SimulationFault: it cannot be run, fails, takes too long, or writes something else than was asked for.
+        """
+        with tempfile.TemporaryDirectory(prefix="dbbstation-") as name:
+            folder = Path(name)
+            columns = {**inputs, **acting}
+            with (folder / INPUTS).open("w", encoding="utf-8", newline="") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                writer.writerow(columns)
+                writer.writerows(zip(*(map(repr, values.tolist()) for values in columns.values()), strict=True))
+            (folder / PARAMETERS).write_text(json.dumps(dict(parameters)) + "\n", encoding="utf-8")
+            self._run(folder)
+            return _read(folder / OUTPUTS)
+
+    def _run(self, folder: Path) -> None:
+        said = f"`{self.said}`"
+        try:
+            done = subprocess.run(  # noqa: S603 - what the user's model file names
+                self._command,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                check=False,
+                timeout=self._limit_s,
+            )
+        except subprocess.TimeoutExpired:
+            raise SimulationFault(f"{said} takes longer than {self._limit_s:g} s; raise `time_limit_s`") from None
+        except OSError as error:
+            raise SimulationFault(f"{said} cannot be run: {error.strerror}") from error
+        if done.returncode:
+            last = done.stderr.decode("utf-8", "replace").strip().splitlines()[-LINES_TOLD:]
+            raise SimulationFault(f"{said} ended with code {done.returncode}: {' / '.join(last) or 'it said nothing'}")
+
+
+def _read(path: Path) -> dict[str, NDArray[np.float64]]:
+    """Columns of what the program wrote."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SimulationFault(f"it wrote no `{OUTPUTS}` that can be read") from error
+    if not rows:
+        raise SimulationFault(f"its `{OUTPUTS}` is empty")
+    head, body = [cell.strip() for cell in rows[0]], [row for row in rows[1:] if row]
+    for number, row in enumerate(body, 2):
+        if len(row) != len(head):
+            raise SimulationFault(f"row {number} of its `{OUTPUTS}` has {len(row)} cells, {len(head)} are expected")
+    try:
+        values = np.array(body, dtype=np.float64).reshape(len(body), len(head))
+    except ValueError as error:
+        raise SimulationFault(f"its `{OUTPUTS}` has what is no number: {error}") from error
+    return {name: values[:, k].copy() for k, name in enumerate(head)}
+
+
+def whole_command(words: tuple[str, ...], folder: Path) -> tuple[str, ...]:
+    """Return a command with its files beside the model file by their whole path.
+
+    Args:
+        words: of the command.
+        folder: of the model file.
+    """
+    return tuple(str((folder / word).absolute()) if (folder / word).is_file() else word for word in words)
+
+
+def files_of(command: tuple[str, ...]) -> list[Path]:
+    """Files that a command names, which are its content."""
+    found = [Path(word) for word in command if Path(word).is_file()]
+    program = shutil.which(command[0])
+    return sorted({*found, *([Path(program)] if program else [])})

@@ -1,0 +1,118 @@
+"""An FMU as a simulator: one that the test compiles, with a concealed effect, end to end."""
+
+import json
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dbbstation.diagnosis.simulator.model import SimulationRequest
+from dbbstation.diagnosis.simulator.terms import Term, TermForm
+from dbbstation.errors import CalibrationError, InputError
+from dbbstation.simulators import kept
+from dbbstation.simulators.loading import load_simulator
+from dbbstation.simulators.running import Runs
+from tests.cli.conftest import call
+from tests.diagnosis.simulator.systems import held
+
+fmpy = pytest.importorskip("fmpy", reason="FMPy, an extra, is not installed")
+if shutil.which("gcc") is None:
+    pytest.skip("no gcc to compile an FMU", allow_module_level=True)
+
+HERE = Path(__file__).parent
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="tank" guid="{tank}">
+  <CoSimulation modelIdentifier="tank" canHandleVariableCommunicationStepSize="true"/>
+  <ModelVariables>
+    <ScalarVariable name="rate" valueReference="0" causality="parameter" variability="tunable"><Real start="0.4"/></ScalarVariable>
+    <ScalarVariable name="inflow" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="flow" valueReference="2" causality="input"><Real start="0"/></ScalarVariable>
+    <ScalarVariable name="level" valueReference="3" causality="output"><Real/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure><Outputs><Unknown index="4"/></Outputs></ModelStructure>
+</fmiModelDescription>
+"""
+T = 0.25 * np.arange(160)
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fmu")
+    library = folder / "tank.so"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    subprocess.run(
+        ["gcc", "-shared", "-fPIC", "-O1", f"-I{headers}", HERE / "tank.c", "-o", library, "-lm"],  # noqa: S607 - the compiler on the PATH
+        check=True,
+    )
+    with zipfile.ZipFile(folder / "tank.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", DESCRIPTION)
+        archive.write(library, "binaries/linux64/tank.so")
+    return folder / "tank.fmu"
+
+
+@pytest.fixture
+def folder(fmu, tmp_path, monkeypatch):
+    monkeypatch.setattr(kept, "simulations_folder", lambda: tmp_path / "kept")
+    shutil.copy(fmu, tmp_path)
+    shutil.copy(HERE / "tank-fmu.yaml", tmp_path / "model.yaml")
+    rng = np.random.default_rng(4)
+    pump = 0.5 + held(rng, len(T), 16, 0.4)
+    level, levels = 1.0, []
+    for u in pump:  # the truth loses 0.08 x² as well; steps a hundredth as long
+        levels.append(level)
+        for _ in range(100):
+            level += 0.0025 * (u - 0.4 * level - 0.08 * level * level)
+    rows = np.array(levels) + 0.002 * rng.standard_normal(len(T))
+    lines = "\n".join(f"{t:.2f},{u:.4f},{x:.5f}" for t, u, x in zip(T, pump, rows, strict=True))
+    (tmp_path / "run.csv").write_text(f"t_s,pump,level_m\n{lines}\n")
+    return tmp_path
+
+
+def simulated(folder, rate, *terms):
+    loaded = load_simulator(folder / "model.yaml", [folder / "run.csv"])
+    with Runs(loaded, 0) as runs:
+        return loaded, runs([SimulationRequest(0, (("rate", rate),), terms)])[0].outputs[0]
+
+
+def test_an_fmu_is_simulated_with_its_parameters_and_inputs(folder):
+    loaded, found = simulated(folder, 0.3)
+    level, expected = 1.0, []
+    for u in loaded.model.runs[0].inputs["pump"].tolist():
+        expected.append(level)
+        level = u / 0.3 + (level - u / 0.3) * np.exp(-0.3 * 0.25)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_a_term_follows_the_state_of_an_fmu_by_rounds(folder):
+    loaded, found = simulated(folder, 0.3, Term("flow", TermForm.SQUARE, ("level",), (-0.08,)))
+    level, expected = 1.0, []
+    for u in loaded.model.runs[0].inputs["pump"].tolist():
+        expected.append(level)
+        drive = (u - 0.08 * level * level) / 0.3
+        level = drive + (level - drive) * np.exp(-0.3 * 0.25)
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+def test_a_variable_that_an_fmu_lacks_is_refused_with_its_name(folder):
+    text = (folder / "model.yaml").read_text()
+    (folder / "model.yaml").write_text(text.replace("flow.level: level", "flow.level: depth"))
+    with pytest.raises(CalibrationError, match="depth"):
+        simulated(folder, 0.3)
+    (folder / "model.yaml").write_text(text.replace("tank.fmu", "other.fmu"))
+    with pytest.raises(InputError, match=r"`other\.fmu` is not there"):
+        simulated(folder, 0.3)
+
+
+@pytest.mark.nightly
+def test_what_an_fmu_lacks_is_found_end_to_end(folder):
+    asked = ("mismatch", folder / "run.csv", "--simulator", folder / "model.yaml", "--no-held-out", "--json")
+    outcome = call(*asked)
+    assert outcome.code == 0, outcome.err
+    data = json.loads(outcome.out)
+    there = [f for f in data["findings"] if f["verdict"] == "identified"]
+    assert [f["port"] for f in there] == ["flow"]
+    rate = next(p for p in data["parameters"] if p["name"] == "rate")
+    assert rate["corrected"]["value"] == pytest.approx(0.4, abs=0.05)

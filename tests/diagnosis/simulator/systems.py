@@ -163,6 +163,55 @@ def _tank(truth, right, port="flow", values=None):
     )
 
 
+def _two_masses(truth, right):
+    """A motor that drives a load through a shaft; the angle of the load is seen."""
+    ports = (SimulatorPort("coupling", "rad", {"twist": "rad"}), SimulatorPort("load", "N m", {"speed": "rad/s"}))
+
+    def rate(t, x, u, p, ports):
+        twist = x[0] - x[2] + ports.coupling(t, {"twist": x[0] - x[2]})
+        torque = p["stiffness"] * twist + p["damping"] * (x[1] - x[3])
+        drag = ports.load(t, {"speed": x[3]})
+        return [x[1], (u["torque"] - 0.4 * x[1] - torque) / 0.1, x[3], (torque - p["friction"] * x[3] + drag) / 0.2]
+
+    return System(
+        make=lambda n: Stepped(
+            rate, lambda _t, x, _u, _p, _ports: x[2], ("motor", "motor_speed", "angle", "speed"), 2 * n
+        ),
+        parameters={"stiffness": (20.0, 12.0), "damping": (0.2, 0.4), "friction": (0.3, 0.5)},
+        states={"motor": 0.0, "motor_speed": 0.0, "angle": 0.0, "speed": 0.0},
+        ports=ports,
+        truth={"coupling": truth},
+        right=right,
+        inputs=lambda rng: {"t": 0.05 * np.arange(400), "torque": held(rng, 400, 16, 2.0)},
+        noise=0.004,
+        unit="rad",
+    )
+
+
+def _exchanger(truth, right):
+    """A body that is heated and gives off heat to its surroundings; its age is an input."""
+    ports = (SimulatorPort("heat", "K/s", {"excess": "K", "age": "h"}),)
+
+    def rate(t, x, u, p, ports):
+        return [p["gain"] * u["heater"] - p["loss"] * x[0] + ports.heat(t, {"excess": x[0], "age": u["age"]})]
+
+    return System(
+        make=lambda n: Stepped(rate, lambda _t, x, _u, _p, _ports: x[0], ("excess",), n),
+        parameters={"gain": (1.0, 0.8), "loss": (0.1, 0.07)},
+        states={"excess": 0.0},
+        ports=ports,
+        truth={"heat": truth},
+        right=right,
+        inputs=lambda rng: {
+            "t": 1.0 * np.arange(400),
+            "heater": 1.0 + held(rng, 400, 20, 0.8),
+            "age": np.linspace(0.0, 100.0, 400),
+        },
+        noise=0.03,
+        unit="K",
+    )
+
+
 def _late(dead):
     def make():
         times, values = [], []
@@ -224,5 +273,16 @@ SYSTEMS = {
         _plain(lambda s: -0.008 * s["level"] ** 2),
         ("square of level", "quadratic drag of level", "curve of level", "cubic of level"),
     ),
+    "two at once": _mass(
+        0.004,
+        _plain(lambda s: -0.25 * s["speed"] * abs(s["speed"]) - 0.8 * s["place"] ** 3),
+        ("quadratic drag of speed", "curve of speed", "cubic of place", "curve of place"),
+    ),
+    "backlash between two masses": _two_masses(
+        _plain(lambda s: -float(np.clip(s["twist"], -0.05, 0.05))), ("dead zone of twist", "limited of twist")
+    ),
+    "fouling": _exchanger(
+        _plain(lambda s: 0.0004 * s["age"] * s["excess"]), ("product of excess and age", "product of age and excess")
+    ),
 }
-"""Eight of the twelve concealed effects; those of two masses, of fouling, of a coupling and of two at once have files of their own."""
+"""A hardening spring beside ten of the twelve concealed effects; an Abbe error and a coupling's resonance are not among them."""

@@ -1,5 +1,6 @@
-"""An FMU as a simulator: one that the test compiles."""
+"""An FMU as a simulator: one that the test compiles, with a concealed effect, end to end."""
 
+import json
 import shutil
 import subprocess
 import zipfile
@@ -14,6 +15,7 @@ from dbbstation.errors import CalibrationError, InputError
 from dbbstation.simulators import kept
 from dbbstation.simulators.loading import load_simulator
 from dbbstation.simulators.running import Runs
+from tests.cli.conftest import call
 from tests.diagnosis.simulator.systems import held
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy, an extra, is not installed")
@@ -102,3 +104,15 @@ def test_a_variable_that_an_fmu_lacks_is_refused_with_its_name(folder):
     (folder / "model.yaml").write_text(text.replace("tank.fmu", "other.fmu"))
     with pytest.raises(InputError, match=r"`other\.fmu` is not there"):
         simulated(folder, 0.3)
+
+
+@pytest.mark.nightly
+def test_what_an_fmu_lacks_is_found_end_to_end(folder):
+    asked = ("mismatch", folder / "run.csv", "--simulator", folder / "model.yaml", "--no-held-out", "--json")
+    outcome = call(*asked)
+    assert outcome.code == 0, outcome.err
+    data = json.loads(outcome.out)
+    there = [f for f in data["findings"] if f["verdict"] == "identified"]
+    assert [f["port"] for f in there] == ["flow"]
+    rate = next(p for p in data["parameters"] if p["name"] == "rate")
+    assert rate["corrected"]["value"] == pytest.approx(0.4, abs=0.05)

@@ -29,7 +29,13 @@ from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, Family, log_odds
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import compress, solve
-from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance, spread_by_kind
+from dbbstation.inference.uneven import (
+    has_long_tails,
+    log_student,
+    most_probable_tails,
+    most_probable_variance,
+    spread_by_kind,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Container, Iterable, Sequence
@@ -241,6 +247,11 @@ class Bank:
         left = self.beside().left(self.target[:, None], self._sizes(members))[:, 0] / self.noise.innovation
         student = log_student(left / self.trust, self.tails)
         return float(np.sum(student - np.log(self.trust) + 0.5 * left**2))
+
+    def may_have_long_tails(self, members: Sequence[Member]) -> bool:
+        """Whether what is new in the rows, as the noise is now, has longer tails than the normal distribution beside members."""
+        left = self.beside().left(self.target[:, None], self._sizes(members))[:, 0]
+        return has_long_tails(left / self.trust)
 
     def _spread_of(self, left: NDArray[np.float64]) -> tuple[NDArray[np.float64], str]:
         """Spread of each kept row that makes whitened rows most probable: a constant part, those known, and those that grow."""

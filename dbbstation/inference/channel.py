@@ -140,6 +140,7 @@ class Channel:
             variables.
         least_noise: standard deviation of one row that is always there, whatever the rows seem to say: what the way they were made
             leaves of a perfect object, in the unit of the residual.
+        step: that measured values are multiples of, in the unit of the residual; zero where they are of no step that is known.
         surely: probability that the noise is not more than it is taken for [interval of a variance by chi-square; JCGM 101:2008,
             sec. 6.4.9.4]; None: its estimate is taken, for which half of that is as good.
         grows: size of what a part of the noise may be in proportion to, beside a constant part, shape (n,); None: noise is the same
@@ -168,6 +169,7 @@ class Channel:
     apart: int = 1
     static: tuple[Pattern, ...] | None = None
     least_noise: float = 0.0
+    step: float = 0.0
     surely: float | None = None
     grows: NDArray[np.float64] | None = None
     noise_follows: tuple[tuple[str, NDArray[np.float64]], ...] = ()

@@ -205,7 +205,9 @@ class _Search:
             others = hypothesis.without(*pair)
             scan = self._scan(others)
             worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
-            self._look_at([*others, scan.best[int(worth.argmax())]])
+            k = int(worth.argmax())
+            if self._may_be_likely(others, float(worth[k])):
+                self._look_at([*others, scan.best[k]])
         for member in hypothesis.members:
             if not member.cause.named or len(member.variant.columns) >= FLEXIBLE:
                 self._pairs(hypothesis.without(member.cause.name))
@@ -254,9 +256,16 @@ class _Search:
         ]
         # A flexible form imitates two causes; what two that are not flexible do together is looked at by itself.
         slim = [pair for pair in both if max(len(named[k].variant.columns) for k in pair[1:]) < FLEXIBLE]
+        alone = self._comparison.log_evidence(members)
         for pairs in (both, slim):
-            for _, a, b in sorted(pairs, reverse=True)[:PAIRS]:
-                self._look_at([*members, named[a], named[b]])
+            for evidence, a, b in sorted(pairs, reverse=True)[:PAIRS]:
+                if self._may_be_likely(members, evidence - alone):
+                    self._look_at([*members, named[a], named[b]])
+
+    def _may_be_likely(self, members: Sequence[Member], worth: float) -> bool:
+        """Whether members with something of so much worth beside them may, settled, be anything but negligible."""
+        odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
+        return self._comparison.log_evidence(members) + odds + worth > self._top - NEGLIGIBLE
 
     def _scan(self, members: Sequence[Member]) -> Scan:
         names = {member.cause.name for member in members}

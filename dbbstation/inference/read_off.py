@@ -13,6 +13,7 @@ from dbbstation.inference.impossible import impossible
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.named_values import named_values, with_jackknife
 from dbbstation.inference.patterns import Family
+from dbbstation.inference.pushes import too_many, within_a_step
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.variables import Kind
@@ -34,6 +35,10 @@ LATE = (Family.MEMORY, Family.DEAD_TIME)
 
 HALF = 0.5
 """Share of its largest value from which on an effect counts as being there, for the spans over which it is."""
+
+
+MAKES_UP = "Held-out parts are predicted worse than as simulated, and some of what acts always beside it predicts none: this may make up for that."
+"""Why something that happened once is not sure: its probability is that beside effects which other rows refute."""
 
 
 @dataclass(frozen=True)
@@ -328,11 +333,38 @@ class _Judge:
         worse = held_out is not None and held_out.is_worse
         verdict = claim(probability, sigmas, self._acts(name), gains, worse=worse)
         text = ""
+        if name in self._in_time:
+            every = [size for own in self._pushes.values() for size in own]
+            if why := within_a_step(self._pushes[name], self._settled.channel.step) or too_many(every):
+                return Verdict.AMBIGUOUS, (), why
+        if verdict is Verdict.HAPPENED and worse and self._refuted:
+            return Verdict.AMBIGUOUS, (), MAKES_UP
         if verdict is Verdict.DOES_NOT_PREDICT and gains is not None:
             text = f"It was found in these rows; held-out parts gain by it in {gains.with_gain} of {len(gains.parts)}."
             if gains.predicts:
                 text += " Everything together predicts them worse than without."
         return verdict, (), text
+
+    @cached_property
+    def _refuted(self) -> bool:
+        """Whether something that acts always is a member and predicts no held-out parts."""
+        every = [self._gains(name) for name in self._members if self._acts(name) is Acts.ALWAYS]
+        return any(gains is not None and not gains.predicts for gains in every)
+
+    @cached_property
+    def _in_time(self) -> list[str]:
+        """Members that are stretches of time."""
+        return [name for name in self._members if name in self._kinds and self._kinds[name][0] in IN_TIME]
+
+    @cached_property
+    def _pushes(self) -> dict[str, list[Value]]:
+        """Sizes of all stretches of time, by member."""
+        unit, found = self._settled.channel.unit, {}
+        for name in self._in_time:
+            values, covariance = self._values[name]
+            sigmas = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+            found[name] = [Value(float(v), float(s), unit) for v, s in zip(values, sigmas, strict=True)]
+        return found
 
     def _impossible_in_place(self, cause: Cause) -> str:
         """Why a law cannot stand in the place of what nothing measured tells from it; empty where it can."""

@@ -88,16 +88,32 @@ def settle(
         return _settled(_begun(channel, options), options, progress)
     found: list[Settled] = []
     laid_out = _begun(channel, options)
-    if beside_all := [one for one in beginnings if one not in BESIDE_NOTHING]:
-        # What stands beside everything is worked out once, and gone on with under each kind of noise.
-        bank = deepcopy(laid_out)
-        begun = _settled(bank, options, progress)
-        for one in beside_all:
-            found.append(_from(*deepcopy((bank, begun.best.members)), begun.refused, one, options, progress, found))
-    for one in [one for one in beginnings if one in BESIDE_NOTHING]:
-        found.append(_from(deepcopy(laid_out), (), {}, one, options, progress, found))
+    begun: tuple[Bank, Settled] | None = None
+    # Long tails come last: where nothing has any, they are no rival.
+    for one in sorted(beginnings, key=lambda one: one in LONG_TAILS):
+        if one in LONG_TAILS and found and not _may_have_long_tails(laid_out, found):
+            continue
+        if one in BESIDE_NOTHING:
+            found.append(_from(deepcopy(laid_out), (), {}, one, options, progress, found))
+            continue
+        if begun is None:
+            # What stands beside everything is worked out once, and gone on with under each kind of noise.
+            bank = deepcopy(laid_out)
+            begun = bank, _settled(bank, options, progress)
+        bank, beside_all = deepcopy((begun[0], begun[1].best.members))
+        found.append(_from(bank, beside_all, begun[1].refused, one, options, progress, found))
     found.sort(key=lambda one: -one.log_probability)
     return replace(found[0], others=tuple(found[1:]))
+
+
+def _may_have_long_tails(laid_out: Bank, found: Sequence[Settled]) -> bool:
+    """Whether what is new in a row has long tails beside what was found, or beside nothing: what was found may be such rows."""
+    if any(one.bank.may_have_long_tails(one.best.members) for one in found):
+        return True
+    bank = deepcopy(laid_out)
+    bank.measures_beside_members = True
+    bank.measure(())
+    return bank.may_have_long_tails(())
 
 
 BESIDE_NOTHING = (Beginning.NOTHING, Beginning.NOTHING_LONG_TAILS)

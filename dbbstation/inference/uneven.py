@@ -80,6 +80,18 @@ def most_probable_tails(new: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
     return found
 
 
+def has_long_tails(new: NDArray[np.float64]) -> bool:
+    """Whether what is new in rows, shape (m,), is more probable with long tails than without, each with its most probable scale."""
+    if not np.any(new):
+        return False
+    scaled = new / np.sqrt(np.mean(np.square(new)))
+    weight, tails = most_probable_tails(scaled)
+    # Under the weights that belong to it, the scale of Student's t is the weighted mean of squares.
+    scale = float(np.sqrt(np.mean(np.square(weight * scaled))))
+    student = float(np.sum(log_student(scaled / scale, tails))) - len(new) * float(np.log(scale))
+    return student > -0.5 * len(new)
+
+
 def log_student(new: NDArray[np.float64], tails: float) -> NDArray[np.float64]:
     """Log density of Student's t of so many degrees of freedom, over the height of the normal density, shape (m,).
 

@@ -122,3 +122,22 @@ def test_what_came_once_has_happened_and_a_step_that_gains_persists(last, persis
     without = {one.name: one for one in read_off(settled, trial([], 0.5))}[name]
     assert without.verdict is Verdict.HAPPENED
     assert not without.persists
+
+
+def test_what_came_once_beside_what_does_not_predict_is_not_sure():
+    """The play was refuted by other rows, so that the pulse may make up for it."""
+    data = table(2, EFFECTS["hysteresis of q"], rows=600)
+    whole = channel(data, blocks=1)
+    inside = (np.arange(600) >= 200) & (np.arange(600) < 280)
+    settled = settle(replace(whole, residual=whole.residual + 0.4 * inside))
+    assert "hysteresis of q" in settled.best.names
+    (pulse,) = settled.best.names - {"hysteresis of q"}
+
+    def told(kinds, after):
+        return {one.name: one for one in read_off(settled, trial(kinds, after))}[pulse]
+
+    assert told([], 0.5).verdict is Verdict.HAPPENED
+    assert told([("hysteresis of q",)], 1.1).verdict is Verdict.HAPPENED
+    refuted = told([], 1.1)
+    assert refuted.verdict is Verdict.AMBIGUOUS
+    assert "may make up for that" in refuted.text

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import betaincc, betaln, expit
-from scipy.stats import chi2
 
 from dbbstation.diagnosis.drive.findings import Complement, DrivePart
 from dbbstation.diagnosis.drive.fit import fit
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.curves import Stretches
+from dbbstation.inference.pushes import distinct_sizes, most_of_one_size, pooled
 from dbbstation.inference.verdict import Value
 
 if TYPE_CHECKING:
@@ -26,15 +26,6 @@ if TYPE_CHECKING:
 
 APART = 4.0
 """Standard uncertainties by which levels of a force in time must differ to be two: one in 15,000 by chance."""
-
-
-MOST_PUSHES = 8
-"""Stretches of time of sizes of their own, at the most: each has three numbers that nothing but the residual says, and with more of them
-they can follow whatever a law leaves."""
-
-
-ONE_SIZE = 0.999
-"""Probability up to which pushes of one size scatter as little as that."""
 
 
 @dataclass(frozen=True)
@@ -97,24 +88,16 @@ def distinct_pushes(parts: Sequence[DrivePart]) -> int:
     Args:
         parts: that `pulse_parts` found.
     """
-    return len(parts) - max(len(equal_pushes(parts)) - 1, 0)
+    return distinct_sizes(_sizes_of(parts))
 
 
 def equal_pushes(parts: Sequence[DrivePart]) -> list[DrivePart]:
-    """The most stretches of time that can be of one size together, by chi-square about their weighted mean, in their order."""
-    order = sorted(range(len(parts)), key=lambda k: parts[k].parameters["force_n"].value)
-    sizes = [parts[k].parameters["force_n"] for k in order]
-    best: range = range(0)
-    for first in range(len(sizes)):
-        while (stop := first + len(best) + 1) <= len(sizes) and _of_one_size(sizes[first:stop]):
-            best = range(first, stop)
-    return [parts[k] for k in sorted(order[k] for k in best)]
+    """The most stretches of time that can be of one size together, in their order."""
+    return [parts[k] for k in most_of_one_size(_sizes_of(parts))]
 
 
-def _of_one_size(sizes: Sequence[Value]) -> bool:
-    mean = pooled(sizes).value
-    squares = sum(((one.value - mean) / one.uncertainty) ** 2 for one in sizes)
-    return len(sizes) < 2 or squares <= float(chi2.ppf(ONE_SIZE, len(sizes) - 1))  # noqa: PLR2004 - one agrees with itself
+def _sizes_of(parts: Sequence[DrivePart]) -> list[Value]:
+    return [part.parameters["force_n"] for part in parts]
 
 
 def complement_of(parts: Sequence[DrivePart], first_s: float, last_s: float) -> Complement | None:
@@ -132,15 +115,6 @@ def complement_of(parts: Sequence[DrivePart], first_s: float, last_s: float) -> 
     edges = [first_s, *(t for part in equal for t in part.t_s or ()), last_s]
     between = tuple((a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a)
     return Complement(Value(-size.value, size.uncertainty, size.unit), between, len(equal))
-
-
-def pooled(sizes: Sequence[Value]) -> Value:
-    """Weighted mean of sizes, with the larger of the uncertainties from theirs and from their scatter [ISO 13528; Birge 1932]."""
-    values, sigmas = (np.array([getattr(one, name) for one in sizes]) for name in ("value", "uncertainty"))
-    weights = 1.0 / np.square(sigmas)
-    mean = float(weights @ values / weights.sum())
-    scatter = float(weights @ np.square(values - mean)) / max(len(values) - 1, 1)
-    return Value(mean, float(np.sqrt(max(scatter, 1.0) / weights.sum())), sizes[0].unit)
 
 
 def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[DrivePart]:

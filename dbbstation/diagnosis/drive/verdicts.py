@@ -12,8 +12,9 @@ from dbbstation.diagnosis.drive.channel import METHOD_SHARE
 from dbbstation.diagnosis.drive.findings import DriveFinding, DrivePart, UnmodelledForce
 from dbbstation.diagnosis.drive.naming import COGGING, COULOMB, TRANSIENT, acts, source_of
 from dbbstation.diagnosis.drive.noise_rival import probability_beside_noise
-from dbbstation.diagnosis.drive.pulses import MOST_PUSHES, complement_of, distinct_pushes, edges_of, pulse_parts
+from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, edges_of, pulse_parts
 from dbbstation.inference.patterns import Family
+from dbbstation.inference.pushes import MOST_PUSHES
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.verdict import OUT, SURE, Gains, Value, Verdict, claim

@@ -117,6 +117,7 @@ class Table:
             time_unit=time_unit,
             simulated=simulated,
             least_noise=rounding_of(self.measured),
+            step=step_of(self.measured),
             noise_follows=tuple(_sizes_of_noise(follows, time, self.blocks)),
         )
 
@@ -158,11 +159,16 @@ def _sizes_of_noise(
             yield f"speed of {variable.name}", np.abs(variable.rates(time, blocks))
 
 
-def rounding_of(values: NDArray[np.float64]) -> float:
-    """Standard deviation of what was rounded off values that are multiples of a step [JCGM 100:2008, sec. F.2.2.1]."""
+def step_of(values: NDArray[np.float64]) -> float:
+    """Step that values, shape (n,), are multiples of: the least difference of two of them."""
     steps = np.diff(np.unique(values))
     steps = steps[steps > EQUAL * np.ptp(values)]
-    return float(steps.min()) / float(np.sqrt(12.0)) if len(steps) else 0.0
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def rounding_of(values: NDArray[np.float64]) -> float:
+    """Standard deviation of what was rounded off values that are multiples of a step [JCGM 100:2008, sec. F.2.2.1]."""
+    return step_of(values) / float(np.sqrt(12.0))
 
 
 EQUAL = 1e-9

@@ -7,8 +7,9 @@ import pytest
 
 from dbbstation.diagnosis.drive.findings import DrivePart
 from dbbstation.diagnosis.drive.identify import identify
-from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, equal_pushes, pooled
+from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, equal_pushes
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
+from dbbstation.inference.pushes import pooled
 from dbbstation.inference.verdict import Value
 from dbbstation.results.of_drive import drive_result
 from dbbstation.trace.drive_recording import DriveRecording

@@ -14,7 +14,9 @@ def test_noise_is_at_least_that_of_rounding(rng):
     axis = moving(rng, 400)
     rounded = STEP_MM * np.round((axis.place + rng.normal(0.0, 0.001, 400)) / STEP_MM)
     # A rectangular distribution as wide as the step.
-    assert table_of(axis, rounded, axis.place).channel().least_noise == pytest.approx(STEP_MM / np.sqrt(12.0))
+    channel = table_of(axis, rounded, axis.place).channel()
+    assert channel.least_noise == pytest.approx(STEP_MM / np.sqrt(12.0))
+    assert channel.step == pytest.approx(STEP_MM)
 
 
 def test_targets_that_are_multiples_of_a_step_are_no_rounding(rng):

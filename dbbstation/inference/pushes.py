@@ -1,0 +1,75 @@
+"""How many events stretches of time are: those of one size count once, and more than a few are no events."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import chi2
+
+from dbbstation.inference.verdict import OUT, Value
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+MOST_PUSHES = 8
+"""Stretches of time of sizes of their own, at the most: each has three numbers that nothing but the residual says, and with more of them
+they can follow whatever a law or a model of the noise leaves."""
+
+ONE_SIZE = 0.999
+"""Probability up to which pushes of one size scatter as little as that."""
+
+
+def too_many(sizes: Sequence[Value]) -> str:
+    """Why stretches of time of such sizes are no events; empty where they may be."""
+    distinct = distinct_sizes(sizes)
+    if distinct <= MOST_PUSHES:
+        return ""
+    return (
+        f"{len(sizes)} stretches of time would be needed, {distinct} of them of sizes of their own: a form that is not listed, or noise "
+        "that comes in pieces, is more likely than so many events."
+    )
+
+
+def within_a_step(sizes: Sequence[Value], step: float) -> str:
+    """Why stretches of time of such sizes may be what was rounded off; empty where one is beyond a step.
+
+    What rounding does to a value that changes slowly has the same sign in many rows, and may be a half of a step either way.
+
+    Args:
+        sizes: of the stretches.
+        step: that measured values are multiples of; zero where there is none.
+    """
+    if any(abs(one.value) - step >= OUT * one.uncertainty for one in sizes):
+        return ""
+    return f"No stretch of it is larger than the step of {step:.3g} {sizes[0].unit} that is measured in: it may be what was rounded off."
+
+
+def distinct_sizes(sizes: Sequence[Value]) -> int:
+    """How many sizes stretches of time have, those of one size counted once: what happens again happens as strongly."""
+    return len(sizes) - max(len(most_of_one_size(sizes)) - 1, 0)
+
+
+def most_of_one_size(sizes: Sequence[Value]) -> list[int]:
+    """Numbers of the most stretches of time that can be of one size together, by chi-square about their weighted mean, rising."""
+    order = sorted(range(len(sizes)), key=lambda k: sizes[k].value)
+    best: range = range(0)
+    for first in range(len(order)):
+        while (stop := first + len(best) + 1) <= len(order) and _is_one([sizes[k] for k in order[first:stop]]):
+            best = range(first, stop)
+    return sorted(order[k] for k in best)
+
+
+def _is_one(sizes: Sequence[Value]) -> bool:
+    mean = pooled(sizes).value
+    squares = sum(((one.value - mean) / one.uncertainty) ** 2 for one in sizes)
+    return len(sizes) < 2 or squares <= float(chi2.ppf(ONE_SIZE, len(sizes) - 1))  # noqa: PLR2004 - one agrees with itself
+
+
+def pooled(sizes: Sequence[Value]) -> Value:
+    """Weighted mean of sizes, with the larger of the uncertainties from theirs and from their scatter [ISO 13528; Birge 1932]."""
+    values, sigmas = (np.array([getattr(one, name) for one in sizes]) for name in ("value", "uncertainty"))
+    weights = 1.0 / np.square(sigmas)
+    mean = float(weights @ values / weights.sum())
+    scatter = float(weights @ np.square(values - mean)) / max(len(values) - 1, 1)
+    return Value(mean, float(np.sqrt(max(scatter, 1.0) / weights.sum())), sizes[0].unit)

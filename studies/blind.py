@@ -13,6 +13,7 @@ from concurrent.futures import as_completed
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.computing.memory import forget_largest_memory, largest_memory_mb
 from dbbstation.computing.processes import deaf, processes
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.atomic import write_text
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 ANSWERS = "answers.json"
 FORMAT = "blind-answers/1"
+SECONDS_PER_HOUR = 3600.0
 
 
 def verdict_folder(folder: Path, candidates: Sequence[str]) -> Path:
@@ -50,7 +52,8 @@ def judge_sessions(
         again: judge all of them anew, for a diagnosis that has changed since.
 
     Returns:
-        By session, `seconds` it took and `summary` of the diagnosis, or `error` where there was none.
+        By session, `seconds` it took and `summary` of the diagnosis, or `error` where there was none; `processor_s`, and `memory_mb`,
+        the largest memory of the process during it, with all that it had loaded before (None where the system does not say).
 
     Raises:
         InputError: a folder without sessions.
@@ -99,7 +102,22 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
     return {answer["session"]: answer for answer in answers["sessions"]}
 
 
+def cost(verdicts: Sequence[dict[str, Any]]) -> dict[str, float | None] | None:
+    """Processor time and memory of the diagnoses; None where an earlier version did not measure them."""
+    seconds = [verdict["processor_s"] for verdict in verdicts if "processor_s" in verdict]
+    memory_mb = [verdict["memory_mb"] for verdict in verdicts if verdict.get("memory_mb")]
+    if not seconds:
+        return None
+    return {
+        "processor_s_mean": sum(seconds) / len(seconds),
+        "processor_s_greatest": max(seconds),
+        "processor_h": sum(seconds) / SECONDS_PER_HOUR,
+        "memory_mb_greatest": max(memory_mb, default=None),
+    }
+
+
 def _judge(path: Path, *, candidates: tuple[str, ...], kept: Path) -> None:
+    forget_largest_memory()
     begun, begun_processor = time.perf_counter(), time.process_time()
     verdict: dict[str, Any] = {"session": path.name}
     try:
@@ -110,6 +128,7 @@ def _judge(path: Path, *, candidates: tuple[str, ...], kept: Path) -> None:
         verdict["error"] = f"{type(error).__name__}: {error}"
     verdict["seconds"] = time.perf_counter() - begun
     verdict["processor_s"] = time.process_time() - begun_processor
+    verdict["memory_mb"] = largest_memory_mb()
     write_text(kept / f"{path.name}.json", json.dumps(verdict, indent=1) + "\n", force=True)
 
 

@@ -36,8 +36,8 @@ def without_tests(explained: Explained) -> ChosenAnew | None:
             out = np.zeros(len(target), dtype=bool)
             for rows, own in zip(channel.runs, groups, strict=True):
                 out[rows] = own == group
-            beside = channel.beside_base(noise_mm, settled.scatter, but_for=out)
-            yield beside.comparison(np.where(out, 0.0, target))
+            kept = np.where(out, 0.0, target)
+            yield channel.beside_base(noise_mm, settled.scatter, but_for=out).comparison(kept)
 
     def choose(comparison: ModelComparison) -> Sequence[Member]:
         begin = [settled.best.members]

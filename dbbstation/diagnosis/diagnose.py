@@ -10,14 +10,16 @@ import numpy as np
 from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.stray_balls import beside
 from dbbstation.computing.threads import with_one_thread
+from dbbstation.diagnosis.after_reversals import after_reversals
 from dbbstation.diagnosis.chosen_anew import without_tests
 from dbbstation.diagnosis.explain import explain, without
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained, Verdict
 from dbbstation.diagnosis.left_out import found_again, predicted, widened_by_tests
 from dbbstation.diagnosis.locate import locations_of
 from dbbstation.diagnosis.next_test import next_tests
+from dbbstation.diagnosis.shapes import Follows
 from dbbstation.diagnosis.shifts import shifts_between
-from dbbstation.diagnosis.thinned import thinned
+from dbbstation.diagnosis.thinned import sectors_for, thinned
 from dbbstation.diagnosis.unexplained_curve import curve_of
 from dbbstation.diagnosis.unexplained_model import with_exact_wave
 from dbbstation.diagnosis.verdicts import judge
@@ -63,7 +65,8 @@ def diagnose(
         CalibrationError: the base model cannot be fitted.
         ModelError: a source needs what the runs or the machine file do not give.
     """
-    runs = [thinned(observation) for observation in observations]
+    most = sectors_for(len(observations))
+    runs = [thinned(observation, most) for observation in observations]
     explained = explain(machine, runs, sources, progress)
     progress("verdicts")
     explained, findings = judged(explained)
@@ -139,7 +142,7 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
     if not effects or not sure:
         found = remainder_of(settled.after, settled.noise)
         if not is_missing_physics(left) and found.probability >= SIGNIFICANT:
-            return Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise.")
+            return _quick(settled)
         rough = rough_formulas(settled)
         text = "Something is left beyond noise, and no variable organises it clearly."
         if rough:
@@ -161,6 +164,14 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
     rms_um = 1e3 * left.rms if is_missing_physics(left) else curve.unconcealed_um
     gain = settled.best.log_factor(member.cause.name)
     return Unexplained(rms_um, shape.strut, curve.follows, gain, text, curve)
+
+
+def _quick(settled: SettledCircles) -> Unexplained:
+    """What is left above the harmonics that are asked for, which noise is read from: nothing, or what follows a reversal."""
+    found = after_reversals(settled.unmodelled.runs, settled.after.residual_mm)
+    if found is None or found.probability >= SIGNIFICANT:
+        return Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise.")
+    return Unexplained(found.beyond_um, found.strut, Follows("time", "since a reversal"), 0.0, found.text)
 
 
 def _where(observations: Sequence[Observation], found: Remainder) -> tuple[float, str]:

@@ -18,13 +18,29 @@ SECTORS = 720
 FEWEST_PER_SECTOR = 2
 """Samples per sector below which sectors are made wider."""
 
+MOST_SAMPLES = 30 * SECTORS
+"""Samples of all runs that a diagnosis works on: those of thirty circles. Columns of all causes over them take most of its memory, 0.9 GB."""
 
-def thinned(observation: Observation) -> Observation:
-    """Return the run averaged over sectors, with what was commanded averaged alike; as it is where it is short."""
+LEAST_SECTORS = SECTORS // 2
+"""Samples per turn that are kept however many runs there are: with fewer, noise is not read from harmonics far above the low ones."""
+
+
+def sectors_for(runs: int) -> int:
+    """Samples per turn that each of so many runs is averaged to, at the most."""
+    return max(min(SECTORS, MOST_SAMPLES // max(runs, 1)), LEAST_SECTORS)
+
+
+def thinned(observation: Observation, most: int = SECTORS) -> Observation:
+    """Return the run averaged over sectors, with what was commanded averaged alike; as it is where it is short.
+
+    Args:
+        observation: the run.
+        most: samples per turn at the most.
+    """
     raw = observation.raw
-    if len(raw) <= SECTORS:
+    if len(raw) <= most:
         return observation
-    sectors = min(SECTORS, max(len(raw) // FEWEST_PER_SECTOR, 1))
+    sectors = min(most, max(len(raw) // FEWEST_PER_SECTOR, 1))
     commanded = observation.commanded
     if commanded is not None:
         before = len(observation.lead_in_deg)

@@ -204,7 +204,26 @@ class _Judge:
     def _testable(self, name: str) -> bool:
         """Whether plausible amplitudes would be seen beside base and causes; half of their combinations at least."""
         whole = max(self._named[name].variants, key=lambda v: len(v.columns))
-        return bool(np.mean(self._sigmas(whole, self._best.without(name)) >= OUT) >= TESTABLE_SHARE)
+        return self._would_be_seen(name, whole) and not self._unseen_points(name)
+
+    def _would_be_seen(self, name: str, variant: Variant) -> bool:
+        return bool(np.mean(self._sigmas(variant, self._best.without(name)) >= OUT) >= TESTABLE_SHARE)
+
+    def _unseen_points(self, name: str) -> list[float]:
+        """Values of a listed parameter, such as the run that a bump came before, at which these tests would not show a cause.
+
+        Values of a list are cases of their own: to see one of them says nothing of another.
+        """
+        unseen = []
+        for variant in self._named[name].variants:
+            if variant.label or not variant.nonlinear:
+                continue
+            listed = [
+                p.listed for p in self._channel.source_of(name, variant).parameters(self._channel.machine) if p.grid
+            ]
+            if any(listed) and not self._would_be_seen(name, variant):
+                unseen.append(variant.nonlinear[listed.index(True)])
+        return sorted(set(unseen))
 
     def _sigmas(self, variant: Variant, others: tuple[Member, ...]) -> NDArray[np.float64]:
         """By how many standard deviations combinations of plausible amplitudes stand out beside base and others, least first."""
@@ -214,6 +233,12 @@ class _Judge:
         for member in self._settled.members:
             if self._sigmas(self._named[name].variants[0], self._best.without(member.cause.name))[-1] >= OUT:
                 return f"Beside {member.cause.name}, and what its formula may be off by, these tests would not show it."
+        unseen = self._unseen_points(name)
+        if unseen and self._would_be_seen(name, max(self._named[name].variants, key=lambda v: len(v.columns))):
+            source = self._channel.source_of(name, self._named[name].variants[0])
+            listed = next(p for p in source.parameters(self._channel.machine) if p.listed)
+            at = ", ".join(f"{value:g}" for value in unseen)
+            return f"These tests would not show it where {listed.name} is {at}: the scatter of balls and the fitted parameters conceal it."
         return "These tests would not show it at its plausible size: the fitted parameters conceal it."
 
     def _beside(self, cause: Cause) -> tuple[float, Member]:

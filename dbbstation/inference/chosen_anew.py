@@ -76,6 +76,7 @@ def chosen_anew(
             found[kind_of(name)] = found.get(kind_of(name), 0.0) + with_all - but_for
         brought.append(found)
         whole.append(with_all)
+        del others  # its products fill as much memory as those of the next part will
     return ChosenAnew(tuple(brought), tuple(whole))
 
 

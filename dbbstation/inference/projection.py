@@ -114,8 +114,13 @@ class CauseColumns:
             wider = np.empty((len(self._buffer), 2 * last), order="F")
             wider[:, : self._ready] = self._buffer[:, : self._ready]
             self._buffer = wider
-        # A caller may change what it handed over; what makes columns of its own copies them.
-        self._waiting.append(columns if self._whitened is not None else columns.copy())
+        if (
+            self._whitened is None
+        ):  # nothing is to be worked out later, and a copy of what waits would take as much memory again
+            self._buffer[:, first:last] = columns
+            self._ready = last
+        else:
+            self._waiting.append(columns)
         self.count = last
         return np.arange(first, last)
 
@@ -128,7 +133,8 @@ class CauseColumns:
         kept = CauseColumns(np.where(rows[:, None], 0.0, self.base), room=0)
         out = self.samples[rows]
         kept._buffer, kept.count, kept._ready = self._buffer, self.count, self.count
-        kept._products = self.gram - out.T @ out
+        products = out.T @ out
+        kept._products = np.subtract(self.gram, products, out=products)
         kept._along = kept.axes.T @ self.samples
         return kept
 
@@ -172,13 +178,16 @@ class BesideBase:
         causes = self._causes
         columns = causes.samples if only is None else causes.of(only)
         of_base = self._taken @ (causes.along if only is None else causes.axes.T @ columns)
-        gram = (causes.gram if only is None else columns.T @ columns) - of_base.T @ of_base
+        # As many products as columns times columns fill tens of megabytes: one array of them is worked on in place.
+        gram = of_base.T @ of_base
+        np.subtract(causes.gram if only is None else columns.T @ columns, gram, out=gram)
         towards = columns.T @ target - of_base.T @ (self._taken @ (causes.axes.T @ target))
         if only is not None:
             some = gram, towards
             gram, towards = np.zeros((causes.count, causes.count)), np.zeros(causes.count)
             gram[np.ix_(only, only)], towards[only] = some
-        return ModelComparison(gram / self._noise**2, towards / self._noise**2)
+        gram /= self._noise**2
+        return ModelComparison(gram, towards / self._noise**2)
 
     def left(self, targets: NDArray[np.float64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
         """What base and causes together leave of targets, shape (n, m).
@@ -189,13 +198,17 @@ class BesideBase:
         """
         causes, axes = self._causes, self._causes.axes
         used = np.flatnonzero(sd > 0.0)
-        columns, size = causes.of(used), sd[used] / self._noise
+        size = sd[used] / self._noise
+        # Nearly all columns are multiplied where they are: to pick them would copy all that the memory is full of.
         every = len(used) > FEW * causes.count
+        columns = causes.samples if every else causes.of(used)
+        own = used if every else np.arange(len(used))
         along = causes.along[:, used] if every else axes.T @ columns
         products = causes.gram[np.ix_(used, used)] if every else columns.T @ columns
         of_base = self._taken @ (along * size)
         gram = size[:, None] * products * size - of_base.T @ of_base
-        towards = size[:, None] * (columns.T @ targets) - of_base.T @ (self._taken @ (axes.T @ targets))
-        values = cho_solve((cholesky(gram + np.eye(len(used))), True), towards)
-        left = np.asarray(targets - columns @ (size[:, None] * values), dtype=np.float64)
+        towards = size[:, None] * (columns.T @ targets)[own] - of_base.T @ (self._taken @ (axes.T @ targets))
+        values = np.zeros((columns.shape[1], targets.shape[1]))
+        values[own] = size[:, None] * cho_solve((cholesky(gram + np.eye(len(used))), True), towards)
+        left = np.asarray(targets - columns @ values, dtype=np.float64)
         return left - axes @ (self._taken.T @ (self._taken @ (axes.T @ left)))

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from dbbstation.cli.figure_option import figure_option, format_of
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@click.argument(
+    "folders",
+    metavar="FOLDER...",
+    nargs=-1,
+    required=True,
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+)
 @click.option("--candidates", metavar="A,B,...", help="Error sources to compare [default: all, as in `diagnose`].")
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of processes [default: all cores].")
 @click.option("--again", is_flag=True, help="Diagnose sessions again that have a verdict already.")
@@ -21,7 +32,7 @@ from dbbstation.cli.figure_option import figure_option, format_of
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def blind(
     *,
-    folder: Path,
+    folders: tuple[Path, ...],
     candidates: str | None,
     jobs: int | None,
     again: bool,
@@ -31,15 +42,16 @@ def blind(
 ) -> None:
     r"""Diagnose sessions in which somebody has hidden effects, and score the verdicts.
 
-    FOLDER has one session folder per recording and `answers.json`, which is opened only after every session has
+    A FOLDER has one session folder per recording and `answers.json`, which is opened only after every session of every folder has
     its verdict. Verdicts are kept in FOLDER/verdicts at once, so that a study can be interrupted and goes on where
-    it stopped. --figure draws how often causes were there that were given a probability. The simulation under
+    it stopped. Several folders are scored together. --figure draws how often causes were there that were given a probability. The simulation under
     tests/plant makes such folders: it shares no code with this program.
 
     \b
     Examples:
       python -m tests.plant.blind hidden --clean 100 --single 200 --pairs 40 --outside 40 --concealed 20 --seed 1
       dbbstation study blind hidden
+      dbbstation study blind first second
       dbbstation study blind hidden --again --json > blind.json
       dbbstation study blind hidden --figure reliability.svg
     """
@@ -49,24 +61,27 @@ def blind(
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.sources.registry import known_sources
     from dbbstation.tasks.diagnose import default_candidates
-    from studies.blind import judge_sessions, read_answers
+    from studies.blind import cost, judge_sessions, read_answers
     from studies.blind_score import numbers, score
 
     if figure is not None:
         refuse_existing(figure, force=force)
     names = [n.strip() for n in candidates.split(",")] if candidates else default_candidates(known_sources())
-    total = len(list(folder.glob("*/session.yaml")))
+    total = sum(len(list(folder.glob("*/session.yaml"))) for folder in folders)
+    verdicts: list[dict[str, dict[str, Any]]] = []
     with progress_bar("sessions", total) as advance:
-        verdicts = judge_sessions(
-            folder,
-            names,
-            jobs or os.cpu_count() or 1,
-            lambda done, _: advance(done),
-            again=again,
-        )
+        for folder in folders:
+            before = sum(map(len, verdicts))
+            told = partial(_further, advance, before)
+            verdicts.append(judge_sessions(folder, names, jobs or os.cpu_count() or 1, told, again=again))
+    outcomes = []
+    for folder, judged in zip(folders, verdicts, strict=True):
+        own = score(read_answers(folder), judged, names if candidates else None)
+        outcomes += own if len(folders) == 1 else [replace(one, session=f"{folder.name}/{one.session}") for one in own]
     found: dict[str, Any] = {
         "candidates": list(names),
-        **numbers(score(read_answers(folder), verdicts, names if candidates else None)),
+        **numbers(outcomes),
+        "cost": cost([one for judged in verdicts for one in judged.values()]),
     }
     if as_json:
         print_json(found)
@@ -76,11 +91,21 @@ def blind(
         return
     if found["reliability"] is None:
         what = "no verdict has a probability, so there is no reliability to draw"
-        raise InputError([Problem(str(folder), 0, 0, what, "judge the sessions with --again, or leave --figure out")])
+        raise InputError(
+            [
+                Problem(
+                    ", ".join(map(str, folders)), 0, 0, what, "judge the sessions with --again, or leave --figure out"
+                )
+            ]
+        )
     from studies.blind_figure import reliability_figure
 
     write_bytes(figure, reliability_figure(found["reliability"], format_of(figure)), force=force)
     say(f"figure written to {figure}")
+
+
+def _further(advance: Callable[[int], None], before: int, done: int, _: int) -> None:
+    advance(before + done)
 
 
 def _print(found: dict[str, Any]) -> None:
@@ -122,6 +147,13 @@ def _print(found: dict[str, Any]) -> None:
         click.echo(
             f"held-out tests, where rightly named: {over[1]:.2f} of what is predicted ({over[0]:.2f} to {over[2]:.2f}; "
             f"{inside['hits']} of {inside['count']} between 0.8 and 1.3), {gain[1]:.1f} times less than before"
+        )
+    if used := found["cost"]:
+        memory = used["memory_mb_greatest"]
+        click.echo(
+            f"a diagnosis took {used['processor_s_mean']:.0f} s of processor time, {used['processor_s_greatest']:.0f} s at the most"
+            + (f"; memory {memory:.0f} MB at the most" if memory else "")
+            + f"; all of them {used['processor_h']:.2g} hours"
         )
     if found["failures"]:
         click.echo("\nwhat went wrong, worst first:")

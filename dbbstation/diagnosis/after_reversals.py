@@ -1,0 +1,83 @@
+"""Whether what is left is larger just after one strut turns round: a strut that rings, where no listed cause is at work."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.louder import louder
+from dbbstation.machine.geometry import STRUTS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.shapes import Samples
+
+WITHIN_S = (0.5, 1.0, 2.0, 4.0)
+"""Times after a reversal that are looked at [s]: what a drive's control or its mounting oscillates for."""
+
+FEWEST_ROWS = 4
+"""Samples of such a stretch, at the least: an oscillation of two samples is no more than noise."""
+
+
+@dataclass(frozen=True)
+class AfterReversals:
+    """What is left just after a strut turns round.
+
+    Attributes:
+        strut: 1 to 6.
+        within_s: time after the reversal [s].
+        probability: that noise which is the same everywhere is as much larger there, over all struts and times.
+        rms_um: of the readings there [µm].
+        elsewhere_um: of the readings elsewhere [µm].
+        beyond_um: what is there beyond what is elsewhere [µm].
+    """
+
+    strut: int
+    within_s: float
+    probability: float
+    rms_um: float
+    elsewhere_um: float
+    beyond_um: float
+
+    @property
+    def text(self) -> str:
+        """Two sentences for people."""
+        return (
+            f"What is left is larger just after strut {self.strut} turns round: {self.rms_um:.2g} µm rms within {self.within_s:g} s, "
+            f"{self.elsewhere_um:.2g} µm elsewhere. A strut that rings does that; noise that is the same everywhere does not."
+        )
+
+
+def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[NDArray[np.float64]]) -> AfterReversals | None:
+    """The strut whose reversals what is left follows most; None where there are too few of them.
+
+    Args:
+        runs: that are paths, as shapes see them.
+        residual_mm: what a fit leaves of each, shape (n,) [mm].
+    """
+    if not all({"time", "strut-speed-sign"} <= run.values.keys() for run in runs):
+        return None
+    apart_s = float(np.median(np.concatenate([np.diff(run.values["time"]) for run in runs])))
+    found: list[AfterReversals] = []
+    lengths = [(within_s, round(within_s / apart_s)) for within_s in WITHIN_S]
+    lengths = [(within_s, rows) for within_s, rows in lengths if rows >= FEWEST_ROWS]
+    for strut in range(1, STRUTS + 1):
+        begins = [_reversals(run.values["strut-speed-sign"][:, strut - 1]) for run in runs]
+        for within_s, rows in lengths:
+            one = louder(residual_mm, begins, rows)
+            if one is not None:
+                chance = min(1.0, one.probability * STRUTS * len(lengths))
+                sizes_um = 1e3 * one.rms, 1e3 * one.elsewhere, 1e3 * one.beyond
+                found.append(AfterReversals(strut, within_s, chance, *sizes_um))
+    return min(found, key=lambda one: (one.probability, -one.beyond_um), default=None)
+
+
+def _reversals(sign: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Rows in which a strut first moves the other way than before, shape (k,)."""
+    moving = np.flatnonzero(sign)
+    return moving[1:][np.diff(sign[moving]) != 0.0]

@@ -1,0 +1,65 @@
+"""A strut that rings after it turns round lies above the harmonics that a model is asked for: it must not pass for noise."""
+
+from __future__ import annotations
+
+import pytest
+
+from dbbstation.calibration.fit.calibrate import calibrate
+from dbbstation.diagnosis.after_reversals import after_reversals
+from dbbstation.diagnosis.shapes import samples_of
+from dbbstation.diagnosis.thinned import thinned
+from dbbstation.tasks.diagnose import diagnose_sessions
+from dbbstation.tasks.load import load_sessions
+from tests.plant.mechanisms.disturbances import BumpedJig, RingingStrut
+from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.noise import Noise
+from tests.plant.session import record
+
+KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
+REMEMBERING = Noise(white_um=0.3, correlated_um=0.24, correlation=0.6)
+
+
+def looked_at(folder):
+    """What a kinematic calibration leaves after reversals."""
+    recorded = load_sessions([folder])
+    runs = [thinned(one) for one in recorded.observations]
+    fit = calibrate(recorded.machine, runs)
+    motions = [one.motion() for one in runs]
+    return after_reversals([samples_of(m, recorded.machine, fit.model.bar(m)) for m in motions], fit.residual_mm)
+
+
+@pytest.mark.parametrize(
+    "ringing",
+    [RingingStrut(strut=2), RingingStrut(strut=5, height_um=3.0, period_s=0.3, decay_s=0.6)],
+    ids=["slow", "quick"],
+)
+def test_a_strut_that_rings_is_located(tmp_path, ringing):
+    record(tmp_path / "s", seed=31, mechanisms=[KINEMATICS, ringing], rate_hz=25.0)
+    found = looked_at(tmp_path / "s")
+    assert found.strut == ringing.strut
+    assert found.probability < 1e-8
+    assert found.beyond_um > 0.5
+
+
+def test_noise_alone_follows_no_reversal(tmp_path):
+    record(tmp_path / "s", seed=32, mechanisms=[KINEMATICS], rate_hz=10.0, noise=REMEMBERING)
+    assert looked_at(tmp_path / "s").probability > 0.01
+
+
+@pytest.mark.slow
+def test_nothing_is_left_is_not_said_of_a_strut_that_rings(tmp_path):
+    record(tmp_path / "s", seed=33, mechanisms=[KINEMATICS, RingingStrut(strut=2)], rate_hz=10.0)
+    summary = diagnose_sessions([tmp_path / "s"], ["gravity"], (), lambda _: None).summary()
+    assert summary["mismatch"] is True
+    assert (summary["unexplained"]["strut"], summary["unexplained"]["variable"]) == (2, "time since a reversal")
+    assert "Nothing is left" not in summary["unexplained"]["text"]
+
+
+@pytest.mark.slow
+def test_a_bump_between_tests_that_balls_hide_is_not_ruled_out(tmp_path):
+    """Balls that scatter by a micrometre hide a shift of all later tests; one between the directions of a test shows."""
+    record(tmp_path / "s", seed=1510, mechanisms=[KINEMATICS, BumpedJig(from_run=14)], rate_hz=10.0)
+    summary = diagnose_sessions([tmp_path / "s"], ["jig-bump"], (), lambda _: None).summary()
+    (bump,) = summary["sources"]
+    assert bump["verdict"] == "not-testable"
+    assert "after_runs" in bump["text"]

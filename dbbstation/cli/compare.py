@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
-from dbbstation.cli.effects import parts_with_gain
+from dbbstation.cli.effects import cancelling_text, parts_with_gain
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.output import echo
 
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 @click.argument("a", type=click.Path(path_type=Path), metavar="A")
 @click.argument("b", type=click.Path(path_type=Path), metavar="B")
 @chosen_tests_options
+@click.option(
+    "--no-held-out", is_flag=True, help="Leave out the held-out tests: causes are then not asked to predict others."
+)
 @figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -29,6 +32,7 @@ def compare(
     *,
     tests: tuple[str, ...],
     exclude: tuple[str, ...],
+    no_held_out: bool,
     figure: Path | None,
     force: bool,
     as_json: bool,
@@ -59,6 +63,7 @@ def compare(
             b,
             tests=tests,
             exclude=exclude,
+            hold_out=not no_held_out,
             progress=progress,
             say=lambda text: say(f"note: {text}"),
         )
@@ -155,6 +160,8 @@ def _print_causes(result: ComparisonResult) -> None:
             if cause.text:
                 echo(f"{cause.name}: {cause.text}")
         echo(f"\nin short: {result.organised_text}")
+        if result.cancelling:
+            echo(cancelling_text(result.cancelling))
         held = result.held_out_rms_um
         echo(f"held-out tests: {held.before:.2f} -> {held.after:.2f} µm rms, once their balls and bars have settled")
     echo(f"\n{result.left.text}")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
+from dbbstation.cli.effects import cancelling_text
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Keep an unmodelled effect in that model, as a curve over strut length or force: compensated, cause unknown.",
 )
+@click.option(
+    "--no-held-out", is_flag=True, help="Leave out the held-out tests: causes are then not asked to predict others."
+)
 @figure_option()
 @click.option(
     "--effects",
@@ -46,6 +50,7 @@ def diagnose(
     exclude: tuple[str, ...],
     out: Path | None,
     keep_unexplained: bool,
+    no_held_out: bool,
     figure: Path | None,
     effects: bool,
     force: bool,
@@ -90,6 +95,7 @@ def diagnose(
             tests=tests,
             exclude=exclude,
             keep_unexplained=keep_unexplained,
+            hold_out=not no_held_out,
             known=every_source(source_files),
             progress=progress,
             say=lambda text: say(f"note: {text}"),
@@ -119,6 +125,8 @@ def _print(result: DiagnosisFigures) -> None:
     for outlier in result.outliers:
         echo(f"outlier, kept out of the fits: {outlier.text}")
     _print_sources(result.sources)
+    if result.cancelling:
+        echo(f"\n{cancelling_text(result.cancelling)}")
     if result.locations:
         echo("\nlargest misfit of the kinematic calibration:")
         for location in result.locations[:5]:
@@ -222,7 +230,7 @@ def _print_gain(result: DiagnosisFigures) -> None:
     echo(f"\nresidual within mountings {residual.before:.2f} -> {residual.after:.2f} µm rms")
     normalised = result.held_out_normalised
     if result.held_out == "not-tested" and any(source.verdict == "identified" for source in result.sources):
-        echo("too few tests to hold some back: whether what is identified predicts others was not tested")
+        echo("no tests were held back: whether what is identified predicts others was not tested")
     if max(held_out.before, held_out.after) > UNPREDICTABLE_UM:
         echo("held-out tests cannot be predicted: the other tests are too few to identify the machine")
     else:

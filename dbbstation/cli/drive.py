@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.effects import cancelling_text
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
@@ -130,6 +131,11 @@ def _print(result: DriveResult) -> None:
     if result.locations:
         echo("\nwhere the misfit of mass and viscous friction is largest:")
         _print_locations(result.locations)
+    _print_rest(result)
+
+
+def _print_rest(result: DriveResult) -> None:
+    """Print what has no name, what cancels, what cannot be told, and the band."""
     echo("\n" + result.unexplained.text)
     if result.unexplained.significant:
         for effect in result.unexplained.effects[:3]:
@@ -139,6 +145,8 @@ def _print(result: DriveResult) -> None:
             )
         echo(f"It is {result.unexplained.rms_n:.2g} N rms; largest:")
         _print_locations(result.unexplained.locations[:3])
+    if result.cancelling:
+        echo(cancelling_text(result.cancelling))
     for sentence in result.cannot_tell:
         echo(sentence)
     signals = result.signals

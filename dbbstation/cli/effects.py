@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.inference import HeldOutGains, ResidualResult
+    from dbbstation.results.inference import CancellingResult, HeldOutGains, ResidualResult
     from dbbstation.results.serialise import Quantified
 
 SURELY_FOUND = ("identified", "happened", "does-not-predict")
@@ -41,6 +41,12 @@ def parts_with_gain(gains: HeldOutGains | None, *, acts: str = "always") -> str:
         acts: `always` or `once`.
     """
     return gains.counted if gains is not None and acts == "always" else ""
+
+
+def cancelling_text(cancelling: CancellingResult) -> str:
+    """Return which effects cancel each other, as a sentence."""
+    parts = ", ".join(f"{name} {rms:.2g}" for name, rms in cancelling.rms.items())
+    return f"Effects cancel each other: {parts}, together {cancelling.rms_of_sum:.2g} {cancelling.unit} rms."
 
 
 def residual_text(left: ResidualResult, unit: str) -> str:

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from dbbstation.cli.effects import LIKELY, SURELY_FOUND, first_names, parts_with_gain, residual_text, with_uncertainty
+from dbbstation.cli.effects import (
+    LIKELY,
+    SURELY_FOUND,
+    cancelling_text,
+    first_names,
+    parts_with_gain,
+    residual_text,
+    with_uncertainty,
+)
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.number_options import number_language, number_options
 from dbbstation.cli.output import echo
@@ -227,7 +235,8 @@ def _print(result: MismatchResult) -> None:
     if there:
         echo()
         _print_findings(there, unit)
-    _print_cancelling(result)
+    if result.cancelling:
+        echo(f"\n{cancelling_text(result.cancelling)}")
     _print_parameters(result)
     if held_out:
         echo(
@@ -314,13 +323,6 @@ MOST_TOLD = 12
 
 MOST_VALUES = 6
 """Values of an effect that are printed; those of a curve say little by themselves, and are in the JSON."""
-
-
-def _print_cancelling(result: MismatchResult) -> None:
-    cancelling, unit = result.cancelling, result.unit
-    if cancelling:
-        parts = ", ".join(f"{name} {rms:.2g}" for name, rms in cancelling.rms.items())
-        echo(f"\nEffects cancel each other: {parts}, together {cancelling.rms_of_sum:.2g} {unit} rms.")
 
 
 def _print_parameters(result: MismatchResult) -> None:

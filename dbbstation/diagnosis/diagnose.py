@@ -26,6 +26,7 @@ from dbbstation.diagnosis.verdicts import judge
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN
+from dbbstation.inference.cancelling import cancelling
 from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.by_temperature import not_given
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.explained import Explained, SettledCircles
     from dbbstation.diagnosis.findings import SourceFinding
+    from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.remainder import Remainder
     from dbbstation.machine.geometry import Machine
@@ -51,6 +53,8 @@ def diagnose(
     observations: Sequence[Observation],
     sources: Sequence[ErrorSource],
     progress: Callable[[str], None] = lambda _: None,
+    *,
+    hold_out: bool = True,
 ) -> Diagnosis:
     """Find what a kinematic calibration leaves out, by the probabilities of sets of causes; see docs/decisions/0019.
 
@@ -60,6 +64,7 @@ def diagnose(
         sources: named candidates, several forms of one cause under one name; those that lack what they need are left out
             by the caller.
         progress: told what is being done.
+        hold_out: choose everything anew without each group of tests, which asks whether causes predict others.
 
     Raises:
         CalibrationError: the base model cannot be fitted.
@@ -71,7 +76,7 @@ def diagnose(
     progress("verdicts")
     explained, findings = judged(explained)
     progress("held-out tests")
-    anew = without_tests(explained)
+    anew = without_tests(explained) if hold_out else None
     explained = _widened(explained)
     findings = judge(explained, anew)
     settled, before, outliers = explained.settled, explained.before, explained.outliers
@@ -99,8 +104,21 @@ def diagnose(
         unexplained=with_exact_wave(rest, after),
         shifts=shifts_between(before, after),
         second_start_agrees=settled.second_start_agrees(),
+        cancelling=_cancelling(explained),
         next_tests=() if settled.at_limit else next_tests(explained, findings, elsewhere),
     )
+
+
+def _cancelling(explained: Explained) -> Cancelling | None:
+    """Named causes whose effects on the readings cancel each other."""
+    settled, samples = explained.settled, explained.channel.columns.samples
+    values = settled.comparison.estimates(settled.best.members).values if settled.best.members else np.zeros(0)
+    effects = {}
+    for member in settled.best.members:
+        own, values = values[: len(member.columns)], values[len(member.columns) :]
+        if member.cause.named:
+            effects[member.cause.name] = samples[:, member.columns] @ own
+    return cancelling(effects)
 
 
 def _widened(explained: Explained) -> Explained:

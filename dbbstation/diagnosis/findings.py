@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.shapes import Follows
     from dbbstation.diagnosis.workspace import WorkspaceError
+    from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.held_out import HeldOut
@@ -241,6 +242,7 @@ class Diagnosis:
         shifts: largest first.
         second_start_agrees: a second search came to the same set of causes; None where the comparison ended at its limit.
         next_tests: best first, each beside those before it; empty where nothing is to be asked.
+        cancelling: effects of named causes on the readings that cancel each other [mm]; None where none do.
     """
 
     mismatch: bool
@@ -258,3 +260,4 @@ class Diagnosis:
     shifts: tuple[Shift, ...]
     second_start_agrees: bool | None
     next_tests: tuple[NextTest, ...]
+    cancelling: Cancelling | None = None

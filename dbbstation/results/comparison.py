@@ -10,7 +10,7 @@ from pydantic import Field
 
 from dbbstation.results.diagnosis import BeforeAfter
 from dbbstation.results.frame import Framed
-from dbbstation.results.inference import HeldOutGains
+from dbbstation.results.inference import CancellingResult, HeldOutGains
 from dbbstation.results.serialise import Quantified
 
 
@@ -119,6 +119,7 @@ class ComparedCause:
         verdict: one of the six words of docs/verdicts.md.
         acts: `always` or `once`.
         persists: it happened once, and other tests tell of it, too.
+        recurs: a wave over the time that other tests foretell.
         gains: in tests that did not choose it; None where these were not asked for.
         probability: that it is there.
         log_evidence: log Bayes factor.
@@ -140,6 +141,7 @@ class ComparedCause:
     verdict: str
     acts: str
     persists: bool
+    recurs: bool
     gains: HeldOutGains | None
     probability: float
     log_evidence: float
@@ -223,6 +225,7 @@ class ComparisonResult(Framed):
         held_out_rms_um: errors of tests that took no part [µm].
         runs: largest difference first.
         directions: parts that are alike and opposite; None where only one direction was measured.
+        cancelling: effects that cancel each other; None where none do.
         organised_text: what was found, in short.
         causes: those that are there first.
         left: the residual.
@@ -249,6 +252,7 @@ class ComparisonResult(Framed):
     held_out_rms_um: BeforeAfter
     runs: tuple[ComparedRun, ...]
     directions: DirectionHalves | None
+    cancelling: CancellingResult | None
     organised_text: str
     causes: tuple[ComparedCause | CauseNotAsked, ...]
     left: ComparisonResidual

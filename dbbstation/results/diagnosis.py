@@ -12,7 +12,7 @@ from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.calibration import OutlierResult
 from dbbstation.results.effects import CauseContribution
 from dbbstation.results.frame import Framed
-from dbbstation.results.inference import HeldOutGains
+from dbbstation.results.inference import CancellingResult, HeldOutGains
 from dbbstation.results.serialise import Absent, AsItIs, Kept, Quantified
 
 
@@ -286,6 +286,7 @@ class DiagnosisFigures(Framed):
         outliers: kept out of the fits.
         locations: where the misfit is, the largest first.
         sources: what was found of every cause.
+        cancelling: effects of named causes on the readings that cancel each other; None where none do.
         unexplained: the unmodelled residual.
         parameter_shift: bias of the kinematic calibration, the largest first.
         second_start_agrees: whether a second search came to the same causes; None where there was none.
@@ -307,6 +308,7 @@ class DiagnosisFigures(Framed):
     outliers: tuple[OutlierResult, ...]
     locations: tuple[MisfitLocation, ...]
     sources: tuple[CauseResult, ...]
+    cancelling: CancellingResult | None
     unexplained: UnexplainedResult
     parameter_shift: tuple[ParameterShift, ...]
     second_start_agrees: bool | None

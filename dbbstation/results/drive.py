@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from dbbstation.results.frame import Framed
+from dbbstation.results.inference import CancellingResult, HeldOutGains
 from dbbstation.results.serialise import Absent, AsItIs, Kept, Quantified
 
 
@@ -152,19 +153,6 @@ class ComplementResult:
     t_s: tuple[tuple[float, float], ...]
 
 
-@dataclass(frozen=True)
-class PartsWithGain:
-    """In how many held-out parts a cause gains.
-
-    Attributes:
-        with_gain: that many.
-        predicts: whether that counts as a prediction.
-    """
-
-    with_gain: int
-    predicts: bool
-
-
 @dataclass(frozen=True, kw_only=True)
 class DriveCause:
     """What was found of one cause.
@@ -182,7 +170,9 @@ class DriveCause:
         parts: where it is there more than once.
         at_end: names of numbers at the end of the values that are tried.
         complement: what explains as much in the place of pulses; None where nothing does.
-        gains: in held-out parts; None where these were not asked for.
+        acts: `always` or `once`.
+        persists: it happened once, and held-out parts tell of it, too.
+        gains: in held-out parts [N²]; None where these were not asked for.
         text: in words.
     """
 
@@ -198,7 +188,9 @@ class DriveCause:
     parts: tuple[CausePart, ...]
     at_end: tuple[str, ...]
     complement: ComplementResult | None
-    gains: PartsWithGain | None
+    acts: str
+    persists: bool
+    gains: HeldOutGains | None
     text: str
 
 
@@ -312,6 +304,7 @@ class DriveResult(Framed):
         locations: where the misfit is large.
         sources: causes, those that are there first.
         unexplained: the residual.
+        cancelling: forces that cancel each other; None where none do.
         cannot_tell: what these recordings cannot tell, a sentence each.
         held_out: `tested` or `not-tested`.
         held_out_rms_n: errors of held-out parts; None where not tested.
@@ -335,6 +328,7 @@ class DriveResult(Framed):
     locations: tuple[ForceLocation, ...]
     sources: tuple[DriveCause, ...]
     unexplained: UnexplainedForces
+    cancelling: CancellingResult | None
     cannot_tell: tuple[str, ...]
     held_out: str
     held_out_rms_n: HeldOutForce | None

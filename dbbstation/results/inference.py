@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.results.serialise import Quantified
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
+    from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.read_off import Span
     from dbbstation.inference.verdict import Gains, Value
@@ -36,6 +36,21 @@ class HeldOutGains:
     def counted(self) -> str:
         """In how many parts of how many it gains, as tables print it."""
         return f"{self.with_gain} of {len(self.parts)}"
+
+
+@dataclass(frozen=True)
+class CancellingResult:
+    """Effects that are each larger than all together.
+
+    Attributes:
+        rms: of each about its mean, by name.
+        rms_of_sum: of all together.
+        unit: of both.
+    """
+
+    rms: Mapping[str, float]
+    rms_of_sum: float
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -110,6 +125,19 @@ def all_quantified(values: Mapping[str, Value]) -> dict[str, Quantified]:
 def gains_result(gains: Gains | None) -> HeldOutGains | None:
     """Return gains in held-out parts; None where these were not asked for."""
     return None if gains is None else HeldOutGains(gains.parts, gains.with_gain, gains.total, gains.predicts)
+
+
+def cancelling_result(found: Cancelling | None, unit: str, scale: float = 1.0) -> CancellingResult | None:
+    """Return effects that cancel each other; None where none do.
+
+    Args:
+        found: the effects, in the unit of the residual.
+        unit: that they are given in.
+        scale: this many of it are one of the residual's.
+    """
+    if found is None:
+        return None
+    return CancellingResult({name: scale * rms for name, rms in found.rms.items()}, scale * found.rms_of_sum, unit)
 
 
 def span_result(span: Span) -> EffectSpan:

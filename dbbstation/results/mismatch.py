@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from dbbstation.results.frame import Framed
-from dbbstation.results.inference import EffectSpan, HeldOutGains, ResidualResult
+from dbbstation.results.inference import CancellingResult, EffectSpan, HeldOutGains, ResidualResult
 from dbbstation.results.serialise import Absent, AsItIs, Kept, Quantified
 
 
@@ -132,19 +132,6 @@ class HeldOutRms:
     after: float
     worse: bool
     folds: tuple[HeldOutPart, ...]
-
-
-@dataclass(frozen=True)
-class CancellingResult:
-    """Effects that are each larger than all together.
-
-    Attributes:
-        rms: of each about its mean, by name, in the unit of the table.
-        rms_of_sum: of all together.
-    """
-
-    rms: Mapping[str, float]
-    rms_of_sum: float
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from dbbstation.results.comparison import (
     VariableSpan,
 )
 from dbbstation.results.diagnosis import BeforeAfter
-from dbbstation.results.inference import all_quantified, gains_result
+from dbbstation.results.inference import all_quantified, cancelling_result, gains_result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -68,6 +68,7 @@ def comparison_result(
         held_out_rms_um=BeforeAfter(1e3 * before.rms, 1e3 * after.rms),
         runs=tuple(_run(run) for run in largest_first),
         directions=None if halves is None else DirectionHalves(1e3 * halves[0], 1e3 * halves[1]),
+        cancelling=cancelling_result(found.cancelling, "µm", 1e3),
         organised_text=organised_text(found),
         causes=(
             *(_cause(found, finding) for finding in found.there),
@@ -102,6 +103,7 @@ def _cause(found: Comparison, finding: CauseFinding) -> ComparedCause:
         verdict=str(finding.verdict),
         acts=finding.acts.name.lower(),
         persists=finding.persists,
+        recurs=finding.recurs,
         gains=gains_result(finding.gains),
         probability=finding.probability,
         log_evidence=finding.log_factor,

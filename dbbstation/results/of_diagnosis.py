@@ -23,7 +23,7 @@ from dbbstation.results.diagnosis import (
     UnexplainedResult,
     WorkspaceGain,
 )
-from dbbstation.results.inference import gains_result
+from dbbstation.results.inference import cancelling_result, gains_result
 from dbbstation.results.of_calibration import outlier_result
 from dbbstation.results.serialise import Quantified
 from dbbstation.trace.analysis import figures
@@ -65,6 +65,7 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
             *(_cause(source) for source in diagnosis.sources),
             *(CauseResult(name=name, verdict=str(Verdict.NOT_TESTABLE), text=why) for name, why in lacking.items()),
         ),
+        cancelling=cancelling_result(diagnosis.cancelling, "µm", 1e3),
         unexplained=UnexplainedResult(
             rms_um=rest.rms_um,
             strut=rest.strut,

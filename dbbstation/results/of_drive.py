@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.drive.naming import acts
 from dbbstation.inference.left_over import SIGNIFICANT
 from dbbstation.results.drive import (
     CausePart,
@@ -20,12 +21,11 @@ from dbbstation.results.drive import (
     HeldOutForce,
     ModelStep,
     ParameterBias,
-    PartsWithGain,
     SignalsResult,
     UnexplainedForce,
     UnexplainedForces,
 )
-from dbbstation.results.inference import all_quantified, finite, quantified
+from dbbstation.results.inference import all_quantified, cancelling_result, finite, gains_result, quantified
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -72,6 +72,7 @@ def drive_result(diagnosis: DriveDiagnosis, drawing: Callable[[object], bytes] |
             ),
             locations=tuple(_location(location, rest.variable or "") for location in diagnosis.rest_locations),
         ),
+        cancelling=cancelling_result(diagnosis.cancelling, "N"),
         cannot_tell=tuple(diagnosis.cannot_tell),
         held_out="not-tested" if diagnosis.held_out is None else "tested",
         held_out_rms_n=_held_out(diagnosis.held_out),
@@ -137,7 +138,7 @@ def _location(location: DriveLocation, variable: str) -> ForceLocation:
 
 
 def _cause(finding: DriveFinding) -> DriveCause:
-    complement, gains = finding.complement, finding.gains
+    complement = finding.complement
     return DriveCause(
         name=finding.name,
         verdict=str(finding.verdict),
@@ -155,7 +156,9 @@ def _cause(finding: DriveFinding) -> DriveCause:
         else ComplementResult(
             quantified(complement.force_n), tuple((stretch[0], stretch[1]) for stretch in complement.t_s)
         ),
-        gains=None if gains is None else PartsWithGain(gains.with_gain, gains.predicts),
+        acts=acts(finding.name).name.lower(),
+        persists=finding.persists,
+        gains=gains_result(finding.gains),
         text=finding.text,
     )
 

@@ -7,9 +7,15 @@ from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.diagnosis.table.words import sentence_of
-from dbbstation.results.inference import all_quantified, gains_result, quantified, residual_result, span_result
+from dbbstation.results.inference import (
+    all_quantified,
+    cancelling_result,
+    gains_result,
+    quantified,
+    residual_result,
+    span_result,
+)
 from dbbstation.results.mismatch import (
-    CancellingResult,
     EffectResult,
     HeldOutPart,
     HeldOutRms,
@@ -61,9 +67,7 @@ def mismatch_result(
         residual_rms=ResidualRms(found.rms_before, found.rms_after),
         held_out="not-tested" if found.held_out is None else "tested",
         held_out_rms=_held_out(found),
-        cancelling=None
-        if found.cancelling is None
-        else CancellingResult(found.cancelling.rms, found.cancelling.rms_of_sum),
+        cancelling=cancelling_result(found.cancelling, compared.unit),
         led_by=tuple(VariableShare(s.variable, s.rms, s.share, s.lost, s.terms) for s in found.shares),
         findings=tuple(_effect(found, finding) for finding in found.findings),
         parameters=tuple(_parameter(one) for one in found.fitted),

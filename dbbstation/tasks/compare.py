@@ -34,6 +34,7 @@ def compare(
     *,
     tests: Sequence[str] = (),
     exclude: Sequence[str] = (),
+    hold_out: bool = True,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
@@ -45,6 +46,7 @@ def compare(
         b: session folder.
         tests: names of tests to take; empty for all.
         exclude: names of tests to leave out.
+        hold_out: choose everything anew without each group of tests, which asks whether causes predict others.
         progress: told each stage.
         stop: asked at each stage whether to stop.
         say: told what is noticed in the files.
@@ -66,7 +68,9 @@ def compare(
         telling.note(*(f"{name}: {warning}" for warning in recorded.warnings))
     candidates = sources_named(default_candidates(known_sources()))
     usable, lacking = usable_sources(one.machine, [*one.observations, *other.observations], candidates)
-    found = put_side_by_side(one.machine, one.observations, other.observations, usable, lacking, telling.stage)
+    found = put_side_by_side(
+        one.machine, one.observations, other.observations, usable, lacking, telling.stage, hold_out=hold_out
+    )
     return comparison_result(
         found,
         notes_of(one.machine, other.machine, found.matching.pairs),

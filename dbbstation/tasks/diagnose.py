@@ -121,6 +121,7 @@ def diagnose(
     tests: Sequence[str] = (),
     exclude: Sequence[str] = (),
     keep_unexplained: bool = False,
+    hold_out: bool = True,
     known: Mapping[str, ErrorSource] | None = None,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
@@ -133,6 +134,7 @@ def diagnose(
         sources: names of the error sources to compare; None: all.
         tests: names of tests to take; empty for all.
         exclude: names of tests to leave out.
+        hold_out: choose everything anew without each group of tests, which asks whether causes predict others.
         keep_unexplained: keep an unmodelled effect in the model, as a curve: compensated, cause unknown.
         known: every error source by name; None: the package's and those of installed packages.
         progress: told each stage as it begins.
@@ -150,7 +152,7 @@ def diagnose(
     """
     telling = Telling(progress, stop, say)
     every = every_source() if known is None else known
-    diagnosed = _diagnosed(sessions, sources, (tuple(tests), tuple(exclude)), every, telling)
+    diagnosed = _diagnosed(sessions, sources, (tuple(tests), tuple(exclude)), every, telling, hold_out=hold_out)
     found = diagnosed.diagnosis
     unnamed = _kept(found, telling) if keep_unexplained else None
     fit = found.after if unnamed is None else unnamed.fit
@@ -177,6 +179,8 @@ def _diagnosed(
     chosen: tuple[Sequence[str], Sequence[str]],
     known: Mapping[str, ErrorSource],
     telling: Telling,
+    *,
+    hold_out: bool = True,
 ) -> Diagnosed:
     """Read and diagnose; `chosen` are tests to take and to leave out."""
     named = sources_named(default_candidates(known) if candidates is None else candidates, known)
@@ -186,7 +190,7 @@ def _diagnosed(
             raise ModelError(what, remedy="leave it out; --keep-unexplained keeps what is left")
     recorded = loaded(sessions, *chosen, telling)
     usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
-    found = search.diagnose(recorded.machine, recorded.observations, usable, telling.stage)
+    found = search.diagnose(recorded.machine, recorded.observations, usable, telling.stage, hold_out=hold_out)
     return Diagnosed(recorded, found, lacking)
 
 

@@ -21,6 +21,7 @@ from dbbstation.diagnosis.compare.left_out import predicted, tried_without_tests
 from dbbstation.diagnosis.compare.pairs import match
 from dbbstation.diagnosis.compare.sides import Sides
 from dbbstation.errors import TraceError
+from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.harmonics import bands, basis, coefficients
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.read_off import read_off
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.compare.details import EffectOfCause
     from dbbstation.diagnosis.compare.pairs import Matching, Pair
+    from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.read_off import CauseFinding, Trial
@@ -150,6 +152,11 @@ class Comparison:
         return _rms(np.concatenate([run.smooth_mm for run in self.runs]))
 
     @property
+    def cancelling(self) -> Cancelling | None:
+        """Effects that cancel each other [mm]; None where none do."""
+        return cancelling(effects_by_name(self.settled))
+
+    @property
     def noise_mm(self) -> float:
         """What noise leaves in the smooth differences, root mean square [mm]."""
         return self.runs[0].noise_mm
@@ -178,6 +185,8 @@ def compare(
     sources: Sequence[ErrorSource] = (),
     lacking: Mapping[str, str] | None = None,
     progress: Callable[[str], None] = lambda _: None,
+    *,
+    hold_out: bool = True,
 ) -> Comparison:
     """Compare two sessions.
 
@@ -188,6 +197,7 @@ def compare(
         sources: named candidates beside the geometry of the machine; those that lack what they need are left out by the caller.
         lacking: error sources that could not be asked, and why.
         progress: called with what is being done.
+        hold_out: choose everything anew without each group of tests.
 
     Raises:
         TraceError: no run in common; circles of one of them had their centres removed.
@@ -199,7 +209,7 @@ def compare(
     sides = Sides.of(machine, matching.pairs)
     settled = settle(channel_of(sides, sources), in_time=False, rivals=False, progress=progress)
     progress("held-out tests")
-    trial = tried_without_tests(sides, settled)
+    trial = tried_without_tests(sides, settled, hold_out=hold_out)
     return Comparison(
         matching=matching,
         settled=settled,

@@ -26,8 +26,14 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 
-def tried_without_tests(sides: Sides, settled: Settled) -> Trial:
-    """Hold back groups of tests in turn; nothing is said where nothing was found, or there are fewer than `LEAST_PARTS` groups."""
+def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> Trial:
+    """Hold back groups of tests in turn; nothing is said where nothing was found, or there are fewer than `LEAST_PARTS` groups.
+
+    Args:
+        sides: the sessions.
+        settled: what the comparison came to.
+        hold_out: choose everything anew without each group; False: only how values move without it is asked.
+    """
     groups = in_turn([pair.test for pair in sides.pairs], FOLDS)
     parts = []
     for group in range(max(groups) + 1):
@@ -37,7 +43,7 @@ def tried_without_tests(sides: Sides, settled: Settled) -> Trial:
         parts.append(rows)
     if len(parts) < LEAST_PARTS or not settled.best.members:
         return Trial()
-    return Trial(_chosen_anew(settled, parts), refits_without(settled, parts))
+    return Trial(_chosen_anew(settled, parts) if hold_out else None, refits_without(settled, parts))
 
 
 def _chosen_anew(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> ChosenAnew:

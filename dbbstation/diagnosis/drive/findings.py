@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.diagnosis.drive.naming import source_of
+from dbbstation.inference.cancelling import cancelling, effects_by_name
+from dbbstation.inference.verdict import Verdict
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -12,7 +16,8 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.held_out import DriveHeldOut
     from dbbstation.diagnosis.drive.recordings import Recordings
-    from dbbstation.inference.verdict import Gains, Value, Verdict
+    from dbbstation.inference.cancelling import Cancelling
+    from dbbstation.inference.verdict import Gains, Value
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,11 @@ class DriveFinding:
     at_end: tuple[str, ...] = ()
     complement: Complement | None = None
     gains: Gains | None = None
+
+    @property
+    def persists(self) -> bool:
+        """Whether it happened once, such as friction that drifts, and held-out parts tell of it, too."""
+        return self.verdict is Verdict.HAPPENED and self.gains is not None and self.gains.predicts
 
 
 @dataclass(frozen=True)
@@ -248,6 +258,16 @@ class DriveDiagnosis:
     def force_n(self) -> NDArray[np.float64]:
         """In the band, shape (m,) [N]."""
         return self.recordings.force_n
+
+    @property
+    def cancelling(self) -> Cancelling | None:
+        """Forces of mass, friction and causes that cancel each other [N]; None where none do."""
+        settled, drive = self.explained.settled, self.explained.drive
+        base, patterns = settled.channel.base, settled.bank.patterns
+        shown = {name: source_of(drive, patterns, name) for name in settled.best.names}
+        forces = zip(base.names, settled.base_values(), strict=True)
+        of_base = {name: base.samples[:, k] * value for k, (name, value) in enumerate(forces)}
+        return cancelling(effects_by_name(settled, shown) | of_base)
 
     def table(self) -> dict[str, NDArray[np.float64]]:
         """What was compared, sample by sample in the band, by column name with its unit."""

@@ -11,6 +11,7 @@ import numpy as np
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.folds import held_out_error, parts_of
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.table.contract import TableSource
     from dbbstation.diagnosis.table.data import Table
+    from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.left_over import LeftOver
@@ -88,19 +90,6 @@ class Share:
     share: float
     lost: float
     terms: int
-
-
-@dataclass(frozen=True)
-class Cancelling:
-    """Effects that cancel each other: each is larger than all together.
-
-    Attributes:
-        rms: of each about its mean, by name of effect or parameter, in the unit of the table.
-        rms_of_sum: of all effects and parameters together.
-    """
-
-    rms: dict[str, float]
-    rms_of_sum: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,21 +325,9 @@ def _followed(effect: NDArray[np.float64], columns: NDArray[np.float64]) -> floa
 
 def _cancelling(settled: Settled) -> Cancelling | None:
     """Effects and parameters larger than all together, where most of their squares cancel."""
-    effects = {name: settled.effect([name]) for name in sorted(settled.best.names)}
     base = settled.channel.base
-    effects |= {
-        n: base.samples[:, k] * v for k, (n, v) in enumerate(zip(base.names, settled.base_values(), strict=True))
-    }
-    rms = {name: _rms_about_mean(effect) for name, effect in effects.items()}
-    whole = _rms_about_mean(np.sum(list(effects.values()), axis=0)) if effects else 0.0
-    if whole >= MOST_CANCELS * float(np.sqrt(np.sum(np.square(list(rms.values()))))):
-        return None
-    return Cancelling({name: own for name, own in rms.items() if own > whole}, whole)
-
-
-MOST_CANCELS = 0.5
-"""Root mean square of all effects together, over the root of the sum of their mean squares, below which they cancel each other:
-three quarters of the squares are gone. Of effects that have nothing to do with each other it is one."""
+    parameters = zip(base.names, settled.base_values(), strict=True)
+    return cancelling(effects_by_name(settled) | {n: base.samples[:, k] * v for k, (n, v) in enumerate(parameters)})
 
 
 def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[RefittedParameter, ...]:

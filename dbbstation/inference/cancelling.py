@@ -1,0 +1,57 @@
+"""Effects that cancel each other: each is larger than all of them together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.settled import Settled
+
+MOST_CANCELS = 0.5
+"""Root mean square of all effects together, over the root of the sum of their mean squares, below which they cancel each other:
+three quarters of the squares are gone. Of effects that have nothing to do with each other it is one."""
+
+
+@dataclass(frozen=True)
+class Cancelling:
+    """Effects that cancel each other.
+
+    Attributes:
+        rms: root mean square of each about its mean, those that are larger than all together, in the unit of the residual.
+        rms_of_sum: the same of all together.
+    """
+
+    rms: dict[str, float]
+    rms_of_sum: float
+
+
+def cancelling(effects: Mapping[str, NDArray[np.float64]]) -> Cancelling | None:
+    """Effects larger than all together, where most of their squares cancel; None where they do not.
+
+    Args:
+        effects: by name, over all rows, shape (n,).
+    """
+    rms = {name: float(np.std(effect)) for name, effect in effects.items()}
+    whole = float(np.std(np.sum(list(effects.values()), axis=0))) if effects else 0.0
+    if whole >= MOST_CANCELS * float(np.sqrt(np.sum(np.square(list(rms.values()))))):
+        return None
+    return Cancelling({name: own for name, own in rms.items() if own > whole}, whole)
+
+
+def effects_by_name(settled: Settled, names: Mapping[str, str] | None = None) -> dict[str, NDArray[np.float64]]:
+    """Effects of the members of the best hypothesis, in order of their names, shape (n,) each.
+
+    Args:
+        settled: what a comparison came to.
+        names: by member, what it is shown as; members that are shown as one are added up. None: each as it is.
+    """
+    shown = {name: name if names is None else names.get(name) or name for name in settled.best.names}
+    groups = {of: [name for name in shown if shown[name] == of] for of in sorted(set(shown.values()))}
+    return {of: settled.effect(members) for of, members in groups.items()}

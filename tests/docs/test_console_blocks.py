@@ -273,6 +273,7 @@ def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys
             outliers=(),
             locations=(),
             sources=(source,),
+            cancelling=None,
             unexplained=UnexplainedResult(0.0, None, None, "Nothing is left beyond noise.", None),
             parameter_shift=(ParameterShift("joint", 0.0, 1.0, 1.0, 0.1),),
             second_start_agrees=True,

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.model_comparison import DIGITS
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
@@ -132,38 +131,28 @@ class Alternatives:
 def named_already(
     comparison: ModelComparison, nameless: Sequence[Cause], named: Iterable[tuple[Variant, float]]
 ) -> frozenset[str]:
-    """Unmodelled effects that a named cause has among its forms, with as many amplitudes, within what its formula may be off by.
+    """Unmodelled effects, of one amplitude, that a named cause has among its forms, within what its formula may be off by.
 
-    They are that cause and no hypothesis of their own: listed beside it they would share its probability. An effect is among the forms if
-    of each combination of its amplitudes at most that share is left beside the form.
+    They are that cause and no hypothesis of their own: listed beside it they would share its probability.
 
     Args:
         comparison: of columns.
         nameless: the unmodelled effects.
         named: forms of named causes, and by how much their formula may be off, as a share of the effect.
     """
-    listed = [(variant, share) for variant, share in named if share > 0.0]
-    found: set[str] = set()
-    for size in {len(variant.columns) for variant, _ in listed}:
-        columns = np.array([variant.columns for variant, _ in listed if len(variant.columns) == size])
-        shares = np.array([share for variant, share in listed if len(variant.columns) == size])
-        inverse = np.linalg.pinv(comparison.products(columns, columns), rcond=DIGITS, hermitian=True)
-        for cause in nameless:
-            effect = cause.variants[0]
-            if len(effect.columns) != size:
-                continue
-            own = _of_plausible_size(comparison.products(effect.columns, effect.columns), effect)
-            across = effect.plausible[:, None] * comparison.products(effect.columns[None, :], columns)
-            left = own - across @ inverse @ across.transpose(0, 2, 1)
-            # Of a combination that these rows do not show, such as a height beside level bars, nothing is left that counts: less than
-            # one standard deviation of the noise.
-            if (np.linalg.eigvalsh(left - shares[:, None, None] ** 2 * own)[:, -1] <= 1.0).any():
-                found.add(cause.name)
-    return frozenset(found)
-
-
-def _of_plausible_size(products: NDArray[np.float64], effect: Variant) -> NDArray[np.float64]:
-    return effect.plausible[:, None] * products * effect.plausible
+    forms = [(variant.columns[0], share) for variant, share in named if len(variant.columns) == 1 and share > 0.0]
+    single = [cause for cause in nameless if len(cause.variants[0].columns) == 1]
+    if not forms or not single:
+        return frozenset()
+    columns = np.array(
+        [*(int(cause.variants[0].columns[0]) for cause in single), *(int(column) for column, _ in forms)]
+    )
+    products = comparison.beside((), columns)
+    size = np.sqrt(np.maximum(np.diag(products), 1e-300))
+    cosine = np.abs(products[: len(single), len(single) :]) / np.outer(size[: len(single)], size[len(single) :])
+    apart = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+    inside = (apart <= [share for _, share in forms]).any(axis=1)
+    return frozenset(cause.name for cause, is_inside in zip(single, inside, strict=True) if is_inside)
 
 
 def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[Member]:

@@ -185,10 +185,6 @@ class ModelComparison:
         inverse = cho_solve((factor, True), np.eye(len(sd)))
         return Estimates(sd * values, sd[:, None] * inverse * sd)
 
-    def products(self, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Products of columns beside the base, shape (..., p, q), given their numbers, shapes (..., p) and (..., q)."""
-        return np.asarray(self._gram[one[..., :, None], other[..., None, :]])
-
     def beside(self, members: Sequence[Member], columns: NDArray[np.int64]) -> NDArray[np.float64]:
         """Products of columns among each other, base and members projected out under their priors, shape (p, p)."""
         own = self._gram[np.ix_(columns, columns)]

@@ -86,18 +86,3 @@ def test_an_effect_that_a_named_cause_has_among_its_forms_is_that_cause(rng) -> 
         )
         assert found == expected
     assert named_already(dense.comparison(), nameless, []) == frozenset()
-
-
-@pytest.mark.parametrize(("off", "unseen", "expected"), [(0.0, 1.0, True), (0.3, 1.0, False), (0.3, 1e-4, True)])
-def test_an_effect_of_several_amplitudes_is_a_named_cause_of_as_many_that_spans_the_same(
-    rng, off, unseen, expected
-) -> None:
-    """Sums and differences of two columns span what these do; a direction that is off counts only if these rows show it."""
-    effects = rng.normal(size=(60, 4))
-    effects[:, 1] *= unseen
-    effects[:, 2] = effects[:, 0] + effects[:, 1]
-    effects[:, 3] = effects[:, 0] - effects[:, 1] + off * unseen * rng.normal(size=60)
-    dense = Dense(np.zeros((60, 0)), effects, np.zeros(60), 0.1)
-    nameless = [cause("both", variant(2, 3), named=False)]
-    found = named_already(dense.comparison(), nameless, [(variant(0, 1), 0.05)])
-    assert ("both" in found) is expected

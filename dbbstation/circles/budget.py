@@ -90,7 +90,13 @@ class Budget:
 
 
 TOO_FEW = f"fewer than {FEWEST_SAMPLES} samples do not separate noise from form"
-"""Why a range of few samples has no uncertainty."""
+"""Why a figure of few samples has no uncertainty: nobody knows its noise."""
+
+NO_PLACE = "not absolute, because nobody knows where the ball stands"
+"""Why the centre about a ball that was put up under the spindle has no uncertainty."""
+
+NO_HEIGHT = "not absolute, because a raised bar does not tell the radius from the height of the tool tip"
+"""Why the radius of a raised bar has no uncertainty: a tip that is higher by dz makes it longer by dz tan e [cone of the bar]."""
 
 RANGES = (BudgetQuantity.G, BudgetQuantity.G_LS, BudgetQuantity.F_MAX, BudgetQuantity.F_MIN)
 """Figures of one circle that are extremes of its path."""
@@ -107,19 +113,18 @@ def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowled
     if quantity in RANGES:
         return _range(one, quantity, known)
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm  # a raised bar: 1 / cos e
-    sigma = one.noise.sigma_um
     if quantity in ABSOLUTE:
         # The mean of readings is along the bar, the radius in the plane of the circle.
         scale = 1.0 if quantity is BudgetQuantity.MEAN_RADIAL else along
         value = one.mean_radial_error_um if quantity is BudgetQuantity.MEAN_RADIAL else one.radius_error_um
         length = _length_terms(one, known, scale)
-        terms = {BudgetTerm.NOISE: scale * sigma / np.sqrt(len(one.raw)), **length.terms}
-        return Budget(quantity, terms, (*length.missing, *NOT_STATED), value, value, known.not_absolute)
+        terms = {BudgetTerm.NOISE: scale * one.noise.sigma_um / np.sqrt(len(one.raw)), **length.terms}
+        return Budget(quantity, terms, (*length.missing, *NOT_STATED), value, value, _why_not(one, quantity, known))
     axis = 0 if quantity is BudgetQuantity.X else 1
     across_um = 1e3 * one.centre_mm[1 - axis]
     value = 1e3 * one.centre_mm[axis]
     terms = {
-        BudgetTerm.NOISE: along * sigma * np.sqrt(2.0 / len(one.raw)),
+        BudgetTerm.NOISE: along * one.noise.sigma_um * np.sqrt(2.0 / len(one.raw)),
         BudgetTerm.ANGLE: abs(across_um) * np.radians(one.raw.start_uncertainty_deg),
         # A drift c over the turn is a sawtooth, whose first harmonic is c / pi across the start.
         BudgetTerm.CLOSURE: _closure_um(one) / np.pi / np.sqrt(3.0),
@@ -129,22 +134,37 @@ def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowled
         missing.insert(0, BudgetTerm.MOUNTING.value)
     else:
         terms[BudgetTerm.MOUNTING] = known.u_ball_um
-    return Budget(quantity, terms, tuple(missing), value, value)
+    return Budget(quantity, terms, tuple(missing), value, value, _why_not(one, quantity, known))
+
+
+def _why_not(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> str:
+    """Return why a figure has no uncertainty; empty where it has one."""
+    reasons = []
+    if quantity in ABSOLUTE:
+        reasons.append(known.not_absolute)
+        if one.raw.circle.elevation_deg and quantity is not BudgetQuantity.MEAN_RADIAL:
+            reasons.append(NO_HEIGHT)
+    if quantity in {BudgetQuantity.X, BudgetQuantity.Y} and known.u_ball_um is None:
+        reasons.append(NO_PLACE)
+    if not one.noise.known:
+        reasons.append(TOO_FEW)
+    return "; ".join(filter(None, reasons))
 
 
 def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> Budget:
     """Budget of an extreme of the path, or of the difference of two."""
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
     terms = _of_extremes(one, 1 if quantity in ABSOLUTE else 2)
-    missing, why = NOT_STATED, ""
+    missing = NOT_STATED
     if quantity in ABSOLUTE:
         length = _length_terms(one, known, along)
         terms |= {BudgetTerm.NOISE: along * one.noise.sigma_um / np.sqrt(len(one.raw)), **length.terms}
-        missing, why = (*length.missing, *NOT_STATED), known.not_absolute
+        missing = (*length.missing, *NOT_STATED)
+    why = _why_not(one, quantity, known)
     found = estimate_of(one, quantity)
     if found is None:
         read = _as_read(one)[quantity]
-        return Budget(quantity, terms, missing, read, read, TOO_FEW)
+        return Budget(quantity, terms, missing, read, read, why)
     terms[BudgetTerm.NOISE] = float(np.hypot(found.u_um, terms.get(BudgetTerm.NOISE, 0.0)))
     return Budget(quantity, terms, missing, found.value_um, found.as_read_um, why)
 
@@ -198,9 +218,8 @@ def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[BudgetQuanti
         quantity: _pair_range(pair, quantity)
         for quantity in (BudgetQuantity.G_BOTH, BudgetQuantity.G_BOTH_LS, BudgetQuantity.H)
     }
-    found[BudgetQuantity.D] = Budget(
-        BudgetQuantity.D, d_terms, radius[0].missing, pair.d_um, pair.d_um, known.not_absolute
-    )
+    why = next((each.why_not for each in radius if each.why_not), "")
+    found[BudgetQuantity.D] = Budget(BudgetQuantity.D, d_terms, radius[0].missing, pair.d_um, pair.d_um, why)
     return {quantity: found[quantity] for quantity in OF_BOTH}
 
 

@@ -178,7 +178,8 @@ def _off_centre(x: Budget, y: Budget) -> Size:
     # A centre that is not off has no direction: either axis may be the one that counts.
     along = np.abs(off) / length if length > 0.0 else np.sqrt([0.5, 0.5])
     value, u_value = without_noise(length, float(np.linalg.norm(along * u)))
-    return Size(value, u_value, "", u_value)
+    why = x.why_not or y.why_not
+    return Size(value, None if why else u_value, why, u_value)
 
 
 def filter_words(tolerance: Tolerance) -> str | None:

@@ -198,7 +198,9 @@ class _Reading:
                         reasons[file.name] = outcome.reason
                     else:
                         found[file.name] = replace(outcome, sha256=digest)
-                        self._kept.keep(file.name, file.stamp, digest, json_of(found[file.name], indent=None))
+                        self._kept.keep(
+                            file.name, file.stamp, digest, json_of(found[file.name], indent=None, escaped=True)
+                        )
                     self._count()
         self.left_out += [(_called(name), reasons[name]) for name in files if name in reasons]
         for name in (name for name in files if name in found):

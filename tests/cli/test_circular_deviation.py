@@ -9,7 +9,11 @@ import pytest
 
 from dbbstation.cli.demo import _print
 from dbbstation.cli.figures import G_LOW_PASSED, G_WITH_NOISE
-from dbbstation.demo import DemoResult, _side_by_side
+from dbbstation.demo import _side_by_side
+from dbbstation.results.demo import DemoCalibration, DemoCause, DemoDiagnosis, DemoEvaluation, DemoReport, DemoResult
+from dbbstation.results.diagnosis import BeforeAfter
+from dbbstation.results.report import ReportVerdict
+from dbbstation.results.serialise import read_plain
 
 NOISE_UM = 0.3
 """Of one reading of the bar in the recorded sessions."""
@@ -54,13 +58,14 @@ def test_low_passed_deviations_hold_less_noise(numbers):
 
 
 def test_the_demonstration_means_what_evaluate_means(capsys, tmp_path, printed, numbers):
-    source = {"verdict": "ruled-out"}
-    held_out = {"before": 7.0, "after": 0.2}
+    measured = read_plain(DemoEvaluation, numbers)
     result = DemoResult(
         tmp_path,
-        _side_by_side(numbers, numbers),
-        {"sources": [source], "held_out_rms_um": held_out},
-        {"residual_within_mounting_rms_um": 3.0},
+        _side_by_side(measured, measured),
+        DemoCalibration(residual_within_mounting_rms_um=3.0),
+        DemoDiagnosis(sources=(DemoCause("play", "ruled-out", None, {}),), held_out_rms_um=BeforeAfter(7.0, 0.2)),
+        DemoReport(verdict=ReportVerdict("none", "Nothing is held against anything.", (), ()), causes=()),
+        printed={},
     )
     _print(result)
     said = capsys.readouterr().out

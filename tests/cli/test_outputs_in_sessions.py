@@ -50,7 +50,7 @@ OF_FILES = {
 
 ELSEWHERE = {
     "bar --out", "demo --out", "import --out", "import --mapping", "jig holders --out", "jig sheet --out", "measure --out",
-    "measure --spy", "monitor --log", "monitor --spy", "program --out", "simulate --out", "station --out", "station --spy",
+    "fleet --out", "measure --spy", "monitor --log", "monitor --spy", "program --out", "simulate --out", "station --out", "station --spy",
     "study blind --figure", "study concealed-gravity --figure", "study gravity --figure",
 }  # fmt: skip
 """Options whose command needs an instrument or long work before it writes, or that make a session: what they write through is

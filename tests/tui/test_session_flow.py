@@ -325,8 +325,8 @@ def test_the_checklist_shows_what_the_instrument_reads(front: Front) -> None:
             await press(app, "b")
             await until(pilot, on(app, PrepareScreen))
             await until(pilot, lambda: "no bar" in below(app))
-            length_mm[0] = 149.1
-            await until(pilot, lambda: "reads 149.1000 mm" in below(app) and "2.4 mm short of feed-in" in below(app))
+            length_mm[0] = 147.1
+            await until(pilot, lambda: "reads 147.1000 mm" in below(app) and "4.4 mm short of feed-in" in below(app))
             length_mm[0] = 151.5
             await until(pilot, lambda: "for the first circle the bar is seated" in below(app))
             wire.hang_up()

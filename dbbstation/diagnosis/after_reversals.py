@@ -1,4 +1,4 @@
-"""Whether what is left is larger just after one strut turns round: a strut that rings, where no listed cause is at work."""
+"""Whether the residual is larger just after one strut turns round: a strut that rings, where no listed cause is at work."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FEWEST_ROWS = 4
 
 @dataclass(frozen=True)
 class AfterReversals:
-    """What is left just after a strut turns round.
+    """The residual just after a strut turns round.
 
     Attributes:
         strut: 1 to 6.
@@ -48,13 +48,13 @@ class AfterReversals:
     def text(self) -> str:
         """Two sentences for people."""
         return (
-            f"What is left is larger just after strut {self.strut} turns round: {self.rms_um:.2g} µm rms within {self.within_s:g} s, "
+            f"The residual is larger just after strut {self.strut} turns round: {self.rms_um:.2g} µm rms within {self.within_s:g} s, "
             f"{self.elsewhere_um:.2g} µm elsewhere. A strut that rings does that; noise that is the same everywhere does not."
         )
 
 
 def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[NDArray[np.float64]]) -> AfterReversals | None:
-    """The strut whose reversals what is left follows most; None where there are too few of them.
+    """The strut whose reversals the residual follows most; None where there are too few of them.
 
     Args:
         runs: that are paths, as shapes see them.

@@ -185,7 +185,7 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
 
 
 def _quick(settled: SettledCircles) -> Unexplained:
-    """What is left above the harmonics that are asked for, which noise is read from: nothing, or what follows a reversal."""
+    """The residual above the harmonics that are asked for, which noise is read from: nothing, or what follows a reversal."""
     found = after_reversals(settled.unmodelled.runs, settled.after.residual_mm)
     if found is None or found.probability >= SIGNIFICANT:
         return Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise.")

@@ -151,7 +151,7 @@ def _curves(diagnosis: Diagnosis, name: str) -> SourceCurves:
 
 
 def _wanted(diagnosis: Diagnosis, name: str) -> Follows:
-    """What a source follows, or what is left."""
+    """What a source follows, or the residual."""
     if not name:
         return diagnosis.unexplained.follows or Follows("")
     source = next(t.source for t in diagnosis.after.layout.terms if t.source.name == name)

@@ -112,7 +112,7 @@ def _effects(one: Seen) -> dict[tuple[str, str], NDArray[np.float64]]:
 def expected_beside(both: Together | None) -> Expected | None:
     """Return where the circle of the first run should lie, by what the runs of other tests show.
 
-    The sizes of the machine's errors are weighed by the likelihood of the other runs. Where these stray from one another by more
+    The sizes of the machine's errors are weighed by the likelihood of the other runs. Where these differ from one another by more
     than they should, each test held against the rest [R. and W., section 5.4.2], the covariance grows with them: a machine may have
     causes that nobody named.
 
@@ -138,7 +138,7 @@ def expected_beside(both: Together | None) -> Expected | None:
 
 
 def _straying(both: Together, size: float) -> float:
-    """By how many times more than they should the other tests stray from what the rest of them show; one at the least."""
+    """By how many times more than they should the other tests differ from what the rest of them show; one at the least."""
     n = COEFFICIENTS
     inverse = np.linalg.inv(both.covariance_um2(size)[n:, n:])
     pulled = inverse @ both.off_um[n:]

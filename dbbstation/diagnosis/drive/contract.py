@@ -37,7 +37,7 @@ class Scale:
         sample_s: from one recorded sample to the next, of the slowest recording [s].
         reverses: some recording changes its direction of travel.
         both_ways: enough samples are travelled in each direction to say how these differ.
-        waves_per_m: waves over the position that what is left by everything smooth follows best, strongest first [1/m].
+        waves_per_m: waves over the position that the residual of everything smooth follows best, strongest first [1/m].
         waves_tried: how many independent waves these were picked from.
     """
 

@@ -144,7 +144,7 @@ def _beyond(residual: NDArray[np.float64], sigma: float) -> float:
 
 
 def _rest(explained: ExplainedDrive, verdicts: Verdicts, model_n: NDArray[np.float64]) -> Rest:
-    """What is left of the force without a name."""
+    """The unmodelled residual of the force."""
     recordings, settled = explained.drive.recordings, explained.settled
     least = METHOD_SHARE * recordings.scale.force_n
     effects = tuple(effect for effect in verdicts.effects() if effect.rms_n > least)

@@ -1,4 +1,4 @@
-"""Where a simulation and a recording differ: is there a mismatch, which variable leads it, which form it has, what is left."""
+"""Where a simulation and a recording differ: is there a mismatch, which variable leads it, which form it has, how large the residual is."""
 
 from __future__ import annotations
 

@@ -98,9 +98,9 @@ def segments_of(
     first = np.concatenate([[True], number[1:] != number[:-1]])
     of, begins = np.cumsum(first) - 1, np.flatnonzero(first)
     ends = np.append(begins[1:], len(rows)) - 1
-    way = toolpath.poses[rows, :3] - toolpath.before[rows, :3]
-    way /= np.linalg.norm(way, axis=1)[:, None]
-    half_sine = np.minimum(np.linalg.norm(way[begins[1:]] - way[ends[:-1]], axis=1) / 2.0, 1.0)
+    leaves = _ways(toolpath, rows[ends[:-1]], toolpath.poses)
+    goes = _ways(toolpath, rows[begins[1:]], toolpath.before)
+    half_sine = np.minimum(np.linalg.norm(goes - leaves, axis=1) / 2.0, 1.0)
     length_mm = np.asarray(np.bincount(of, weights=toolpath.tip_mm[rows]), dtype=np.float64)
     corners = toolpath.corners_mm[rows[ends]]
     shorter = np.minimum(length_mm[1:], length_mm[:-1])
@@ -114,6 +114,26 @@ def segments_of(
     allowed_mm = np.where(np.isfinite(corners[:-1]), corners[:-1], OF_A_MOVE * shorter)
     limits = limited[rows[begins]]
     return Segments(rows, of, length_mm, feed_mm_s, radius_mm, limits, goes_on, ends_open, allowed_mm, half_sine)
+
+
+def _ways(toolpath: Toolpath, rows: NDArray[np.int64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors of the tip's way in some rows at one of their ends, those of arcs along their tangent, shape (k, 3).
+
+    Args:
+        toolpath: of n rows.
+        rows: shape (k,).
+        at: poses at that end of each row of the toolpath, shape (n, 6).
+    """
+    way = toolpath.poses[rows, :3] - toolpath.before[rows, :3]
+    if toolpath.arc is not None:
+        # A chord is off the tangent by half its angle: two circles that touch would meet in a corner that is hardly there.
+        x_mm, y_mm = (at[rows, :2] - toolpath.arc[rows, :2]).T
+        tangent = np.sign(toolpath.arc[rows, 2])[:, None] * np.column_stack([-y_mm, x_mm])
+        length = np.linalg.norm(tangent, axis=1)
+        chord = length > 0.0
+        across = np.linalg.norm(way[chord, :2], axis=1)
+        way[chord, :2] = tangent[chord] * (across / length[chord])[:, None]
+    return way / np.linalg.norm(way, axis=1)[:, None]
 
 
 _MOVES = (RowKind.RAPID, RowKind.FEED)

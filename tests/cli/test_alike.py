@@ -47,7 +47,7 @@ NO_TESTS = {
 }
 
 WRITES = {"out", "figure", "log"}
-TAKES_TESTS = {"sessions", "folder", "a", "plan", "plan_file", "session"}
+TAKES_TESTS = {"sessions", "folder", "folders", "a", "plan", "plan_file", "session"}
 
 LACKING = {
     "--json": (NO_JSON, bool, {"as_json"}),

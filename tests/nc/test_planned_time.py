@@ -65,6 +65,22 @@ def test_an_arc_is_as_fast_as_its_radius_allows(linuxcnc):
     np.testing.assert_allclose(took, [way / v + v / (0.5 * A)], rtol=1e-5)
 
 
+def test_circles_that_touch_and_turn_back_stop_between(linuxcnc):
+    """R 2 and 4 mm at v = 2 mm/s: way/v, v/2a for the ramp at one end and (v - c)²/2av at the other, where c is what a kink may be run with,
+    0.1·a·(1 ms)/2. Chords meet in a corner that is not quite a reversal; under G64 without P it was rounded by half of the shorter circle."""
+    took = seconds(linuxcnc, "G64\nG0 X0 Y0 Z-1000 A0 B0 C0\nF120\nG3 I2\nG2 I4\nG0 Z-900")
+    v, c = 2.0, 0.05
+    ramps = v / (2 * A) + (v - c) ** 2 / (2 * A * v)
+    # Chords within a micrometre are shorter than the circle by a hundred-thousandth.
+    np.testing.assert_allclose(took, 2 * np.pi * np.array([2.0, 4.0]) / v + ramps, rtol=2e-5)
+
+
+def test_a_line_that_touches_a_circle_goes_on_into_it(linuxcnc):
+    """Along the tangent there is no corner: one ramp up, one down. v = 2 mm/s is reached in 2 µm."""
+    took = seconds(linuxcnc, "G64 P0.01\nG0 X0 Y0 Z-1000 A0 B0 C0\nF120\nG1 X10\nG3 J5\nG0 Z-900")
+    assert took.sum() == pytest.approx((10 + 2 * np.pi * 5) / 2.0 + 2.0 / A, rel=1e-5)
+
+
 def test_moves_that_turn_overlap(linuxcnc):
     """Two lines of 20 mm in one direction: both ramps 2v/a, the first with half the acceleration, the second exact: v/a for each."""
     took = seconds(linuxcnc, f"G64 P0.01\n{START}\nG1 X20 A0.001\nG1 X40 A0.003\nG0 Z-900")

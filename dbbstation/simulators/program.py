@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import shutil
 import subprocess
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.ports import SimulationFault
+from dbbstation.files.gateway import content_of
 from dbbstation.simulators.exchanged import ExchangedSimulator
 
 if TYPE_CHECKING:
@@ -93,8 +95,7 @@ class ProgramSimulator(ExchangedSimulator):
 def _read(path: Path) -> dict[str, NDArray[np.float64]]:
     """Columns of what the program wrote."""
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.reader(file))
+        rows = list(csv.reader(io.StringIO(content_of(path).decode("utf-8"), newline="")))
     except (OSError, UnicodeDecodeError) as error:
         raise SimulationFault(f"it wrote no `{OUTPUTS}` that can be read") from error
     if not rows:

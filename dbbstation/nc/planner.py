@@ -111,7 +111,7 @@ class Planner:
     def seconds(self, toolpath: Toolpath) -> NDArray[np.float64]:
         """Time of each row, shape (n,) [s]: dwells as written, rapids without, moves at feed with their ramps.
 
-        How they are reckoned is told in `planned_time`. Moves in which A, B or C move by themselves, or nearly so, take their time.
+        `planned_time` says how they are reckoned. Moves in which A, B or C move by themselves, or nearly so, take their time.
         """
         rows = np.flatnonzero(cuts(toolpath))
         seconds = np.where(toolpath.kind == RowKind.RAPID, 0.0, toolpath.duration_s)

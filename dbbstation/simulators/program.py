@@ -26,7 +26,7 @@ INPUTS, PARAMETERS, OUTPUTS = "inputs.csv", "parameters.json", "outputs.csv"
 """Files in the folder in which the program is run."""
 
 LINES_TOLD = 3
-"""Last lines of what a program says on standard error that are told where it fails."""
+"""Last lines of what a program says on standard error that are reported where it fails."""
 
 
 class ProgramSimulator(ExchangedSimulator):

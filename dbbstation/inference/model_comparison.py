@@ -342,17 +342,15 @@ def _factors(information: NDArray[np.float64]) -> NDArray[np.float64]:
 def cholesky(information: NDArray[np.float64]) -> NDArray[np.float64]:
     """Cholesky factor of the information of amplitudes in units of their priors, shape (p, p).
 
-    Products beside a base are differences. Where their last digits make the information negative, these are taken out.
+    Such information is that of the readings, never negative, and one from the prior: no eigenvalue is below one. Products beside a base
+    are differences of much larger numbers; where their rounding leaves an eigenvalue below zero, eigenvalues below one are one.
     """
     try:
         return np.asarray(np.linalg.cholesky(information), dtype=np.float64)
     except np.linalg.LinAlgError:
-        last = DIGITS * float(np.diag(information).max())
-        return np.asarray(np.linalg.cholesky(information + last * np.eye(len(information))), dtype=np.float64)
-
-
-DIGITS = 1e-12
-"""Share of the largest product of columns that others are exact to."""
+        values, vectors = np.linalg.eigh(information)
+        upper = np.linalg.qr((vectors * np.sqrt(np.maximum(values, 1.0))).T, mode="r")
+        return np.asarray((upper * np.sign(np.diag(upper))[:, None]).T, dtype=np.float64)
 
 
 def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:

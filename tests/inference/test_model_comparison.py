@@ -14,6 +14,7 @@ from dbbstation.inference.model_comparison import (
     MOST_SLACK,
     SCALES,
     Member,
+    cholesky,
     with_slack_of,
 )
 from tests.inference.dense import Dense, cause, variant
@@ -281,3 +282,12 @@ def test_two_causes_with_sizes_of_their_own(rng):
     log_z, error = nested(log_likelihood, 4, rng)
     assert error < 0.3
     assert logsumexp(terms) == pytest.approx(log_z, abs=3 * error)
+
+
+def test_information_whose_rounding_is_negative_is_that_of_the_prior_there(rng: np.random.Generator) -> None:
+    """Readings never take information away: what is left of an eigenvalue is one, and the others stay."""
+    turned = np.linalg.qr(rng.normal(size=(4, 4)))[0]
+    lower = cholesky(turned @ np.diag([-0.15, 3.0, 79.0, 1e6]) @ turned.T)
+    assert np.all(np.diag(lower) > 0.0)
+    np.testing.assert_allclose(np.triu(lower, 1), 0.0, atol=1e-9)
+    np.testing.assert_allclose(lower @ lower.T, turned @ np.diag([1.0, 3.0, 79.0, 1e6]) @ turned.T, atol=1e-7)

@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 MARGIN = 512
 """Columns for which room is made at first, where nobody says how many there will be."""
 
+LEAST_SHARE = 1e-12
+"""Share of a direction of the base in the rows that are left below which these do not show it: a few hundred times rounding, so that
+what is kept is known to a thousandth of itself. Directions that one run alone shows, a mounting's, have none."""
+
 FEW = 0.5
 """Share of all columns up to which some are worked out by themselves."""
 
@@ -37,6 +41,7 @@ class CauseColumns:
         whitened: makes columns as they are taken in, shape (m, q), those over the samples, shape (n, q); the same if None. It is
             asked for a column when that is wanted first.
         room: columns for which room is made at first; more need a copy of all. Room that stays empty takes no memory.
+        along: axes and the base along them, where they are known.
 
     Attributes:
         base: the same.
@@ -50,9 +55,10 @@ class CauseColumns:
         base: NDArray[np.float64],
         whitened: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
         room: int = MARGIN,
+        along: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         self.base = base
-        self.axes, self.on_axes = np.linalg.qr(base)
+        self.axes, self.on_axes = np.linalg.qr(base) if along is None else along
         self._whitened = whitened
         self._buffer = np.empty((len(base), room), order="F")
         self._waiting: list[NDArray[np.float64]] = []
@@ -130,12 +136,18 @@ class CauseColumns:
         Args:
             rows: that are held back, shape (n,).
         """
-        kept = CauseColumns(np.where(rows[:, None], 0.0, self.base), room=0)
-        out = self.samples[rows]
+        # The axes, orthonormal over all rows, are made so over the rows that are left: few products of what is held back tell how.
+        axes, out = self.axes[rows], self.samples[rows]
+        share, turned = np.linalg.eigh(np.eye(axes.shape[1]) - axes.T @ axes)
+        turned, size = turned[:, share > LEAST_SHARE], np.sqrt(share[share > LEAST_SHARE])
+        left = np.where(rows[:, None], 0.0, self.axes) @ (turned / size)
+        kept = CauseColumns(
+            np.where(rows[:, None], 0.0, self.base), room=0, along=(left, (turned * size).T @ self.on_axes)
+        )
         kept._buffer, kept.count, kept._ready = self._buffer, self.count, self.count
         products = out.T @ out
         kept._products = np.subtract(self.gram, products, out=products)
-        kept._along = kept.axes.T @ self.samples
+        kept._along = (turned / size).T @ (self.along - axes.T @ out)
         return kept
 
 

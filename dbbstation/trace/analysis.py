@@ -42,13 +42,14 @@ class CircleFigures:
 
 
 def best_circle(
-    theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float64]
+    theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float64], near_mm: NDArray[np.float64] | None = None
 ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
     """Least-squares circle through points given in polar coordinates [CAL eq 6], by Gauss-Newton.
 
     Args:
         theta_deg: angles, shape (n,) [deg].
         radius_mm: distances from the origin, shape (n,) [mm].
+        near_mm: where the centre is about, shape (2,) [mm]; the origin if None. A near one saves steps.
 
     Returns:
         Centre (x, y), shape (2,) [mm]; radius [mm]; radial deviations of the points, shape (n,) [mm].
@@ -59,7 +60,7 @@ def best_circle(
     theta = np.radians(theta_deg)
     x, y = radius_mm * np.cos(theta), radius_mm * np.sin(theta)
     columns = np.ones((3, len(theta)))
-    centre, radius = np.zeros(2), float(radius_mm.mean())
+    centre, radius = np.zeros(2) if near_mm is None else near_mm.copy(), float(radius_mm.mean())
     for _ in range(MOST_STEPS):
         across, along = x - centre[0], y - centre[1]
         distance = np.sqrt(across * across + along * along)
@@ -89,7 +90,8 @@ def _step(columns: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np
         left: shape (n,).
     """
     normal = columns @ columns.T
-    if np.linalg.cond(normal) < WORST_CONDITION:
+    least, *_, most = np.linalg.eigvalsh(normal)
+    if most < WORST_CONDITION * least:
         return np.asarray(np.linalg.solve(normal, columns @ left))
     step, _, rank, _ = np.linalg.lstsq(columns.T, left, rcond=1e-9)
     return np.asarray(step) if rank == len(columns) else None
@@ -136,7 +138,7 @@ def path_about_ball(theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float6
     for _ in range(MOST_STEPS):
         about_ball_deg = np.degrees(np.arctan2(centre[1] + radius * np.sin(theta), centre[0] + radius * np.cos(theta)))
         last = centre
-        centre, radius, deviation = best_circle(about_ball_deg, radius_mm)
+        centre, radius, deviation = best_circle(about_ball_deg, radius_mm, last)
         if np.abs(centre - last).max() < AGREED_MM:
             break
     return BallPath(np.mod(about_ball_deg, 360.0), centre, radius, deviation)

@@ -58,7 +58,7 @@ class CauseColumns:
         along: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         self.base = base
-        self.axes, self.on_axes = np.linalg.qr(base) if along is None else along
+        self.axes, self.on_axes = along or _orthonormal(base)
         self._whitened = whitened
         self._buffer = np.empty((len(base), room), order="F")
         self._waiting: list[NDArray[np.float64]] = []
@@ -149,6 +149,11 @@ class CauseColumns:
         kept._products = np.subtract(self.gram, products, out=products)
         kept._along = (turned / size).T @ (self.along - axes.T @ out)
         return kept
+
+
+def _orthonormal(base: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    axes, on_axes = np.linalg.qr(base)
+    return axes, on_axes
 
 
 class BesideBase:

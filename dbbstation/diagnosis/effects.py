@@ -109,6 +109,7 @@ def effects_of(
     rows: Sequence[Row] = (),
     covariance: NDArray[np.float64] | None = None,
     unseen: NDArray[np.float64] | None = None,
+    formula_variance: NDArray[np.float64] | None = None,
 ) -> tuple[CauseEffect, ...]:
     """Return what each cause of a model contributes to the circles, the greatest circular deviation first.
 
@@ -122,6 +123,8 @@ def effects_of(
         covariance: of these, in the products of their units, shape (k, k); None where it is not known.
         unseen: combinations of these that the recordings did not determine, each at its plausible size, shape (h, k). Circles do not show
             them; over the workspace the uncertainty is not known where they are its greater part.
+        formula_variance: part of the variances that is what formulas may be off by, shape (k,); None where there is none. What the shape of
+            a formula lacks it lacks on every strut, so that all amplitudes of a source are off by one share.
 
     Raises:
         ModelError: a source needs what the runs do not give.
@@ -138,7 +141,11 @@ def effects_of(
         if not any(np.abs(effect).max(initial=0.0) > ROUNDING_MM for effect in effects):
             continue
         places = _places(group, model, rows)
-        roots = None if covariance is None or places is None else _parted(group, _root(covariance, places))
+        roots = None
+        if covariance is not None and places is not None:
+            of_formulas = np.zeros(len(places)) if formula_variance is None else formula_variance[places]
+            root = _root(covariance[np.ix_(places, places)] - np.diag(of_formulas))
+            roots = _parted(group, np.hstack([root, _of_formulas(group, of_formulas)]))
         hidden = None if unseen is None or places is None else _parted(group, unseen[:, places].T)
         spread = [_answers(observation, lengths[k], group, roots) for k, observation in enumerate(observations)]
         circles = tuple(_circle(o, effect) for o, effect in zip(observations, effects, strict=True))
@@ -194,12 +201,20 @@ def _places(group: Sequence[Fitted], model: MachineModel, rows: Sequence[Row]) -
     return [place[name] for name in names] if all(name in place for name in names) else None
 
 
-def _root(covariance: NDArray[np.float64], places: Sequence[int]) -> NDArray[np.float64]:
-    """Square root of the covariance of some rows, shape (p, r)."""
-    values, vectors = np.linalg.eigh(covariance[np.ix_(places, places)])
+def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Square root of a covariance, shape (p, r)."""
+    values, vectors = np.linalg.eigh(covariance)
     kept = values > 0.0
     root: NDArray[np.float64] = vectors[:, kept] * np.sqrt(values[kept])
     return root
+
+
+def _of_formulas(group: Sequence[Fitted], variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Change of all parameters by what the formula of each source may be off by, one source a column, shape (p, sources)."""
+    sources = list(dict.fromkeys(f.source.name for f in group))
+    owner = np.concatenate([np.full(len(f.values), sources.index(f.source.name)) for f in group])
+    share = np.sqrt(variance) * np.sign(np.concatenate([f.values for f in group]))
+    return share[:, None] * (owner[:, None] == np.arange(len(sources)))
 
 
 def _parted(group: Sequence[Fitted], changes: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:

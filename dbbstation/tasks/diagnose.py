@@ -162,8 +162,9 @@ def diagnose(
     model = identified_model(fit, report, of_sessions) if unnamed is None else unnamed.identified(report, of_sessions)
     telling.stage("effects of causes")
     names = fit.layout.names
-    covariance = fit.solution.covariance + np.diag(fit.layout.formula_variance(fit.x))
-    effects = effects_of(fit.model, fit.observations, names, covariance, fit.null_space)
+    of_formulas = fit.layout.formula_variance(fit.x)
+    covariance = fit.solution.covariance + np.diag(of_formulas)
+    effects = effects_of(fit.model, fit.observations, names, covariance, fit.null_space, of_formulas)
     return diagnosis_result(
         figures,
         effects=effect_results(effects, {one.name: one.verdict for one in figures.sources}),

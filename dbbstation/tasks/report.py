@@ -183,7 +183,12 @@ def _ranked(
             )
         runs = [thinned(one) for one in recorded.observations]
         found = effects_of(
-            identified.model, runs, identified.covariance_rows, identified.covariance, identified.null_space
+            identified.model,
+            runs,
+            identified.covariance_rows,
+            identified.covariance,
+            identified.null_space,
+            identified.formula_variance,
         )
     except StoppedError:
         raise

@@ -89,6 +89,22 @@ def test_a_cause_of_one_amplitude_is_known_as_well_as_its_amplitude(known):
     assert geometry.g_u_um is None
 
 
+def test_what_a_formula_lacks_it_lacks_on_every_strut(known):
+    """All lags off by one share: G, which is proportional to them all, is off by it as well; were struts off by themselves, by another."""
+    model, runs, _ = known
+    lag = model.sources[3]
+    rows = [("servo-lag", "", one.name) for one in lag.source.parameters(model.machine)]
+    of_formula = (0.1 * lag.values) ** 2
+    covariance = np.diag(of_formula)
+
+    def u_of_g(formula):
+        (found,) = (one for one in effects_of(model, runs, rows, covariance, None, formula) if one.name == "servo-lag")
+        return found.g_u_um / found.g_um
+
+    assert u_of_g(of_formula) == pytest.approx(0.1, rel=0.02)
+    assert u_of_g(None) != pytest.approx(0.1, rel=0.2)
+
+
 def test_what_was_not_determined_leaves_the_workspace_without_an_uncertainty(known):
     model, runs, _ = known
     names = [(f.source.name, "", p.name) for f in model.sources[:2] for p in f.source.parameters(model.machine)]

@@ -2,60 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from dbbstation.calibration.reporting.prediction import smooth_lengths_mm
 from dbbstation.report.polar import Drawn, polar_of
+from dbbstation.results.ranked import expanded
 from dbbstation.text.digits import with_uncertainty
 from dbbstation.trace.analysis import horizontal_radius_mm, path_about_ball
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import numpy as np
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.effects import CauseEffect, CuredCircle
+    from dbbstation.diagnosis.effects import CuredCircle
     from dbbstation.report.polar import Polar
+    from dbbstation.results.ranked import Ranked
 
 MOST_DRAWN = 6
 """Tests whose circles are drawn without the first cause: those on which it acts most."""
-
-
-@dataclass(frozen=True, eq=False)
-class Ranked:
-    """Causes beside the circles.
-
-    Attributes:
-        session: whose circles they act on.
-        effects: the greatest first.
-        verdicts: of the diagnosis that the model comes from, by cause.
-        why_not: why there are none; empty where there are.
-    """
-
-    session: str = ""
-    effects: tuple[CauseEffect, ...] = ()
-    verdicts: Mapping[str, str] | None = None
-    why_not: str = ""
-
-
-def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:
-    """Return the causes in the order of what they contribute, one sentence each with the cure.
-
-    Args:
-        ranked: the causes.
-        coverage_factor: k of U = k u.
-    """
-    told = []
-    for rank, one in enumerate(ranked.effects, start=1):
-        g, g_u = with_uncertainty(one.g_um, _expanded(one.g_u_um, coverage_factor))
-        centre, _ = with_uncertainty(one.centre_um, _expanded(one.centre_u_um, coverage_factor))
-        known = "" if g_u == "-" else f", U {g_u} µm"
-        told.append(
-            f"Cause {rank}, {one.name}: {g} µm of G{known}, {centre} µm of the centres. {one.cure[0].upper()}{one.cure[1:].rstrip('.')}."
-        )
-    return tuple(told)
 
 
 class CauseRow(NamedTuple):
@@ -85,7 +49,7 @@ def cause_rows(ranked: Ranked, coverage_factor: float) -> list[CauseRow]:
     for one in ranked.effects:
         count = len(one.circles)
         g, centre, space = (
-            ("-", "-") if value is None else with_uncertainty(value, _expanded(u, coverage_factor))
+            ("-", "-") if value is None else with_uncertainty(value, expanded(u, coverage_factor))
             for value, u in (
                 (one.g_um, one.g_u_um),
                 (one.centre_um, one.centre_u_um),
@@ -142,7 +106,3 @@ def _path(one: CuredCircle, length_mm: NDArray[np.float64]) -> tuple[NDArray[np.
     """Angles [deg] and deviations [µm] from the least-squares circle, up to 30 undulations per revolution."""
     path = path_about_ball(one.raw.theta_deg, horizontal_radius_mm(one.raw, smooth_lengths_mm(one.raw, length_mm)))
     return path.theta_deg, 1e3 * path.deviation_mm
-
-
-def _expanded(u: float | None, coverage_factor: float) -> float | None:
-    return None if u is None else coverage_factor * u

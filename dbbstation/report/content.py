@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.machine.difference import differences, in_words
-from dbbstation.plan.tolerance import OF_A_MODEL
-from dbbstation.quality.conformity import Conformity
 from dbbstation.report.causes_part import TitledPolar, cause_rows, cured_polars
 from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
@@ -15,40 +13,31 @@ from dbbstation.report.model_part import not_visible, parameters, quality_of_fit
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
 from dbbstation.report.shown import ReportContent, ShownCauses, ShownFindings, ShownModel, ShownSession
-from dbbstation.report.verdict import verdict_of
 from dbbstation.results.circle_figures import RunWithoutCircle
 from dbbstation.results.circles import circles_result
 from dbbstation.results.effects import effect_results
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
+from dbbstation.results.of_report import compared, means_of, side_by_side, tolerances_by_test
 from dbbstation.results.report import (
     CertificateState,
-    ComparedTolerance,
-    HeldTolerance,
-    MeanAndLargest,
-    MeasuredFigures,
-    MeasuredMean,
-    MeasuredSize,
     NotEvaluated,
     ReportResult,
-    ToleranceOfTest,
-    WorstCircle,
 )
-from dbbstation.results.tolerances import filter_words, held_against, tolerated_circles, tolerated_pairs
+from dbbstation.results.report_verdict import verdict_of
+from dbbstation.results.tolerances import held_against, tolerated_circles, tolerated_pairs
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
     from dbbstation.circles.path import Filter
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.plan.tolerance import Tolerance
-    from dbbstation.report.causes_part import Ranked
     from dbbstation.report.certificate import Certified
     from dbbstation.results.circle_figures import FigureBudget
     from dbbstation.results.circles import Circled, CirclesResult
     from dbbstation.results.evaluation import EvaluationResult
-    from dbbstation.results.tolerances import Held, ToleratedCircle
+    from dbbstation.results.ranked import Ranked
 
 
 REASONS_SHOWN = 3
@@ -114,19 +103,21 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
     former = reported.before
     before = () if former is None else tolerated_circles(former.circles, tolerances)
     before_both = (*before, *(() if former is None else tolerated_pairs(former.pairs, tolerances)))
-    measured = tuple(_side_by_side(now, before))
+    measured = tuple(side_by_side(now, before))
     return ReportResult(
         report=page,
         verdict=verdict_of(held, reported.found, coverage_factor, identified, ranked),
         certificate=CertificateState(certificate.title, certificate.lacking, certificate.place or None),
         model_warnings=() if identified is None else model_warnings(identified),
         coverage_factor=coverage_factor,
-        tolerances=tuple(_compared(one, now_both, before_both, coverage_factor) for one in tolerances),
+        tolerances=tuple(compared(one, now_both, before_both, coverage_factor) for one in tolerances),
         tolerances_by_test=tuple(
-            _by_test(dict.fromkeys(one.test for one in now), tolerances, (now_both, before_both), coverage_factor)
+            tolerances_by_test(
+                dict.fromkeys(one.test for one in now), tolerances, (now_both, before_both), coverage_factor
+            )
         ),
         measured=measured,
-        measured_means=tuple(_means(measured)),
+        measured_means=tuple(means_of(measured)),
         circles=circles_result(reported.found, reported.chosen),
         causes=() if ranked is None else effect_results(ranked.effects, ranked.verdicts or {}),
         causes_of=None if ranked is None or not ranked.effects else ranked.session,
@@ -217,92 +208,6 @@ def _notes_before(reported: Reported) -> list[str]:
     unlike = differences(one, other)
     note = f"The session before is of another nominal machine; before and now: {in_words(unlike)}."
     return [*([note] if unlike else []), *reported.before.warnings]
-
-
-def _by_test(
-    tests: Iterable[str],
-    tolerances: Sequence[Tolerance],
-    both: tuple[Sequence[ToleratedCircle], Sequence[ToleratedCircle]],
-    coverage_factor: float,
-) -> Iterable[ToleranceOfTest]:
-    """Yield every tolerance held against the circles of each test that it is for.
-
-    Args:
-        tests: names.
-        tolerances: of the shop.
-        both: circles now, and before.
-        coverage_factor: k of U = k u.
-    """
-    for test in tests:
-        now, before = ([one for one in circles if one.test == test] for circles in both)
-        for one in tolerances:
-            if any(one.holds_for(circle.test, circle.direction) and circle.size(one) is not None for circle in now):
-                yield ToleranceOfTest(test=test, **vars(_compared(one, now, before, coverage_factor)))
-
-
-def _compared(
-    tolerance: Tolerance, now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle], coverage_factor: float
-) -> ComparedTolerance:
-    """Return what one tolerance says of circles now and before; nothing of before where it holds for none of them."""
-    (held,) = held_against((tolerance,), now, coverage_factor)
-    (former,) = held_against((tolerance,), before, coverage_factor)
-    told = None if former.worst is None else _held(former, coverage_factor)
-    return ComparedTolerance(**vars(_held(held, coverage_factor)), before=told)
-
-
-def _held(held: Held, coverage_factor: float) -> HeldTolerance:
-    tolerance = held.tolerance
-    return HeldTolerance(
-        quantity=tolerance.figure.value,
-        filter=filter_words(tolerance),
-        largest_um=tolerance.largest_um,
-        tests=tuple(tolerance.tests),
-        directions=tuple(direction.value for direction in tolerance.directions),
-        conformity=None if held.conformity is None else str(held.conformity),
-        within=held.conformity in {None, Conformity.WITHIN},
-        exceeded=held.exceeded,
-        undecided=held.undecided,
-        circles=held.circles,
-        worst=_worst(held, coverage_factor),
-    )
-
-
-def _worst(held: Held, coverage_factor: float) -> WorstCircle | None:
-    worst, size = held.worst, held.size
-    if worst is None or size is None:
-        return None
-    expanded_um = None if size.u_um is None else coverage_factor * size.u_um
-    return WorstCircle(worst.test, worst.direction, worst.repeat, size.um, expanded_um, size.why_not or None)
-
-
-def _side_by_side(now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle]) -> Iterable[MeasuredFigures]:
-    """Yield figures as measured, each with those of the same test, direction and repeat before."""
-    former = {one.key: _sizes(one) for one in before}
-    for one in now:
-        yield MeasuredFigures(
-            one.session, one.test, one.direction, one.repeat, now=_sizes(one), before=former.get(one.key)
-        )
-
-
-def _sizes(one: ToleratedCircle) -> dict[str, MeasuredSize]:
-    return {str(figure): MeasuredSize(size.um, size.u_um) for figure, size in one.sizes.items()}
-
-
-def _means(measured: Sequence[MeasuredFigures]) -> Iterable[MeasuredMean]:
-    """Yield mean and largest of each figure; with those before of the circles that were measured both times."""
-    both = [one for one in measured if one.before is not None]
-    taken = both or measured
-    for figure in OF_A_MODEL:
-        yield MeasuredMean(
-            quantity=figure.value,
-            circles=len(taken),
-            now=_mean_and_largest([one.now[figure.value].um for one in taken]),
-            before=_mean_and_largest([one.before[figure.value].um for one in both if one.before is not None]),
-        )
-
-
-def _mean_and_largest(sizes: Sequence[float]) -> MeanAndLargest | None:
-    return MeanAndLargest(sum(sizes) / len(sizes), max(sizes)) if sizes else None
 
 
 def _polars(reported: Reported) -> list[TitledPolar]:

@@ -12,11 +12,11 @@ from dbbstation.diagnosis.thinned import thinned
 from dbbstation.errors import StationError
 from dbbstation.files.atomic import refuse_outputs, write_bytes
 from dbbstation.machine.difference import check_model_is_of
-from dbbstation.report.causes_part import Ranked
 from dbbstation.report.content import Modelled, Reported, certified_of, content_of, numbers_of
 from dbbstation.report.html import report_html
 from dbbstation.report.pdf import chromium, printed
 from dbbstation.results.model_warnings import lacks_physics
+from dbbstation.results.ranked import Ranked
 from dbbstation.results.tolerances import TOLERATED
 from dbbstation.tasks.circles import load_circles
 from dbbstation.tasks.evaluate import evaluate

@@ -1,12 +1,12 @@
-"""The first page of a report: what the shop's tolerances say, and what to do."""
+"""From tolerances held against circles to the verdict of a report, with its reasons and what to do."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from dbbstation.quality.conformity import Conformity
-from dbbstation.report.causes_part import told_causes
 from dbbstation.results.model_warnings import lacks_physics
+from dbbstation.results.ranked import told_causes
 from dbbstation.results.report import ReportVerdict
 from dbbstation.text.digits import with_uncertainty
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.report.causes_part import Ranked
     from dbbstation.results.circles import Circled, MeasuredCircle
+    from dbbstation.results.ranked import Ranked
     from dbbstation.results.tolerances import Held
 
 MOST_TOLD = 5

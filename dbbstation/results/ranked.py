@@ -1,0 +1,58 @@
+"""Causes of a model beside measured circles, ranked by what they contribute, and a sentence of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.text.digits import with_uncertainty
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.diagnosis.effects import CauseEffect
+
+
+@dataclass(frozen=True, eq=False)
+class Ranked:
+    """Causes beside the circles.
+
+    Attributes:
+        session: whose circles they act on.
+        effects: the greatest first.
+        verdicts: of the diagnosis that the model comes from, by cause.
+        why_not: why there are none; empty where there are.
+    """
+
+    session: str = ""
+    effects: tuple[CauseEffect, ...] = ()
+    verdicts: Mapping[str, str] | None = None
+    why_not: str = ""
+
+
+def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:
+    """Return the causes in the order of what they contribute, one sentence each with the cure.
+
+    Args:
+        ranked: the causes.
+        coverage_factor: k of U = k u.
+    """
+    told = []
+    for rank, one in enumerate(ranked.effects, start=1):
+        g, g_u = with_uncertainty(one.g_um, expanded(one.g_u_um, coverage_factor))
+        centre, _ = with_uncertainty(one.centre_um, expanded(one.centre_u_um, coverage_factor))
+        known = "" if g_u == "-" else f", U {g_u} µm"
+        told.append(
+            f"Cause {rank}, {one.name}: {g} µm of G{known}, {centre} µm of the centres. {one.cure[0].upper()}{one.cure[1:].rstrip('.')}."
+        )
+    return tuple(told)
+
+
+def expanded(u: float | None, coverage_factor: float) -> float | None:
+    """Return U = k u of a contribution; None where u is not known.
+
+    Args:
+        u: standard uncertainty.
+        coverage_factor: k.
+    """
+    return None if u is None else coverage_factor * u

@@ -10,7 +10,8 @@ from dbbstation.quality.answer import DO, EXPLAINS, SHOWN_BY, Advice, answer
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import seen
-from tests.quality.sabotage import at_feed, bumpy, drifting, elsewhere, mirrored, sound
+from tests.quality.sessions import sound
+from tests.quality.spoilers import at_feed, bumpy, drifting, elsewhere, mirrored
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,9 @@ from dbbstation.quality.limits import (
     scale_of,
 )
 from tests.cli.conftest import call
-from tests.quality.sabotage import SPOILERS, calibrated, finding_of, mirrored, read, sound, spoil
+from tests.quality.sessions import calibrated, finding_of, read, sound
+from tests.quality.shares import spoil
+from tests.quality.spoilers import SPOILERS, mirrored
 
 
 @pytest.fixture(scope="module")

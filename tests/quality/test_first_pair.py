@@ -11,16 +11,8 @@ from dbbstation.plan.circle import Direction
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import seen
-from tests.quality.sabotage import (
-    begun_elsewhere,
-    calibrated,
-    drifting,
-    drifting_session,
-    elsewhere,
-    finding_of,
-    mirrored,
-    sound,
-)
+from tests.quality.sessions import calibrated, drifting_session, finding_of, sound
+from tests.quality.spoilers import begun_elsewhere, drifting, elsewhere, mirrored
 
 
 @pytest.fixture(scope="module")

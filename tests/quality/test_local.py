@@ -18,7 +18,8 @@ from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.servo import ServoLag
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
-from tests.quality.sabotage import NOISE, bumpy, finding_of, progress, read, sound
+from tests.quality.sessions import NOISE, finding_of, read, sound
+from tests.quality.spoilers import bumpy, progress
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,8 @@ from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import COEFFICIENTS, Expected, seen
 from dbbstation.quality.together import Together, expected_beside
-from tests.quality.sabotage import elsewhere, finding_of, larger, mirrored, sound
+from tests.quality.sessions import finding_of, sound
+from tests.quality.spoilers import elsewhere, larger, mirrored
 
 N = COEFFICIENTS
 TESTS = 6

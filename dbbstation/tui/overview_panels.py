@@ -241,7 +241,7 @@ class ChosenRun(Panel):
             return lines(Content(nothing), Content(""), Content(texts.CHOOSE))
         count = len(self._choice.runs(board, self._show))
         place = count - min(self._choice.back, count - 1)
-        which = texts.CHOOSE_RUN.format(place=place, count=count) if count > 1 else texts.CHOOSE
+        which = texts.CHOOSE_RUN.format(place=place, count=count) if count > 1 else texts.CHOOSE_ONLY
         return lines(Content(_figures(completed)), _decided(board, completed), Content(which))
 
 

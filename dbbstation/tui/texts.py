@@ -87,6 +87,7 @@ NO_VERDICT = "waits for its verdict"
 NO_BORE = "in no bore"
 BORE = "bore {number}"
 CHOOSE = "Arrow keys choose test and direction."
+CHOOSE_ONLY = "No earlier run of this test and direction. Arrow keys choose another."
 CHOOSE_RUN = "Run {place} of {count} of this test and direction: H shows an earlier one. Arrow keys choose another."
 
 START_LOOKS = "Looking for sessions …"

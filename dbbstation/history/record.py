@@ -93,12 +93,14 @@ class ModelFigures:
         sha256: of the file.
         sessions: SHA-256 of the session files that it comes from, by name.
         parameters: those of the machine.
+        warnings: what has to be said of it wherever its numbers are shown.
     """
 
     file: str
     sha256: str
     sessions: dict[str, str] = field(default_factory=dict)
     parameters: tuple[ModelParameter, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def sources(self) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from pydantic import Field
@@ -227,6 +227,7 @@ class HistoryResult(Framed):
         left_out: sessions and models that could not be used.
         remarks: on sessions.
         worked_out: sessions and models that were read now; the others came from the index.
+        model_warnings: what has to be said of the model of each session, by the session's name; `remarks` begin with it.
     """
 
     coverage_factor: float
@@ -237,6 +238,7 @@ class HistoryResult(Framed):
     left_out: tuple[LeftOut, ...]
     remarks: Annotated[tuple[str, ...], Field(serialization_alias="notes")]
     worked_out: Annotated[int, Kept] = 0
+    model_warnings: Annotated[Mapping[str, tuple[str, ...]], Kept] = field(default_factory=dict)
 
     def rows(self) -> list[dict[str, object]]:
         """One row for each machine, quantity and session, None where there is nothing."""
@@ -259,6 +261,7 @@ class HistoryResult(Framed):
                 "cusum_high": value.cusum_high,
                 "cusum_low": value.cusum_low,
                 "event": next((event.verdict for event in one.events if event.found == value.session), None),
+                "model_warning": "; ".join(self.model_warnings.get(value.session, ())) if one.test is None else None,
             }
             for machine in self.machines
             for one in machine.quantities

@@ -24,7 +24,7 @@ from dbbstation.results.history import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -52,6 +52,7 @@ def history_result(
     left_out: Sequence[tuple[str, str]] = (),
     remarks: Sequence[str] = (),
     worked_out: int = 0,
+    model_warnings: Mapping[str, tuple[str, ...]] | None = None,
 ) -> HistoryResult:
     """Return histories as a result.
 
@@ -61,6 +62,7 @@ def history_result(
         left_out: sessions and models that could not be used, by name, with the reason.
         remarks: on sessions.
         worked_out: sessions and models that were read now.
+        model_warnings: what has to be said of the model of each session, by the session's name.
     """
     return HistoryResult(
         coverage_factor=asked.coverage_factor,
@@ -71,6 +73,7 @@ def history_result(
         left_out=tuple(LeftOut(name, problem) for name, problem in left_out),
         remarks=tuple(remarks),
         worked_out=worked_out,
+        model_warnings=model_warnings or {},
     )
 
 

@@ -95,12 +95,13 @@ def history(
         raise InputError([Problem(str(folder), 0, 0, what, "`dbbstation check SESSION` names every fault")])
     _check_tests(folder, dated, asked)
     by_session, unlike = _of_one_session(models, dated)
-    notes += [*alike, *unlike]
+    notes = [*unlike, *notes, *alike]
     machines = histories(dated, by_session, asked)
     for machine in machines:
         notes += date_faults(machine.sessions, now or datetime.now(UTC))
         notes += _gathered(machine.sessions)
-    return history_result(machines, asked, left_out, notes, reading.worked_out)
+    warned = {one.name: by_session[one.sha256].warnings for one in dated if one.sha256 in by_session}
+    return history_result(machines, asked, left_out, notes, reading.worked_out, warned)
 
 
 def _seal_note(kept: Kept, folder: Path, one: SessionFigures, moment: datetime) -> str:
@@ -306,7 +307,7 @@ def _check_tests(folder: Path, sessions: Sequence[SessionFigures], asked: TrendO
 def _of_one_session(
     models: Sequence[ModelFigures], sessions: Sequence[SessionFigures]
 ) -> tuple[dict[str, ModelFigures], list[str]]:
-    """Return the model of each session by the session's hash, and remarks on models of no session."""
+    """Return the model of each session by the session's hash, and remarks on these and on models of no session."""
     known = {one.sha256: one.name for one in sessions}
     taken: dict[str, ModelFigures] = {}
     notes = []
@@ -322,4 +323,6 @@ def _of_one_session(
         elif taken.setdefault(digest, model) is not model:
             other = taken[digest].file
             notes.append(f"{model.file} and {other} are of one session, {known[digest]}: {other} is taken")
+    said = [f"{one.file}: {text}" for one in taken.values() for text in one.warnings]
+    notes = [*said, *notes]  # of numbers that are shown, before those that are not
     return taken, notes

@@ -18,6 +18,7 @@ from dbbstation.files.recordings.anchors import anchor_of
 from dbbstation.history.order import moment_words
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.tolerances import TOLERATED, tolerated_circles
 from dbbstation.sources.contract import Owner
 from dbbstation.tasks.circles import load_circles
@@ -155,7 +156,8 @@ def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures
     """
     with input_book():
         identified = read_model(path, every_source(source_files))
-    return ModelFigures(path.name, digest_of(path), dict(identified.sessions), machine_parameters(identified))
+    told = model_warnings(identified)
+    return ModelFigures(path.name, digest_of(path), dict(identified.sessions), machine_parameters(identified), told)
 
 
 def machine_parameters(identified: IdentifiedModel) -> tuple[ModelParameter, ...]:

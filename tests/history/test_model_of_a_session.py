@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import pytest
@@ -31,3 +32,15 @@ def test_a_model_of_another_session_or_of_several_is_none_of_this_one():
     taken, notes = historied._of_one_session(models, [SESSION])
     assert taken == {}
     assert len(notes) == 2
+
+
+def test_what_has_to_be_said_of_a_model_comes_before_other_notes():
+    """Numbers of a model that lacks physics are shown: that has to be read before what is not shown."""
+    good, bad = model("b-small.yaml", 6), replace(model("a-joint.yaml", 31), warnings=("physics is missing",))
+    _, notes = historied._of_one_session([good, bad], [SESSION])
+    assert notes == [
+        "a-joint.yaml: physics is missing",
+        "b-small.yaml and a-joint.yaml are of one session, monday: a-joint.yaml is taken",
+    ]
+    _, quiet = historied._of_one_session([good], [SESSION])
+    assert quiet == []

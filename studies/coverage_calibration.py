@@ -7,21 +7,27 @@ from __future__ import annotations
 
 import tempfile
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ruamel.yaml import YAML
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, calibrate
+from dbbstation.calibration.reporting.evaluation import plane_figures, plane_uncertainty_um
 from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.errors import CalibrationError
 from dbbstation.files.formats.model import read_model, write_model
 from dbbstation.model.uncertainty import predicted_poses
+from dbbstation.plan.bar import EXPANSION_UNCERTAINTY
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.load import load_sessions
 from studies.coverage_rows import row_of
 from studies.kept_draws import drawn
+from tests.plant.mechanisms.balls import CmmScatter, MountingScatter
+from tests.plant.mechanisms.bar import BarOffset, RandomBarOffset
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.noise import Noise
@@ -35,6 +41,7 @@ if TYPE_CHECKING:
 
     from dbbstation.model.identified import IdentifiedModel
     from studies.coverage_rows import Row
+    from tests.plant.mechanisms.base import Mechanism
     from tests.plant.truth import Truth
 
 TOLERANCE_MM = 0.05
@@ -51,9 +58,29 @@ RATE_HZ = 2.0
 RAISED_DEG, RAISED = 5.0, "abcde"
 POSES = 12
 REACH_MM, REACH_DEG, MIDDLE_MM = 150.0, 10.0, -1008.0
+BAR_MM = 150.0
+LOWEST_MM = -1150.0
+"""Height of the lowest circles, at which flatness and parallelism are predicted."""
+ALONG = 39
+"""Points along X at which parallelism is taken."""
 COMPLIANCE_UM_KN = 9.68
 
 OF_A_FORMULA = "u holds the 2 % by which real struts depart from the formula; the generator's follow it exactly"
+
+
+class KnownBar(Enum):
+    """What a session states of its bar; its error is drawn accordingly."""
+
+    CALIBRATED = "calibrated where it measures"
+    WARM = "calibrated at 20 degC, shop at 28 degC"
+    NOBODY_KNOWS = "no word of it"
+
+
+WARM_DEGC = 28.0
+EXPANSION_UM_M_K = 11.5
+TEMPERATURE_U_K = 0.3
+UNKNOWN_BAR_UM = 50.0
+"""Standard deviation of the length of bars that nobody put on a calibrator."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +92,14 @@ class Case:
         raised: whether five bars are raised, which shows the height of the base.
         tolerance: whether the machine file states the tolerance of joints.
         gravity: whether struts are elastic, and their compliance fitted.
+        bar: what is known of the bar.
     """
 
     name: str
     raised: bool
     tolerance: bool
     gravity: bool = False
+    bar: KnownBar = KnownBar.CALIBRATED
 
 
 CASES = (
@@ -80,6 +109,12 @@ CASES = (
     Case("raised bars, tolerance known", raised=True, tolerance=True),
     Case("raised bars, gravity fitted", raised=True, tolerance=False, gravity=True),
 )
+OF_BARS = (
+    Case("raised bars, bar not known", raised=True, tolerance=False, bar=KnownBar.NOBODY_KNOWS),
+    Case("level bars, bar not known", raised=False, tolerance=False, bar=KnownBar.NOBODY_KNOWS),
+    Case("raised bars, bar warmer by 8 K", raised=True, tolerance=False, bar=KnownBar.WARM),
+)
+"""Circumstances of calibrations with bars that are not as long as stated where they measure."""
 
 Figures = dict[str, tuple[list[float], list[float | None]]]
 """Found less true values of one draw and their stated standard uncertainties, by figure; None where none is stated."""
@@ -91,6 +126,8 @@ FIGURES = (
     "base joints Z",
     "compliance",
     *(f"predicted {a}" for a in "XYZ"),
+    "flatness",
+    "parallelism",
 )
 
 
@@ -152,9 +189,11 @@ def drawn_figures(case: Case, seed: int) -> dict[str, tuple[NDArray[np.float64],
                 RandomKinematics(TOLERANCE_MM, TOLERANCE_MM),
                 *([Gravity(1e-6 * COMPLIANCE_UM_KN)] if case.gravity else []),
             ],
+            setup=_setup(case.bar, seed),
             noise=NOISES[seed % len(NOISES)],
             rate_hz=RATE_HZ,
         )
+        _state(Path(folder) / "session" / "session.yaml", case.bar)
         recorded = load_sessions([Path(folder) / "session"])
         machine = replace(recorded.machine, joint_tolerance_mm=TOLERANCE_MM if case.tolerance else None)
         names = (*KINEMATIC_SOURCES, *(["gravity"] if case.gravity else []), *MEASUREMENT_SOURCES)
@@ -162,7 +201,34 @@ def drawn_figures(case: Case, seed: int) -> dict[str, tuple[NDArray[np.float64],
         # As people have it: the model from its file.
         write_model(Path(folder) / "model.yaml", identified_model(calibration, {}, {}))
         identified = read_model(Path(folder) / "model.yaml", known_sources())
-    return _parameters(identified, truth, case) | _positions(identified, truth, seed)
+    return _parameters(identified, truth, case) | _positions(identified, truth, seed) | _plane(identified, truth)
+
+
+def _setup(known: KnownBar, seed: int) -> tuple[Mechanism, ...]:
+    """Errors of balls and bar; the readings of a bar that has grown are shorter by that."""
+    balls = (MountingScatter(), CmmScatter())
+    if known is KnownBar.NOBODY_KNOWS:
+        return (*balls, RandomBarOffset(UNKNOWN_BAR_UM))
+    if known is KnownBar.CALIBRATED:
+        return (*balls, RandomBarOffset())
+    rng = np.random.default_rng([seed, 13])
+    warmer_k = WARM_DEGC - 20.0 + TEMPERATURE_U_K * (rng.standard_normal() - rng.standard_normal())
+    um_per_k = 1e-3 * EXPANSION_UM_M_K * (1.0 + EXPANSION_UNCERTAINTY * rng.standard_normal()) * BAR_MM
+    return (*balls, RandomBarOffset(), BarOffset(-um_per_k * warmer_k))
+
+
+def _state(session: Path, known: KnownBar) -> None:
+    """Write what is known of the bar into a session file."""
+    if known is KnownBar.CALIBRATED:
+        return
+    yaml = YAML(pure=True)  # that keeps all else as it was written
+    content = yaml.load(session)
+    if known is KnownBar.NOBODY_KNOWS:
+        del content["bar"]
+    else:
+        content["ambient_temp_c"] = WARM_DEGC
+        content["bar"].update({"temp_c": 20.0, "expansion_um_m_k": EXPANSION_UM_M_K})
+    yaml.dump(content, session)
 
 
 def _parameters(
@@ -195,3 +261,23 @@ def _positions(
     actual, u_mm = predicted_poses(identified, poses)
     off_mm = (actual - truth.actual_pose(poses))[:, :3]
     return {f"predicted {axis}": (off_mm[:, k], u_mm[:, k]) for k, axis in enumerate("XYZ")}
+
+
+def _plane(identified: IdentifiedModel, truth: Truth) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Flatness and parallelism as `evaluate` predicts them, and where the generator's machine goes."""
+    steps = np.linspace(-190.0, 190.0, 3)
+    ring = [(x, y) for x in steps for y in steps if (x, y) != (0.0, 0.0)]
+    found = plane_figures(identified.model, LOWEST_MM)
+    u_um = plane_uncertainty_um(identified, LOWEST_MM)
+    figures = {}
+    for k, (figure, points, axis, value_um) in enumerate(
+        (
+            ("flatness", ring, 2, found.flatness_um),
+            ("parallelism", [(x, 0.0) for x in np.linspace(-190.0, 190.0, ALONG)], 1, found.parallelism_um),
+        )
+    ):
+        poses = np.array([[x, y, LOWEST_MM, 0.0, 0.0, 0.0] for x, y in points])
+        true_um = 1e3 * float(np.ptp((truth.actual_pose(poses) - poses)[:, axis]))
+        u = u_um[k]
+        figures[figure] = (np.array([1e-3 * (value_um - true_um)]), np.array([np.nan if u is None else 1e-3 * u]))
+    return figures

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import binom
 
-from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis, analyse, analyse_pair, refiltered
-from dbbstation.circles.budget import Budget, SetUpKnowledge, budgets, pair_budgets
+from dbbstation.circles.analysis import CircleAnalysis, analyse, analyse_pair, refiltered
+from dbbstation.circles.budget import RANGES, Budget, SetUpKnowledge, budgets, pair_budgets
 from dbbstation.circles.path import Filter
 from dbbstation.circles.quantity import ABSOLUTE, BudgetQuantity
 from dbbstation.circles.quick_look import quick_look
@@ -47,20 +47,32 @@ KINDS = ("perfect", "as large as noise", "worn machine")
 """Faults: none, such that the form is about as large as the noise, and those of a worn machine."""
 
 FILTERS = (Filter.UPR_15, Filter.UPR_50, Filter.UPR_150)
-GAUSSIAN = "G, Gaussian filters"
+GAUSSIAN, SHARP = "Gaussian filters", "30 UPR"
+RAISED_DEG = 30.0
+"""Of the bar of every fifth machine."""
 SURE = "printed without U"
 
 CHANCE = 1e-4
 """Chance at which a row that is as promised counts as not."""
 
+RANGES_OF_CIRCLES = ("G", "G(LS)", "G(b)", "G(b)(LS)", "H")
 _NOISE_OR_FORM = (
     "U holds that all of the spectrum is noise and that only its end is; intervals of small ranges reach to zero"
 )
 REASONS = {
     **dict.fromkeys(
-        ("G", "G(LS)", "G(b)", "G(b)(LS)", "H", GAUSSIAN, "G, 30 UPR", "G(LS), 30 UPR"),
+        [
+            *RANGES_OF_CIRCLES,
+            *(
+                f"{figure}, {filtered}"
+                for figure in (*RANGES_OF_CIRCLES, "Fmax", "Fmin")
+                for filtered in (GAUSSIAN, SHARP)
+            ),
+        ],
         _NOISE_OR_FORM,
     ),
+    "reversal step": "noise that is seen beside steps counts as slow",
+    "closure": "noise that is seen beside steps counts as slow",
     "reversal spike": "U holds spikes of all lengths that may be",
     "cyclic error": "seen from a wave that noise shows in one of a thousand scans",
     "cyclic error, not seen: below": "the bound is that of the strongest of all waves that are tried",
@@ -174,9 +186,10 @@ def _drawn(cell: Cell, seed: int) -> list[tuple[str, bool]]:
     grown_mm = 1e-6 * 11.5 * (1.0 + 0.05 * rng.standard_normal()) * RADIUS_MM * (SHOP_DEGC - 20.0 + degc[0] - degc[1])
     read_long_mm, _ = BAR.reads_long_mm(SHOP_DEGC)
     true, read = [], []
+    raised_deg = RAISED_DEG if seed % 5 == 0 else 0.0
     for direction in Direction:
-        silent = _turn(machine, direction, tuple(-centre_mm), radius_um)
-        about = _turn(machine, direction, tuple(ball_mm - centre_mm), radius_um)
+        silent = _turn(machine, direction, tuple(-centre_mm), radius_um, raised_deg)
+        about = _turn(machine, direction, tuple(ball_mm - centre_mm), radius_um, raised_deg)
         true.append(analyse(silent))
         noisy = about.length_mm + cell.noise.drawn_mm(rng, SAMPLES) + long_mm - grown_mm - read_long_mm
         read.append(analyse(replace(about, length_mm=noisy)))
@@ -186,7 +199,7 @@ def _drawn(cell: Cell, seed: int) -> list[tuple[str, bool]]:
         u_ball_um=U_BALL_UM,
         u_ball_z_um=U_BALL_UM,
     )
-    found = [*_of_one(read[0], true[0], known, seed), *_of_both(analyse_pair(*read), analyse_pair(*true), known)]
+    found = [*_of_one(read[0], true[0], known, seed), *_of_both(read, true, known, seed)]
     return [(figure, bool(inside)) for figure, inside in (*found, *_of_look(read, machine))]
 
 
@@ -211,40 +224,66 @@ def _machine(rng: np.random.Generator, size: float) -> SerialMachine:
     )
 
 
-def _turn(machine: SerialMachine, direction: Direction, ball_mm: tuple[float, ...], radius_um: float) -> RawCircle:
-    circle = Circle((0, 0, 0), (0, 0, 0), RADIUS_MM, (0, 0, 0), FEED_MM_MIN, 0.0, 0.0, 1.5, 0.0, direction)
+def _turn(
+    machine: SerialMachine, direction: Direction, ball_mm: tuple[float, ...], radius_um: float, raised_deg: float
+) -> RawCircle:
+    """A turn of the machine about a ball; of a raised bar the radius is smaller, and the tip is above the ball."""
+    circle = Circle((0, 0, 0), (0, 0, 0), RADIUS_MM, (0, 0, 0), FEED_MM_MIN, 0.0, 0.0, 1.5, raised_deg, direction)
     phi_deg = np.arange(0.0, 360.0, 360.0 / SAMPLES)
-    length_mm = machine.length_mm(
-        circle.theta_deg(phi_deg), RADIUS_MM, FEED_MM_MIN, int(direction.sign), (ball_mm[0], ball_mm[1])
+    radius_mm = RADIUS_MM * float(np.cos(np.radians(raised_deg)))
+    along_mm = machine.length_mm(
+        circle.theta_deg(phi_deg), radius_mm, FEED_MM_MIN, int(direction.sign), (ball_mm[0], ball_mm[1])
     )
-    return RawCircle(str(direction), circle, phi_deg / circle.turning_deg_s, phi_deg, length_mm + 1e-3 * radius_um)
+    length_mm = np.hypot(along_mm + 1e-3 * radius_um, RADIUS_MM * np.sin(np.radians(raised_deg)))
+    return RawCircle(str(direction), circle, phi_deg / circle.turning_deg_s, phi_deg, length_mm)
 
 
 def _of_one(read: CircleAnalysis, true: CircleAnalysis, known: SetUpKnowledge, seed: int) -> Iterator[tuple[str, bool]]:
     for quantity, budget in budgets(read, known).items():
-        yield _row(quantity), _holds(budget, _truth(true, quantity))
+        yield from _stated(budget, _truth(true, quantity), read)
     for quantity in sorted(ABSOLUTE - {BudgetQuantity.D}):
         nothing = budgets(read, UNKNOWN, [quantity])[quantity]
         yield f"{_row(quantity)}, bar not known: {SURE}", nothing.u_um is None
-    chosen = FILTERS[seed % len(FILTERS)]
-    budget = budgets(refiltered(read, chosen), known, [BudgetQuantity.G])[BudgetQuantity.G]
-    yield GAUSSIAN, _holds(budget, refiltered(true, chosen).g_um)
-    sharp_read, sharp_true = refiltered(read, Filter.UPR_30), refiltered(true, Filter.UPR_30)
-    for quantity, budget in budgets(sharp_read, known, [BudgetQuantity.G, BudgetQuantity.G_LS]).items():
-        yield f"{quantity}, 30 UPR", _holds(budget, _truth(sharp_true, quantity))
-    size = sizes_of(sharp_read, known)[CircleFigure.CENTRE_DEVIATION]
+    for chosen, name in _filters(seed):
+        filtered, filtered_true = refiltered(read, chosen), refiltered(true, chosen)
+        for quantity, budget in budgets(filtered, known, RANGES).items():
+            yield from _stated(budget, _truth(filtered_true, quantity), read, f", {name}")
+    size = sizes_of(refiltered(read, Filter.UPR_30), known)[CircleFigure.CENTRE_DEVIATION]
     yield "centre deviation", abs(size.um - 1e3 * float(np.hypot(*true.centre_mm))) <= COVERAGE_FACTOR * size.known_um
+    for step, true_step in zip(read.steps, true.steps, strict=True):
+        yield "reversal step", abs(step.height_um - true_step.height_um) <= COVERAGE_FACTOR * step.u_um
+    if read.closure is not None and true.closure is not None:
+        apart_um = abs(read.closure.height_um - true.closure.height_um)
+        yield "closure", apart_um <= COVERAGE_FACTOR * read.closure.u_um
 
 
-def _of_both(read: PairAnalysis, true: PairAnalysis, known: SetUpKnowledge) -> Iterator[tuple[str, bool]]:
-    truth = {
-        BudgetQuantity.G_BOTH: true.g_um,
-        BudgetQuantity.G_BOTH_LS: true.g_least_squares_um,
-        BudgetQuantity.D: true.d_um,
-        BudgetQuantity.H: true.h_um,
-    }
-    for quantity, budget in pair_budgets(read, known).items():
-        yield _row(quantity), _holds(budget, truth[quantity])
+def _filters(seed: int) -> tuple[tuple[Filter, str], ...]:
+    return (FILTERS[seed % len(FILTERS)], GAUSSIAN), (Filter.UPR_30, SHARP)
+
+
+def _of_both(
+    read: Sequence[CircleAnalysis], true: Sequence[CircleAnalysis], known: SetUpKnowledge, seed: int
+) -> Iterator[tuple[str, bool]]:
+    for chosen, name in ((Filter.NONE, ""), *_filters(seed)):
+        of_true = analyse_pair(*(refiltered(one, chosen) for one in true))
+        truth = {
+            BudgetQuantity.G_BOTH: of_true.g_um,
+            BudgetQuantity.G_BOTH_LS: of_true.g_least_squares_um,
+            BudgetQuantity.D: of_true.d_um,
+            BudgetQuantity.H: of_true.h_um,
+        }
+        for quantity, budget in pair_budgets(analyse_pair(*(refiltered(one, chosen) for one in read)), known).items():
+            if quantity is not BudgetQuantity.D or not chosen:
+                yield from _stated(budget, truth[quantity], read[0], f", {name}" if name else "")
+
+
+def _stated(budget: Budget, truth_um: float, read: CircleAnalysis, what: str = "") -> Iterator[tuple[str, bool]]:
+    """Row of a figure; the radius of a raised bar has no U."""
+    row = _row(budget.quantity) + what
+    if read.raw.circle.elevation_deg and budget.quantity in ABSOLUTE - {BudgetQuantity.MEAN_RADIAL}:
+        yield f"{row}, bar raised: {SURE}", budget.u_um is None
+    else:
+        yield row, _holds(budget, truth_um)
 
 
 def _of_look(read: Sequence[CircleAnalysis], machine: SerialMachine) -> Iterator[tuple[str, bool]]:

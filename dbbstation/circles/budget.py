@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.circles.estimates import estimate_of, pair_estimate
+from dbbstation.circles.estimates import estimate_of, pair_estimate, slow_noise_um
 from dbbstation.circles.noise import FEWEST_SAMPLES, ROUNDING
 from dbbstation.circles.quantity import ABSOLUTE, BudgetQuantity
 from dbbstation.computing.threads import with_one_thread
@@ -118,13 +118,13 @@ def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowled
         scale = 1.0 if quantity is BudgetQuantity.MEAN_RADIAL else along
         value = one.mean_radial_error_um if quantity is BudgetQuantity.MEAN_RADIAL else one.radius_error_um
         length = _length_terms(one, known, scale)
-        terms = {BudgetTerm.NOISE: scale * one.noise.sigma_um / np.sqrt(len(one.raw)), **length.terms}
+        terms = {BudgetTerm.NOISE: scale * slow_noise_um(one, 0) / np.sqrt(len(one.raw)), **length.terms}
         return Budget(quantity, terms, (*length.missing, *NOT_STATED), value, value, _why_not(one, quantity, known))
     axis = 0 if quantity is BudgetQuantity.X else 1
     across_um = 1e3 * one.centre_mm[1 - axis]
     value = 1e3 * one.centre_mm[axis]
     terms = {
-        BudgetTerm.NOISE: along * one.noise.sigma_um * np.sqrt(2.0 / len(one.raw)),
+        BudgetTerm.NOISE: along * slow_noise_um(one, 1) * np.sqrt(2.0 / len(one.raw)),
         BudgetTerm.ANGLE: abs(across_um) * np.radians(one.raw.start_uncertainty_deg),
         # A drift c over the turn is a sawtooth, whose first harmonic is c / pi across the start.
         BudgetTerm.CLOSURE: _closure_um(one) / np.pi / np.sqrt(3.0),
@@ -158,7 +158,7 @@ def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge)
     missing = NOT_STATED
     if quantity in ABSOLUTE:
         length = _length_terms(one, known, along)
-        terms |= {BudgetTerm.NOISE: along * one.noise.sigma_um / np.sqrt(len(one.raw)), **length.terms}
+        terms |= {BudgetTerm.NOISE: along * slow_noise_um(one, 0) / np.sqrt(len(one.raw)), **length.terms}
         missing = (*length.missing, *NOT_STATED)
     why = _why_not(one, quantity, known)
     found = estimate_of(one, quantity)

@@ -73,8 +73,29 @@ def _estimate(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate:
             raise ValueError(f"{quantity} is no range of one circle")
 
 
+def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:
+    """Return the standard deviation of white noise, per sample, that would give a figure its uncertainty [µm].
+
+    Args:
+        one: the circle; of few samples nothing is known, and rounding is what is left.
+        undulations: 0 of radius and mean, 1 of a centre.
+    """
+    if not one.noise.known:
+        return one.noise.sigma_um
+    return float(np.hypot(np.sqrt(_apart(one).continued.mean[undulations]), one.noise.least_um))
+
+
 def _apart(one: CircleAnalysis) -> FormAndNoise:
-    """Form and noise of the deviations from the least-squares circle, not filtered."""
+    """Form and noise of the deviations from the least-squares circle, not filtered; worked out once."""
+    if one not in _APART:
+        _APART[one] = _taken_apart(one)
+    return _APART[one]
+
+
+_APART: WeakKeyDictionary[CircleAnalysis, FormAndNoise] = WeakKeyDictionary()
+
+
+def _taken_apart(one: CircleAnalysis) -> FormAndNoise:
     if one.closure is None or abs(one.closure.height_um) <= CLEAR * one.closure.u_um:
         return form_and_noise(one.residual_um)
     ramp_um = one.closure.height_um * one.raw.phi_deg / FULL_TURN_DEG

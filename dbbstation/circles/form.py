@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.harmonics import bands, noise_spectrum
+from dbbstation.circles.continued import continued_noise
+from dbbstation.inference.harmonics import bands
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from dbbstation.circles.continued import ContinuedNoise
 
 CHANCE = 0.01
 """Chance at which noise alone has one line anywhere in its spectrum that counts as form."""
@@ -26,14 +29,14 @@ class FormAndNoise:
     Attributes:
         form_um: its form, noise taken off as far as the spectrum tells both apart, shape (n,) [µm].
         power_um2: of the noise by line 0, 1, ... n // 2: the variance that white noise of the same power would have [µm²].
-        continued: how many of these lines were not seen: their power is continued from those above.
-        freedom: degrees of freedom of the power of these.
+        continued: the same at the first of these lines, which form covers, by the memory that the noise may have.
+        excess: kurtosis of what pushes the noise from sample to sample, less the 3 of a normal one; zero where it may be one.
     """
 
     form_um: NDArray[np.float64]
     power_um2: NDArray[np.float64]
-    continued: int
-    freedom: float
+    continued: ContinuedNoise
+    excess: float = 0.0
 
 
 def form_and_noise(deviation_um: NDArray[np.float64]) -> FormAndNoise:
@@ -54,16 +57,57 @@ def form_and_noise(deviation_um: NDArray[np.float64]) -> FormAndNoise:
     lines = np.fft.rfft(deviation_um - sharp)
     power = np.abs(lines) ** 2 / count
     floor, standing = _floor(power[low + 1 :])
-    spectrum = noise_spectrum(2.0 * floor[: high - low], low, 2.0)
-    noise = np.concatenate([spectrum.power, _averaged(floor)])
+    continued = continued_noise(power[: low + 1], floor[: high - low])
+    noise = np.concatenate([continued.usual, _averaged(floor)])
     share = np.maximum(power - noise, 0.0) / np.maximum(power, np.finfo(float).tiny)
-    share[: low + 1] *= power[: low + 1] > STANDS_OUT * spectrum.power
+    share[: low + 1] *= power[: low + 1] > STANDS_OUT * noise[: low + 1]
     share[0] = 1.0  # a mean is no noise where the radius is known to less than a sample's noise
     share[low + 1 :] *= standing
     if low > 1 and not (share[2:].any() or sharp.any()):
         strongest = 2 + int(np.argmax(power[2 : low + 1] / np.maximum(noise[2 : low + 1], np.finfo(float).tiny)))
         share[strongest] = 1.0  # nothing stands out: what form there may be most likely has this one
-    return FormAndNoise(np.fft.irfft(share * lines, count) + sharp, noise, low + 1, spectrum.freedom)
+    white = np.where(share > 0.0, 0.0, lines / np.sqrt(count * np.maximum(noise, np.finfo(float).tiny)))
+    white[: low + 1] = 0.0
+    return FormAndNoise(np.fft.irfft(share * lines, count) + sharp, noise, continued, _excess(white, count))
+
+
+TAILS, NO_TAILS = 2.0, 3.0
+"""Standard errors from which a kurtosis above, and one below that of a normal distribution counts. Chance that shortens an interval is the
+worse one."""
+
+
+def _excess(white: NDArray[np.complex128], count: int) -> float:
+    """Kurtosis of white noise less 3, from those of its lines that were seen, others zero, shape (n // 2 + 1,); zero within chance.
+
+    What is missing makes it more normal: fourth cumulants of the rest keep the square of the share that is there. The standard error
+    of a normal one is sqrt(24 / n) [Kendall and Stuart, The Advanced Theory of Statistics, vol. 1, ch. 12].
+    """
+    there = float(np.count_nonzero(white)) / len(white)
+    pushes = np.fft.irfft(white, count)
+    square = float(np.mean(pushes**2))
+    if not square > 0.0:
+        return 0.0
+    excess = float(np.mean(pushes**4)) / square**2 - 3.0
+    error = float(np.sqrt(24.0 / count))
+    return excess / there**2 if excess > TAILS * error or excess < -NO_TAILS * error else 0.0
+
+
+def _pushes(rng: np.random.Generator, excess: float, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Draw white noise of unit variance with this kurtosis: normal, Student's t, or a symmetrical beta distribution.
+
+    These are Pearson's types VII and II; their kurtosis less 3 is 6 / (f - 4) and -6 / (2 a + 3).
+    """
+    if excess > 0.0:
+        freedom = 4.0 + 6.0 / excess
+        return np.asarray(rng.standard_t(freedom, size) * np.sqrt((freedom - 2.0) / freedom))
+    if excess < 0.0:
+        shape = max(-3.0 / excess - 1.5, LEAST_BETA)
+        return np.asarray((2.0 * rng.beta(shape, shape, size) - 1.0) * np.sqrt(2.0 * shape + 1.0))
+    return rng.standard_normal(size)
+
+
+LEAST_BETA = 0.5
+"""Parameter of the flattest distribution that is drawn, that of a sine: no noise has less kurtosis."""
 
 
 STANDS_OUT = 3.0
@@ -126,9 +170,6 @@ def drawn_noise(
 ) -> NDArray[np.float64]:
     """Draw noise that the readings may have, shape (draws, n) [µm].
 
-    How strong it is at low undulations is known to so many degrees of freedom only: each draw has a power of its own there, as a
-    flat prior of its logarithm makes it [scaled inverse chi-square; Gelman et al., Bayesian Data Analysis, sec. 2.6].
-
     Args:
         apart: a series taken apart.
         passed: share of the amplitude that a filter lets pass, by line, shape (n // 2 + 1,).
@@ -136,10 +177,9 @@ def drawn_noise(
         rng: generator.
     """
     count = len(apart.form_um)
-    parts = rng.standard_normal((2, draws, len(passed)))
-    lines = (parts[0] + 1j * parts[1]) * (np.sqrt(0.5 * count * apart.power_um2) * passed)
-    whole = [0, -1] if count % 2 == 0 else [0]
-    lines[:, whole] = np.sqrt(2.0) * lines[:, whole].real
-    strength = np.sqrt(apart.freedom / rng.chisquare(apart.freedom, draws))
-    lines[:, : apart.continued] *= strength[:, None]
+    lines = np.fft.rfft(_pushes(rng, apart.excess, (draws, count)), axis=1)
+    below = apart.continued.drawn(rng, draws)
+    seen = below.shape[1]
+    lines[:, :seen] *= np.sqrt(below) * passed[:seen]
+    lines[:, seen:] *= np.sqrt(apart.power_um2[seen:]) * passed[seen:]
     return np.asarray(np.fft.irfft(lines, count, axis=1))

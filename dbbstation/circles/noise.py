@@ -49,9 +49,14 @@ class CircleNoise:
         return bool(np.isfinite(self.slow_um))
 
     @property
+    def least_um(self) -> float:
+        """Standard deviation that no reading is free of: a coarse one may show no noise at all, its rounding is there [µm]."""
+        return max(self.resolution_um / ROUNDING, LEAST_UM)
+
+    @property
     def sigma_um(self) -> float:
-        """Standard deviation to count with: a coarse reading may show no noise at all, its rounding is there [µm]."""
-        return float(np.hypot(np.nan_to_num(self.slow_um), max(self.resolution_um / ROUNDING, LEAST_UM)))
+        """Standard deviation to count with [µm]."""
+        return float(np.hypot(np.nan_to_num(self.slow_um), self.least_um))
 
 
 def noise_of(

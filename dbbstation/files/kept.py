@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
-_FORM = 3
+_FORM = 4
 """Counts changes of what is kept under one version of the program."""
 
 VERSION = f"{__version__}/{_FORM}"

@@ -13,12 +13,12 @@ class Figure:
     Attributes:
         name: such as `G` or `X`.
         value_um: its size [µm].
-        u_um: its standard uncertainty [µm].
+        u_um: its standard uncertainty [µm]; None where it is not known.
     """
 
     name: str
     value_um: float
-    u_um: float
+    u_um: float | None
 
 
 @dataclass(frozen=True)

@@ -291,13 +291,51 @@ def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Sp
         low: highest harmonic that is not among them.
         freedom: degrees of freedom of each sum.
     """
+    found = continuations(squares, low, freedom, CORNERS)
+    if found is None:
+        white = float((squares / freedom).mean())
+        return Spectrum(np.full(low + 1, white), freedom * len(squares))
+    weight = np.exp(found.likely - found.likely.max())
+    weight /= weight.sum()
+    power = weight @ found.powers
+    logs = np.log(found.powers.mean(axis=1))
+    between = float(weight @ (logs - weight @ logs) ** 2)
+    least = 2.0 / (freedom * len(squares))
+    return Spectrum(power, 2.0 / max(float(weight @ found.variances) + between, least))
+
+
+@dataclass(frozen=True, eq=False)
+class Continuations:
+    """Noise in the low harmonics as each corner lets expect it.
+
+    Attributes:
+        powers: of one orthonormal coefficient at harmonics 0, 1, ... low, shape (corners, low + 1).
+        likely: log likelihood of the harmonics above, less a constant, shape (corners,).
+        variances: of the logarithm of the mean of the powers, shape (corners,).
+    """
+
+    powers: NDArray[np.float64]
+    likely: NDArray[np.float64]
+    variances: NDArray[np.float64]
+
+
+def continuations(
+    squares: NDArray[np.float64], low: int, freedom: float, corners: NDArray[np.float64]
+) -> Continuations | None:
+    """Continue the spectrum of noise below `low` with each corner; None where it counts as white.
+
+    Args:
+        squares: sums of squares of the coefficients at harmonics low + 1, low + 2, ..., shape (h,).
+        low: highest harmonic that is not among them.
+        freedom: degrees of freedom of each sum.
+        corners: that are tried, shape (corners,).
+    """
     harmonic = np.arange(low + 1.0, low + 1.0 + len(squares))
     mean = squares / freedom
     white = float(mean.mean())
-    flat = Spectrum(np.full(low + 1, white), freedom * len(squares))
     if not white > 0.0:
-        return flat
-    seen, below = _shape(harmonic), _shape(np.arange(low + 1.0))
+        return None
+    seen, below = _shape(harmonic, corners), _shape(np.arange(low + 1.0), corners)
     heights = _fitted(mean, seen)
     powers, likely, variances = [], [], []
     for height, above, under in zip(heights, seen, below, strict=True):
@@ -309,18 +347,13 @@ def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Sp
         wanted = (under / power).mean(axis=1)
         variances.append(float(wanted @ np.linalg.pinv(information) @ wanted))
     if max(likely) - _likelihood(mean, np.full(len(mean), white), freedom) < WORTH:
-        return flat
-    weight = np.exp(np.array(likely) - max(likely))
-    weight /= weight.sum()
-    power = weight @ np.array(powers)
-    logs = np.log(np.array(powers).mean(axis=1))
-    between = float(weight @ (logs - weight @ logs) ** 2)
-    return Spectrum(power, 2.0 / max(float(weight @ variances) + between, 2.0 / flat.freedom))
+        return None
+    return Continuations(np.array(powers), np.array(likely), np.array(variances))
 
 
-def _shape(harmonic: NDArray[np.float64]) -> NDArray[np.float64]:
+def _shape(harmonic: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """Floor and first-order process of unit height, of each corner, shape (corners, 2, h)."""
-    process = 1.0 / (1.0 + (harmonic / CORNERS[:, None]) ** 2)
+    process = 1.0 / (1.0 + (harmonic / corners[:, None]) ** 2)
     return np.stack([np.ones_like(process), process], axis=1)
 
 

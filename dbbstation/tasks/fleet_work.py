@@ -263,10 +263,11 @@ def _of_circles(runs: Sequence[RunFigures]) -> tuple[FleetValue, ...]:
     for run in runs:
         for figure in run.figures:
             if figure.name in COMPARED:
-                grouped[figure.name, run.test, run.direction, run.circle].append((figure.value_um, figure.u_um))
+                u_um = np.nan if figure.u_um is None else figure.u_um
+                grouped[figure.name, run.test, run.direction, run.circle].append((figure.value_um, u_um))
     values = []
     for (name, test, direction, circle), repeats in grouped.items():
         value, u = np.mean(repeats, axis=0).tolist()
         quantity = f"{name} {test} {direction}"
-        values.append(FleetValue("figure", quantity, "µm", value, u or None, circle, name in LOGARITHMIC))
+        values.append(FleetValue("figure", quantity, "µm", value, u if u > 0.0 else None, circle, name in LOGARITHMIC))
     return tuple(values)

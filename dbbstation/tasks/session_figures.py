@@ -82,16 +82,17 @@ def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
         tolerated.sizes[figure]
         for figure in (CircleFigure.CIRCULAR_DEVIATION, CircleFigure.CENTRE_DEVIATION, CircleFigure.MEAN_RADIAL_ERROR)
     )
+    x, y = (known[quantity] for quantity in (BudgetQuantity.X, BudgetQuantity.Y))
     return RunFigures(
         test=one.entry.test,
         direction=str(one.entry.direction),
         circle=_in_words(analysis.raw.circle),
         figures=(
-            Figure("G", g.um, g.known_um),
-            Figure("X", 1e3 * x_mm, known[BudgetQuantity.X].known_um),
-            Figure("Y", 1e3 * y_mm, known[BudgetQuantity.Y].known_um),
-            Figure("R", analysis.mean_radial_error_um, radial.known_um),
-            Figure("C", centre.um, centre.known_um),
+            Figure("G", g.um, g.u_um),
+            Figure("X", 1e3 * x_mm, x.u_um),
+            Figure("Y", 1e3 * y_mm, y.u_um),
+            Figure("R", analysis.mean_radial_error_um, radial.u_um),
+            Figure("C", centre.um, centre.u_um),
         ),
     )
 

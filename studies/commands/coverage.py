@@ -24,8 +24,9 @@ PLANS = {"elevated": "table2-elevated", "level": "table2"}
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
 @click.option(
     "--part",
-    type=click.Choice(["machines", "calibration", "circles"]),
-    help="Random machines per plan, rows of calibration and prediction, or rows of circles, only.",
+    type=click.Choice(["machines", "calibration", "bars", "circles"]),
+    help="Random machines per plan, rows of calibration and prediction, of these with bars that nobody knows or that are warm, or rows "
+    "of circles, only.",
 )
 @click.option(
     "--draws",
@@ -76,12 +77,13 @@ def coverage(
         found[name] = covered.numbers()
         if not as_json:
             _print(name, found[name])
-    if plan is None and part in {None, "calibration"}:
-        rows = _calibration(draws or SESSIONS, seed, _file(keep, "calibration"))
-        found["calibration"] = [row.plain() for row in rows]
-        found["faults"] = [row.fault for row in rows if row.fault]
-        if not as_json:
-            _print_rows(rows)
+    for which in ("calibration", "bars"):
+        if plan is None and part in {None, which}:
+            rows = _calibration(draws or SESSIONS, seed, _file(keep, which), which)
+            found[which] = [row.plain() for row in rows]
+            found["faults"] = [*found.get("faults", []), *(row.fault for row in rows if row.fault)]
+            if not as_json:
+                _print_rows(rows)
     if plan is None and part in {None, "circles"}:
         found["circles"] = _circles(draws or CIRCLES, seed, _file(keep, "circles"), as_json=as_json)
     if as_json:
@@ -102,12 +104,13 @@ def _plans(plan: str | None, part: str | None) -> list[str]:
     return sorted(PLANS) if plan is None else [plan]
 
 
-def _calibration(draws: int, seed: int, keep: Path | None) -> list[Row]:
+def _calibration(draws: int, seed: int, keep: Path | None, which: str) -> list[Row]:
     from dbbstation.cli.progress import progress_bar
-    from studies.coverage_calibration import CASES, coverage_of_calibration
+    from studies.coverage_calibration import CASES, OF_BARS, coverage_of_calibration
 
-    with progress_bar("sessions", draws * len(CASES)) as advance:
-        return coverage_of_calibration(CASES, range(seed, seed + draws), advance, keep)
+    cases = OF_BARS if which == "bars" else CASES
+    with progress_bar("sessions", draws * len(cases)) as advance:
+        return coverage_of_calibration(cases, range(seed, seed + draws), advance, keep)
 
 
 def _print_rows(rows: list[Row]) -> None:

@@ -1,0 +1,97 @@
+"""Noise of one turn at its low undulations, where form lies over it: as its spectrum above is continued by each memory that it may have.
+
+Noise that remembers its neighbours for longer than six degrees of the turn shows the same slope above 30 undulations, whatever its
+memory. The lines below tell more: noise has no more power there than was read, and where many lines have just what a memory lets
+expect, they are noise. Each line is noise alone, or form of any size over it [a mixture of a spike and a slab; Mitchell and
+Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.harmonics import continuations
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+CORNERS = np.geomspace(1.0, 240.0, 33)
+"""Corners of the spectrum that are tried, in undulations, from a memory of a sixth of a turn to none that shows."""
+
+NOISE_ALONE = 0.5
+"""Chance beforehand that a line below 30 undulations is noise alone. A wrong choice is as bad in both directions, hence one half."""
+
+FORM_DECADES = 6.0
+"""Decades of power over which form is as likely as not, all alike."""
+
+FIRST_FORM = 2
+"""The first line that is form. Those before are radius and centre, which were taken off."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContinuedNoise:
+    """Power of noise at lines 0, 1, ... low, by memory.
+
+    Attributes:
+        powers: of a line, shape (memories, low + 1) [µm²].
+        weights: of the memories, their sum one, shape (memories,).
+        freedoms: degrees of freedom of each, shape (memories,).
+    """
+
+    powers: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    freedoms: NDArray[np.float64]
+
+    @property
+    def usual(self) -> NDArray[np.float64]:
+        """Geometric mean over the memories, shape (low + 1,) [µm²]."""
+        return np.asarray(np.exp(self.weights @ np.log(self.powers)))
+
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """Mean over the memories, which is the variance that slow figures have, shape (low + 1,) [µm²]."""
+        return np.asarray(self.weights @ self.powers)
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the whole."""
+        logs = np.log(self.powers.mean(axis=1))
+        between = float(self.weights @ (logs - self.weights @ logs) ** 2)
+        return 2.0 / (float(self.weights @ (2.0 / self.freedoms)) + between)
+
+    def drawn(self, rng: np.random.Generator, draws: int) -> NDArray[np.float64]:
+        """Draw powers that the noise may have, shape (draws, low + 1) [µm²].
+
+        Each draw has one memory, and a strength as a flat prior of its logarithm makes it [scaled inverse chi-square; Gelman et al.,
+        Bayesian Data Analysis, sec. 2.6].
+        """
+        which = rng.choice(len(self.weights), draws, p=self.weights)
+        strength = self.freedoms[which] / rng.chisquare(self.freedoms[which])
+        return np.asarray(self.powers[which] * strength[:, None])
+
+
+def continued_noise(below: NDArray[np.float64], above: NDArray[np.float64], freedom: float = 2.0) -> ContinuedNoise:
+    """Continue the noise of one turn.
+
+    Args:
+        below: power at lines 0, 1, ... low, form included, shape (low + 1,) [µm²].
+        above: power of the noise at the lines above, shape (h,) [µm²].
+        freedom: degrees of freedom of each line.
+    """
+    low = len(below) - 1
+    found = continuations(freedom * above, low, freedom, CORNERS)
+    if found is None:
+        white = np.full((1, low + 1), float(above.mean()))
+        return ContinuedNoise(white, np.ones(1), np.array([freedom * len(above)]))
+    read = np.maximum(below[FIRST_FORM:], np.finfo(float).tiny)
+    expected = np.maximum(found.powers[:, FIRST_FORM:], np.finfo(float).tiny)
+    ratio = read / expected
+    alone = NOISE_ALONE * ratio * np.exp(-np.minimum(ratio, 700.0))  # both as densities of the logarithm of the power
+    with_form = (1.0 - NOISE_ALONE) * -np.expm1(-ratio) / (FORM_DECADES * np.log(10.0))
+    likely = found.likely + np.log(alone + with_form + np.finfo(float).tiny).sum(axis=1)
+    weights = np.exp(likely - likely.max())
+    least = 2.0 / (freedom * len(above))
+    return ContinuedNoise(found.powers, weights / weights.sum(), 2.0 / np.clip(found.variances, least, 1.0))

@@ -198,20 +198,22 @@ def _print_misfit(result: CalibrationResult) -> None:
 
 def _print_parameters(result: CalibrationResult) -> None:
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
+    from dbbstation.text.digits import decimals_of
 
     rows = []
     for source in result.sources:
         if source.name in IN_A_TABLE_OF_THEIR_OWN:
             continue
-        for name, number in source.parameters.items():
-            value, uncertainty, unit = number.value, number.uncertainty, number.unit
+        for name, parameter in source.parameters.items():
+            value, uncertainty, unit = parameter.value, parameter.uncertainty, parameter.unit
             each = 1.0
             if unit == "mm" and source.name not in IN_MM:
                 each, unit = 1e3, "µm"
-            known: list[object] = ["-", "-"]
+            cells = [f"{each * value:.1f}", "-", "-"]
             if uncertainty is not None:
-                known = [each * uncertainty, COVERAGE_FACTOR * each * uncertainty]
-            rows.append([source.name, name.removesuffix("_mm").replace("_", " "), each * value, *known, unit])
+                u, expanded = each * uncertainty, COVERAGE_FACTOR * each * uncertainty
+                cells = [f"{number:.{decimals_of(expanded)}f}" for number in (each * value, u, expanded)]
+            rows.append([source.name, name.removesuffix("_mm").replace("_", " "), *cells, unit])
     print_table(["source", "parameter", "value", "u", EXPANDED, "unit"], rows)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 import yaml
 
@@ -34,6 +36,20 @@ def test_text_and_json_say_the_same(run, jig_session):
     assert f"least visible, to {data['observability']['weak_directions'][0]['uncertainty']:.1f} µm" in text
     for check in data["scatter"]:
         assert f"scatter by {check['found_um']:.2f}" in text
+    _values_have_the_decimals_of_their_u(text, data)
+
+
+def _values_have_the_decimals_of_their_u(text, data):
+    """Two digits of U count [GUM 7.2.6], and no value is printed finer or coarser; not above ten, where its digits are whole ones."""
+    (lengths,) = [source for source in data["sources"] if source["name"] == "strut-reference-length"]
+    rows = [line.split() for line in text.splitlines() if line.startswith("strut-reference-length")]
+    assert len(rows) == 6
+    for _, _, strut, *shown, unit in rows:
+        number = lengths["parameters"][f"strut_{strut}_mm"]
+        expanded = 2e3 * number["uncertainty"]
+        decimals = max(1 - math.floor(math.log10(expanded)), 0)
+        assert shown == [f"{one:.{decimals}f}" for one in (1e3 * number["value"], expanded / 2.0, expanded)]
+        assert unit == "µm"
 
 
 def test_conv_a_on_a_jig_session_prescribes_six_and_says_which(run, jig_session):

@@ -30,8 +30,8 @@ DRIFT = 0.05
 BEFORE = (10, 20, 50, 200)
 """Sessions before a change."""
 
-FEW = (2, 3, 5, 8, 10)
-"""Sessions of histories that are decided by stated uncertainty."""
+FEW = (2, 3, 5, 8, 10, 16)
+"""Sessions of short histories: up to ten are decided by stated uncertainty, sixteen by the scatter that ten have shown."""
 
 LATE_STEPS = (3.0, 5.0, 7.0, 10.0, 20.0)
 """Sizes of steps in the last of a few sessions [stated uncertainties]."""

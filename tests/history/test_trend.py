@@ -50,6 +50,26 @@ def test_the_rate_is_that_of_all_watched_quantities_of_a_machine():
     assert machine.expected == pytest.approx(0.01 * 29)
 
 
+@pytest.mark.parametrize(("at", "count"), [(7, 8), (7, 16), (15, 16)])
+def test_a_tenth_of_a_millimetre_in_x_is_seen_in_the_eighth_and_in_the_sixteenth_session(rng, at, count):
+    """u of 0.6 µm, by which sessions scatter, too: stated U decides up to the tenth session, their scatter from the eleventh on."""
+
+    def figures(week):
+        noise = 0.6 * rng.standard_normal(3)
+        x_um = 2.0 + noise[1] + (100.0 if week >= at else 0.0)
+        figures = zip("GXY", (10.0 + noise[0], x_um, noise[2]), strict=True)
+        return RunFigures("a", "ccw", "here", tuple(Figure(name, value, 0.6) for name, value in figures))
+
+    (machine,) = histories([session(week, figures(week)) for week in range(count)], {}, ASKED)
+    found = {label: trend(machine, f"{label} a ccw").watched for label in "GXY"}
+    assert not found["G"].events
+    assert not found["Y"].events
+    (event,) = found["X"].events
+    # Seen at once; that it is no single session that stands out is known with the next one.
+    assert (event.found, event.since, event.by_stated) == (at if at == count - 1 else at + 1, at, at < 10)
+    assert event.difference == pytest.approx(100.0, abs=4.0 * 0.6)
+
+
 def test_machines_are_apart_and_in_the_order_of_their_names():
     found = histories([session(0, machine="b"), session(1, machine="a"), session(2, machine="b")], {}, ASKED)
     assert [(one.machine, [s.name for s in one.sessions]) for one in found] == [("a", ["w1"]), ("b", ["w0", "w2"])]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
+from statistics import median
 
 import numpy as np
 import pytest
@@ -34,6 +35,13 @@ def test_a_device_that_is_polled_takes_it_anywhere_before_it_replies() -> None:
     latch = latch_of(GAUGE, asked_s=0.0, first_byte_s=sent_s + 0.04 + character_s, baud=4800)
     assert latch.t_s == pytest.approx(sent_s + 0.02)
     assert latch.uncertainty_s == pytest.approx(0.04 / sqrt(12))
+
+
+def test_a_reply_that_came_before_its_line_could_carry_it_says_no_more_than_its_own_time() -> None:
+    """The line is faster than stated: a rectangle from asking to the first byte, not a moment that is known exactly."""
+    latch = latch_of(GAUGE, asked_s=1.0, first_byte_s=1.002, baud=4800)
+    assert latch.t_s == pytest.approx(1.001)
+    assert latch.uncertainty_s == pytest.approx(0.002 / sqrt(12))
 
 
 def test_a_reply_that_was_held_up_makes_it_less_certain() -> None:
@@ -89,5 +97,8 @@ def test_the_first_byte_of_a_sample_of_a_stream_lies_before_it_was_seen_whole() 
     length_s = protocol.frame_characters * 10 / 115_200
     # From one sample to the next it may jump where the computer was busy; over all of them it is the device's period.
     assert (readings[-1].first_byte_s - readings[0].first_byte_s) / 49 == pytest.approx(0.004, rel=0.25)
-    assert all(-length_s < one.first_byte_s - one.t_s < 0.2 for one in readings)
+    # The device's clock is read off what arrives: where the computer held up the first samples, some are stamped by as much too late.
+    behind_s = [one.first_byte_s - one.t_s for one in readings]
+    assert max(map(abs, behind_s)) < 0.2
+    assert -length_s < median(behind_s) < 0.2
     assert {one.t_uncertainty_s for one in readings} == {None}

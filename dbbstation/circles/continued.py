@@ -27,6 +27,10 @@ NOISE_ALONE = 0.5
 FORM_DECADES = 6.0
 """Decades of power over which form is as likely as not, all alike."""
 
+NOTHING_UM2 = 1e-24
+"""Least power of noise: less than the rounding of any length makes, 3e-11 µm at 150 mm. A path that was worked out and not measured
+has no more, nor has the difference of two that are the same [µm²]."""
+
 FIRST_FORM = 2
 """The first line that is form. Those before are radius and centre, which were taken off."""
 
@@ -84,14 +88,13 @@ def continued_noise(below: NDArray[np.float64], above: NDArray[np.float64], free
     low = len(below) - 1
     found = continuations(freedom * above, low, freedom, CORNERS)
     if found is None:
-        white = np.full((1, low + 1), float(above.mean()))
+        white = np.full((1, low + 1), max(float(above.mean()), NOTHING_UM2))
         return ContinuedNoise(white, np.ones(1), np.array([freedom * len(above)]))
-    read = np.maximum(below[FIRST_FORM:], np.finfo(float).tiny)
-    expected = np.maximum(found.powers[:, FIRST_FORM:], np.finfo(float).tiny)
-    ratio = read / expected
+    powers = np.maximum(found.powers, NOTHING_UM2)
+    ratio = np.maximum(below[FIRST_FORM:], NOTHING_UM2) / powers[:, FIRST_FORM:]
     alone = NOISE_ALONE * ratio * np.exp(-np.minimum(ratio, 700.0))  # both as densities of the logarithm of the power
     with_form = (1.0 - NOISE_ALONE) * -np.expm1(-ratio) / (FORM_DECADES * np.log(10.0))
     likely = found.likely + np.log(alone + with_form + np.finfo(float).tiny).sum(axis=1)
     weights = np.exp(likely - likely.max())
     least = 2.0 / (freedom * len(above))
-    return ContinuedNoise(found.powers, weights / weights.sum(), 2.0 / np.clip(found.variances, least, 1.0))
+    return ContinuedNoise(powers, weights / weights.sum(), 2.0 / np.clip(found.variances, least, 1.0))

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from dbbstation.circles.form import form_and_noise
+
+THETA = np.radians(np.arange(0.0, 360.0, 0.5))
 
 
 def test_an_empty_line_is_no_form_and_no_warning(rng):
@@ -16,3 +19,13 @@ def test_an_empty_line_is_no_form_and_no_warning(rng):
     apart = form_and_noise(deviation_um)
     assert np.isfinite(apart.form_um).all()
     assert np.abs(np.fft.rfft(apart.form_um)[0]) < 1e-9
+
+
+@pytest.mark.parametrize("size_um", [0.0, 2.0, 500.0])
+def test_a_path_without_any_noise_is_all_form(size_um):
+    """Two turns that are the same leave nothing of their difference, not even rounding."""
+    path = size_um * np.cos(2.0 * THETA)
+    found = form_and_noise(path)
+    assert found.form_um == pytest.approx(path, abs=1e-9)
+    assert np.sqrt(found.power_um2.max()) < 1e-9 * max(size_um, 1.0)
+    assert np.isfinite(found.continued.freedom)

@@ -186,7 +186,7 @@ def compensate_toolpath(
         chord_um=1e3 * float(off_mm.max(initial=0.0)),
         chord_line=int(toolpath.line[pieces.row[worst]]) if len(off_mm) else 0,
         tilt_um=1e3 * tilt_left_mm,
-        seconds=float(_seconds(done, planner).sum()),
+        seconds=float(_seconds(done, planner, in_chords=True).sum()),
         nominal_seconds=float(_seconds(toolpath, planner).sum()),
         slow=slow,
     )
@@ -302,7 +302,9 @@ def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner
             replace(path, feed_mm_min=of_feed * path.feed_mm_min, feed_deg_min=of_feed * path.feed_deg_min)
             for path in (toolpath, done)
         ]
-        nominal, own = (_seconds(path, planner).sum() for path in slower)
+        nominal, own = (
+            _seconds(path, planner, in_chords=chords).sum() for path, chords in zip(slower, (False, True), strict=True)
+        )
         return float(own / nominal)
 
     if share(1.0) <= SURELY_KEPT:
@@ -311,15 +313,15 @@ def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner
     for _ in range(20):
         middle = (low + high) / 2.0
         low, high = (middle, high) if share(middle) <= NAMED else (low, middle)
-    takes, took = of.lost(_seconds(toolpath, planner), _seconds(done, planner))
+    takes, took = of.lost(_seconds(toolpath, planner), _seconds(done, planner, in_chords=True))
     row = int(np.argmax((of.before == int(np.argmax(takes - took))) & (toolpath.kind == RowKind.FEED)))
     feed = float(toolpath.feed[row])
     return Slow(int(toolpath.line[row]), feed, low * feed, np.nan)
 
 
-def _seconds(path: Toolpath, planner: Planner) -> NDArray[np.float64]:
+def _seconds(path: Toolpath, planner: Planner, *, in_chords: bool = False) -> NDArray[np.float64]:
     """Time of each row at feed, zero in others, shape (n,) [s]."""
-    return np.where(path.kind == RowKind.FEED, planner.seconds(path), 0.0)
+    return np.where(path.kind == RowKind.FEED, planner.seconds(path, in_chords=in_chords), 0.0)
 
 
 def _slowed(done: Toolpath, planner: Planner) -> Toolpath:

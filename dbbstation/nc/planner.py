@@ -108,17 +108,18 @@ class Planner:
             return np.full(len(toolpath), np.inf)
         return np.sqrt(OF_AN_ARC * self.acceleration_mm_s2 * arc_radius_mm(toolpath))
 
-    def seconds(self, toolpath: Toolpath) -> NDArray[np.float64]:
+    def seconds(self, toolpath: Toolpath, *, in_chords: bool = False) -> NDArray[np.float64]:
         """Time of each row, shape (n,) [s]: dwells as written, rapids without, moves at feed with their ramps.
 
         `planned_time` says how they are reckoned. Moves in which A, B or C move by themselves, or nearly so, take their time.
+        `in_chords` says that arcs are written as their chords, as in compensated programs.
         """
         rows = np.flatnonzero(cuts(toolpath))
         seconds = np.where(toolpath.kind == RowKind.RAPID, 0.0, toolpath.duration_s)
         if len(rows) == 0:
             return seconds
         a = self.acceleration_mm_s2
-        segments = segments_of(toolpath, rows, self.limited(toolpath), a)
+        segments = segments_of(toolpath, rows, self.limited(toolpath), a, in_chords=in_chords)
         cycle_s = CYCLE_S if self.look_ahead is None else self.look_ahead.cycle_s
         seconds[rows] = seconds_of(segments, a, cycle_s, self.reached_mm_s(segments.length_mm))
         return seconds

@@ -1,10 +1,11 @@
 """What LinuxCNC's planner makes of programs as other people write them, nominal and compensated: time and path.
 
-`DBBSTATION_LOOK_ALIKES=200` runs as many in the nightly test, which prints a row for each.
+`DBBSTATION_LOOK_ALIKES=200` runs as many in the nightly test, which prints a row for each; `DBBSTATION_LOOK_ALIKES_FROM` is the first seed.
 """
 
 from __future__ import annotations
 
+import math
 import os
 
 import numpy as np
@@ -19,7 +20,7 @@ from dbbstation.nc.toolpath import RowKind, Toolpath
 from tests.nc.look_alikes import STYLES, look_alike
 from tests.nc.planner.linuxcnc import PERIOD_NS, Ran, missing, run
 from tests.nc.planner.required import needs
-from tests.nc.test_on_the_planner import accelerating, allowed_mm, judged
+from tests.nc.test_on_the_planner import accelerating, allowed_mm, judged, off_the_path_mm
 
 REASON = missing()
 pytestmark = [
@@ -30,6 +31,7 @@ pytestmark = [
 
 FASTER = 5
 ACCELERATIONS_MM_S2 = (500.0, 1000.0, 2000.0, 5000.0)
+FIRST = int(os.environ.get("DBBSTATION_LOOK_ALIKES_FROM", "0"))
 COUNT = int(os.environ.get("DBBSTATION_LOOK_ALIKES", "64"))
 
 
@@ -51,6 +53,39 @@ def within_a_cycle_mm(path: Toolpath, mm_s2: float) -> float:
     return float(mm_s / 2.0 * PERIOD_NS / 1e9 / 2.0)
 
 
+def beyond_bound(turned_rad: float, more: float) -> float:
+    """How far a corner between two moves that turn is left, as a share of P.
+
+    The first one has the deceleration a, and the second one begins where the first one is 2·P / sin(φ/2) from the corner, which is
+    right where both have the same acceleration. With an acceleration r·a of the second one they are as far from the corner at
+    the same time where the path is left by 4·r·cos(φ/2) / (1 + √r)² of P.
+
+    Args:
+        turned_rad: φ, the angle of the corner.
+        more: r.
+    """
+    return 4.0 * more * math.cos(turned_rad / 2.0) / (1.0 + math.sqrt(more)) ** 2
+
+
+def beyond_p_mm(path: Toolpath) -> float:
+    """By how much LinuxCNC leaves corners between moves that turn beyond P, at most [mm].
+
+    Before a rapid or an exact stop the last of them has all of the acceleration, the one before it half. Axes have limits each, so that
+    a move across two of them accelerates faster than one along one.
+    """
+    moves = np.flatnonzero(path.is_move)
+    way = (path.poses - path.before)[moves, :3]
+    length = np.linalg.norm(way, axis=1)
+    most, bound_mm = 0.0, path.corners_mm[moves]
+    for k in np.flatnonzero((length[1:] > 0.0) & (length[:-1] > 0.0) & (path.turn_deg[moves[1:]] > 0.0)):
+        first, second = (way[i] / length[i] for i in (k, k + 1))
+        ends = k + 2 == len(moves) or path.kind[moves[k + 2]] != path.kind[moves[k + 1]] or bound_mm[k + 1] == 0.0
+        more = float(np.abs(first).max() / np.abs(second).max()) * (2.0 if ends else 1.0)
+        turned_rad = math.acos(float(np.clip(first @ second, -1.0, 1.0)))
+        most = max(most, float(bound_mm[k]) * (beyond_bound(turned_rad, more) - 1.0))
+    return most
+
+
 def check(seed: int, linuxcnc, model) -> str:
     """Compensate one in the first way that keeps its feed, run both, and return a row of the table."""
     text, mm_s2 = look_alike(seed), ACCELERATIONS_MM_S2[seed // len(STYLES) % len(ACCELERATIONS_MM_S2)]
@@ -68,18 +103,35 @@ def check(seed: int, linuxcnc, model) -> str:
     nominal = run(text, mm_s2=mm_s2, faster=FASTER)
     read = read_program(done.text, "written.ngc")
     bounded = np.isfinite(read.corners_mm[read.is_move]).all()
+    more_mm = within_a_cycle_mm(read, mm_s2) + beyond_p_mm(read) if bounded else 0.0
     ran, off_mm = (
-        judged(done.text, read, mm_s2, FASTER) if bounded else (run(done.text, mm_s2=mm_s2, faster=FASTER), 0.0)
+        judged(done.text, read, mm_s2, FASTER, more_mm)
+        if bounded
+        else (run(done.text, mm_s2=mm_s2, faster=FASTER), 0.0)
     )
     first, second = feed_s(nominal, path), feed_s(ran, read)
     ratio, total = second / first, ran.moving_s / nominal.moving_s
     assert ratio <= KEPT, f"seed {seed}: {first} s at feed, compensated {second} s\n{text}"
     if bounded:
-        assert off_mm < allowed_mm(read, mm_s2) + within_a_cycle_mm(read, mm_s2), (
-            f"seed {seed}: {off_mm} mm off\n{text}"
-        )
+        assert off_mm < allowed_mm(read, mm_s2) + more_mm, f"seed {seed}: {off_mm} mm off\n{text}"
     cells = [f"{seed}", text[1:].split(" ")[0], f"{mm_s2 / 1e3:g}", prefer or "", f"{first:.2f}", f"{ratio:.4f}"]
     return f"| {' | '.join([*cells, f'{done.feed_s / second:.3f}', f'{total:.4f}'])} |"
+
+
+@pytest.mark.parametrize(("ends", "more"), [("G0 Z-990", 2.0), ("G1 X60 Y3 A3", 1.0)])
+def test_the_last_of_moves_that_turn_leaves_its_corner_by_more_than_p(ends, more):
+    """By a closed form: 1.37 P where a rapid follows, P where another move at feed follows."""
+    turned_rad = math.radians(3.0)
+    x, y = 20.0 + 20.0 * math.cos(turned_rad), 20.0 * math.sin(turned_rad)
+    text = f"G21 G90 G94 G64 P0.01\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X20 A1 F3000\nG1 X{x:.6f} Y{y:.6f} A2\n{ends}\nM2\n"
+    path = read_program(text, "corner.ngc")
+    corner = path.poses[path.is_move][1]
+    ran = run(text, mm_s2=2000.0, faster=FASTER)
+    near = np.abs(ran.poses[:, 0] - corner[0]) < 5.0
+    off_mm = off_the_path_mm(Ran(ran.time_s[near], ran.poses[near], ran.line[near]), path)
+    expected_mm = 0.01 * beyond_bound(turned_rad, more / math.cos(turned_rad))
+    # What servo cycles do: the second begins half of one too early or too late, and the cubic between them.
+    assert abs(off_mm - expected_mm) < within_a_cycle_mm(path, 2000.0) / 2.0 + 2000.0 * 1e-6 / 6.0
 
 
 @pytest.mark.slow
@@ -92,7 +144,7 @@ def test_they_keep_their_feed(seed, linuxcnc, crooked):
 @pytest.mark.nightly
 @pytest.mark.timeout(7200)
 def test_so_do_many(linuxcnc, crooked, capsys):
-    for seed in range(COUNT):
+    for seed in range(FIRST, COUNT):
         row = check(seed, linuxcnc, crooked)
         with capsys.disabled():
             print(row, flush=True)  # noqa: T201 - the table of the docs

@@ -46,6 +46,31 @@ def test_lines_in_one_direction_are_one(linuxcnc):
     assert parted.sum() == pytest.approx(50 / 20 + 20 / A)
 
 
+@pytest.mark.parametrize(("kink_deg", "stops"), [(0.0, 0), (0.25, 0), (0.28, 1)])
+def test_an_exact_path_stops_in_corners_alone(linuxcnc, kink_deg, stops):
+    """At v = 20 mm/s a kink of 0.1·a·(1 ms)/v = 0.286 degrees can be run. LinuxCNC ran 0.26 degrees and stopped at 0.28; with 5 m/s² 1.0 and 1.3."""
+    angle = np.radians(kink_deg)
+    on = f"G1 X{10 + 10 * np.cos(angle):.9f} Y{10 * np.sin(angle):.9f}"
+    took = seconds(linuxcnc, f"G61\n{START}\nG1 X10\n{on}")
+    assert took.sum() == pytest.approx(20 / 20 + (1 + stops) * 20 / A, rel=1e-5)
+
+
+def test_an_exact_path_goes_on_from_a_line_into_its_circle(linuxcnc):
+    """And not where A moves in it."""
+    straight, turning = (
+        seconds(linuxcnc, f"G61\nG0 X0 Y0 Z-1000 A0 B0 C0\nF120\nG1 X10{word}\nG3 J5").sum() for word in ("", " A1")
+    )
+    assert straight == pytest.approx((10 + 2 * np.pi * 5) / 2.0 + 2.0 / A, rel=1e-5)
+    assert turning > straight + 0.9 * 2.0 / A
+
+
+def test_an_exact_path_stops_where_the_circle_is_written_in_chords(linuxcnc):
+    """Its first chord, 0.8 degrees of R 2 mm, meets the line in half of that, more than 0.26: one ramp down, one up, v/a."""
+    path = linuxcnc.read("G21 G90 G94\nG61\nG0 X0 Y0 Z-1000 A0 B0 C0\nF1200\nG1 X10\nG3 J2\nM2\n", "timed.ngc")
+    written = PLANNER.seconds(path, in_chords=True).sum() - PLANNER.seconds(path).sum()
+    assert written == pytest.approx(20.0 / A, rel=0.2)  # in the circle the acceleration is a little less
+
+
 def test_a_corner_is_an_arc_within_its_bound(linuxcnc):
     """90 degrees, P 0.05 mm: R = P·cos 45°/(1 - cos 45°); v² = 0.866·a·R; the arc takes R off both lines."""
     bound, half = 0.05, 0.5**0.5

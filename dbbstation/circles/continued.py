@@ -59,13 +59,6 @@ class ContinuedNoise:
         """Mean over the memories, which is the variance that slow figures have, shape (low + 1,) [µm²]."""
         return np.asarray(self.weights @ self.powers)
 
-    @property
-    def freedom(self) -> float:
-        """Degrees of freedom of the whole."""
-        logs = np.log(self.powers.mean(axis=1))
-        between = float(self.weights @ (logs - self.weights @ logs) ** 2)
-        return 2.0 / (float(self.weights @ (2.0 / self.freedoms)) + between)
-
     def drawn(self, rng: np.random.Generator, draws: int) -> NDArray[np.float64]:
         """Draw powers that the noise may have, shape (draws, low + 1) [µm²].
 

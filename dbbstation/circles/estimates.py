@@ -77,7 +77,7 @@ def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:
     """Return the standard deviation of white noise, per sample, that would give a figure its uncertainty [µm].
 
     Args:
-        one: the circle; of few samples nothing is known, and rounding is what is left.
+        one: the circle. Of too few samples the noise is not known, and the rounding of the readings counts alone.
         undulations: 0 of radius and mean, 1 of a centre.
     """
     if not one.noise.known:

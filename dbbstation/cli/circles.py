@@ -180,10 +180,9 @@ def _print(result: CirclesResult, *, several: bool) -> None:
 def _figure(run: CircleFiguresResult | PairFigures, name: str, value: float) -> tuple[str, str]:
     """Return a figure and its U as they are printed."""
     from dbbstation.cli.output import COVERAGE_FACTOR
-    from dbbstation.text.digits import with_uncertainty
+    from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
 
-    u = run.uncertainty[name].u_um
-    return with_uncertainty(value, None if u is None else COVERAGE_FACTOR * u)
+    return with_uncertainty(value, expanded_uncertainty(run.uncertainty[name].u_um, COVERAGE_FACTOR))
 
 
 def _print_why_not(runs: Sequence[CircleFiguresResult | PairFigures]) -> None:

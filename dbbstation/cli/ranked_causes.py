@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table
-from dbbstation.text.digits import with_uncertainty
+from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,5 +59,4 @@ def print_effects(effects: Sequence[CauseContribution]) -> None:
 def _pair(value: float | None, u: float | None) -> tuple[str, str]:
     if value is None:
         return "-", "-"
-    shown, expanded = with_uncertainty(value, None if u is None else COVERAGE_FACTOR * u)
-    return shown, expanded
+    return with_uncertainty(value, expanded_uncertainty(u, COVERAGE_FACTOR))

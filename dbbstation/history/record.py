@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from datetime import datetime  # noqa: TC003 - JSON is read by it
+from math import nan
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,11 @@ class Figure:
     name: str
     value_um: float
     u_um: float | None
+
+    @property
+    def stated_u_um(self) -> float:
+        """Its standard uncertainty; not a number where it is not known [µm]."""
+        return nan if self.u_um is None else self.u_um
 
 
 @dataclass(frozen=True)

@@ -208,12 +208,11 @@ def _circle_series(sessions: Sequence[SessionFigures], asked: TrendOptions) -> d
                 one.at.append(k)
                 if len(repeats) == 1:  # as most are, and means take half of the time that a history opens in
                     one.values.append(figure.value_um)
-                    one.u.append(np.nan if figure.u_um is None else figure.u_um)
+                    one.u.append(figure.stated_u_um)
                     continue
                 one.values.append(fmean(figures[place].value_um for figures in repeats))
                 # What repeats do not share averages out; what is stated holds mostly what they share.
-                known = [np.nan if u_um is None else u_um for u_um in (figures[place].u_um for figures in repeats)]
-                one.u.append(sqrt(fmean(u_um**2 for u_um in known)))
+                one.u.append(sqrt(fmean(figures[place].stated_u_um ** 2 for figures in repeats)))
     order = sorted(found, key=lambda s: (s.test, s.direction, s.of, _FIRST.get(s.figure, len(_FIRST))))
     return {subject: found[subject] for subject in order}
 

@@ -26,8 +26,9 @@ MARGIN = 512
 """Columns for which room is made at first, where nobody says how many there will be."""
 
 LEAST_SHARE = 1e-12
-"""Share of a direction of the base in the rows that are left below which these do not show it: a few hundred times rounding, so that
-what is kept is known to a thousandth of itself. Directions that one run alone shows, a mounting's, have none."""
+"""Share of a direction of the base in the rows that are kept below which these do not show it: thousands of times rounding, 2e-16, so that
+a share that counts is known to a thousandth. Directions that one run alone shows, a mounting's, have none. In diagnoses of two sessions all
+shares were below 1e-14 or above 4e-4; from 1e-14 to 1e-8 the answers are the same to a millionth."""
 
 FEW = 0.5
 """Share of all columns up to which some are worked out by themselves."""

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dbbstation.calibration.reporting.prediction import smooth_lengths_mm
 from dbbstation.report.polar import Drawn, polar_of
-from dbbstation.results.ranked import expanded
-from dbbstation.text.digits import with_uncertainty
+from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
 from dbbstation.trace.analysis import horizontal_radius_mm, path_about_ball
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ def cause_rows(ranked: Ranked, coverage_factor: float) -> list[CauseRow]:
     for one in ranked.effects:
         count = len(one.circles)
         g, centre, space = (
-            ("-", "-") if value is None else with_uncertainty(value, expanded(u, coverage_factor))
+            ("-", "-") if value is None else with_uncertainty(value, expanded_uncertainty(u, coverage_factor))
             for value, u in (
                 (one.g_um, one.g_u_um),
                 (one.centre_um, one.centre_u_um),

@@ -17,6 +17,7 @@ from dbbstation.results.report import (
     WorstCircle,
 )
 from dbbstation.results.tolerances import filter_words, held_against
+from dbbstation.text.digits import expanded_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -84,7 +85,7 @@ def _worst(held: Held, coverage_factor: float) -> WorstCircle | None:
     worst, size = held.worst, held.size
     if worst is None or size is None:
         return None
-    expanded_um = None if size.u_um is None else coverage_factor * size.u_um
+    expanded_um = expanded_uncertainty(size.u_um, coverage_factor)
     return WorstCircle(worst.test, worst.direction, worst.repeat, size.um, expanded_um, size.why_not or None)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.text.digits import with_uncertainty
+from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,20 +39,10 @@ def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:
     """
     told = []
     for rank, one in enumerate(ranked.effects, start=1):
-        g, g_u = with_uncertainty(one.g_um, expanded(one.g_u_um, coverage_factor))
-        centre, _ = with_uncertainty(one.centre_um, expanded(one.centre_u_um, coverage_factor))
+        g, g_u = with_uncertainty(one.g_um, expanded_uncertainty(one.g_u_um, coverage_factor))
+        centre, _ = with_uncertainty(one.centre_um, expanded_uncertainty(one.centre_u_um, coverage_factor))
         known = "" if g_u == "-" else f", U {g_u} µm"
         told.append(
             f"Cause {rank}, {one.name}: {g} µm of G{known}, {centre} µm of the centres. {one.cure[0].upper()}{one.cure[1:].rstrip('.')}."
         )
     return tuple(told)
-
-
-def expanded(u: float | None, coverage_factor: float) -> float | None:
-    """Return U = k u of a contribution; None where u is not known.
-
-    Args:
-        u: standard uncertainty.
-        coverage_factor: k.
-    """
-    return None if u is None else coverage_factor * u

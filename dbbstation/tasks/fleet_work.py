@@ -263,8 +263,8 @@ def _of_circles(runs: Sequence[RunFigures]) -> tuple[FleetValue, ...]:
     for run in runs:
         for figure in run.figures:
             if figure.name in COMPARED:
-                u_um = np.nan if figure.u_um is None else figure.u_um
-                grouped[figure.name, run.test, run.direction, run.circle].append((figure.value_um, u_um))
+                same = grouped[figure.name, run.test, run.direction, run.circle]
+                same.append((figure.value_um, figure.stated_u_um))
     values = []
     for (name, test, direction, circle), repeats in grouped.items():
         value, u = np.mean(repeats, axis=0).tolist()

@@ -11,6 +11,16 @@ SIGNIFICANT = 2
 """Digits of an uncertainty that count."""
 
 
+def expanded_uncertainty(u: float | None, coverage_factor: float) -> float | None:
+    """Return U = k u; None where u is not known.
+
+    Args:
+        u: standard uncertainty.
+        coverage_factor: k.
+    """
+    return None if u is None else coverage_factor * u
+
+
 def decimals_of(expanded: float) -> int:
     """Return the decimals of a value with this expanded uncertainty, and of that; of none with uncertainty zero the most."""
     if not expanded > 0.0:

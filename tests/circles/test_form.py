@@ -22,10 +22,10 @@ def test_an_empty_line_is_no_form_and_no_warning(rng):
 
 
 @pytest.mark.parametrize("size_um", [0.0, 2.0, 500.0])
-def test_a_path_without_any_noise_is_all_form(size_um):
+def test_a_path_without_any_noise_is_all_form(size_um, rng):
     """Two turns that are the same leave nothing of their difference, not even rounding."""
     path = size_um * np.cos(2.0 * THETA)
     found = form_and_noise(path)
     assert found.form_um == pytest.approx(path, abs=1e-9)
     assert np.sqrt(found.power_um2.max()) < 1e-9 * max(size_um, 1.0)
-    assert np.isfinite(found.continued.freedom)
+    assert np.isfinite(found.continued.drawn(rng, 20)).all()

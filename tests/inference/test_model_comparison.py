@@ -285,7 +285,7 @@ def test_two_causes_with_sizes_of_their_own(rng):
 
 
 def test_information_whose_rounding_is_negative_is_that_of_the_prior_there(rng: np.random.Generator) -> None:
-    """Readings never take information away: what is left of an eigenvalue is one, and the others stay."""
+    """Readings never take information away: the negative eigenvalue becomes one, the others stay."""
     turned = np.linalg.qr(rng.normal(size=(4, 4)))[0]
     lower = cholesky(turned @ np.diag([-0.15, 3.0, 79.0, 1e6]) @ turned.T)
     assert np.all(np.diag(lower) > 0.0)

@@ -77,7 +77,7 @@ def _wrong_way(whole: Sound, run: int, apart_um: float) -> Judgement:
 
 
 def _put_across(one: Seen, um: float) -> Recording:
-    """Bring the first sine of a circle to a size and take its third away: what is left is a shift."""
+    """Bring the first sine of a circle to a size and take its third away, so that a shift remains."""
     circle, recording = one.run.circle, one.run.recording
     theta = np.radians(circle.theta_deg(progress(recording, circle)) - circle.start_deg)
     first, _, third = one.coefficients_um[HIGHEST_HARMONIC + 1 :]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from dbbstation.errors import ModelError
 from dbbstation.inference.square_root import Columns
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.model.observation import Motions
 from dbbstation.sources.contract import ErrorSource, Fitted, Need, Parameter
 
 if TYPE_CHECKING:
@@ -130,13 +132,11 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
     terms: list[ParameterSet] = []
     prior: list[float] = []
     random: list[bool] = []
-    motions = [observation.motion() for observation in observations]
-    for source in sources:
+    for source, sets in zip(sources, _sets(sources, observations), strict=True):
         parameters = source.parameters(machine)
-        given = [motion for motion in motions if not source.of_currents or motion.motor_current_a is not None]
-        for shared, motion in {source.shared_by(motion): motion for motion in given or motions}.items():
-            source.require(motion)
-            stated = source.stated_mm(motion)
+        for shared, stated in sets.items():
+            if isinstance(stated, ModelError):
+                raise stated
             if stated is not None and not np.any(stated > 0.0):
                 continue
             terms.append(ParameterSet(source, shared, parameters, slice(len(prior), len(prior) + len(parameters))))
@@ -147,6 +147,31 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
     scale = np.array([p.plausible for p in every])
     nominal = np.array([p.grid[len(p.grid) // 2] if p.grid else 0.0 for p in every])
     return Layout(machine, tuple(terms), Columns(np.array(prior), scale, np.array(random, dtype=bool)), nominal)
+
+
+_Stated: TypeAlias = "NDArray[np.float64] | ModelError | None"
+"""Size that is stated of a set of parameters, shape (p,), None where there is none; or why its source cannot be there."""
+
+
+def _sets(sources: Sequence[ErrorSource], observations: Sequence[Observation]) -> list[dict[str, _Stated]]:
+    """Names of the sets that each source needs, in the order of the runs, with what the last run of each says of its size.
+
+    One run at a time: its motion is six numbers a sample, more than all else that is known of it.
+    """
+    found: list[dict[str, _Stated]] = [{} for _ in sources]
+    driven = [observation.raw.motor_current_a is not None for observation in observations]
+    for motion, has_currents in zip(Motions(observations), driven, strict=True):
+        for source, sets in zip(sources, found, strict=True):
+            if source.of_currents and any(driven) and not has_currents:
+                continue
+            stated: _Stated
+            try:
+                source.require(motion)
+                stated = source.stated_mm(motion)
+            except ModelError as error:
+                stated = error
+            sets[source.shared_by(motion)] = stated
+    return found
 
 
 def _prior(parameter: Parameter) -> float:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from dbbstation.sources.registry import sources_named
 from dbbstation.trace.circle import RawCircle
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
+
+Found = TypeVar("Found")
 
 KINEMATIC_SOURCES = ("strut-reference-length", "base-joints")
 """The 24 parameters of [CAL II-C]."""
@@ -390,20 +393,36 @@ SMALLEST_NOISE_MM = 1e-7
 @with_one_thread
 def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple[NDArray[np.float64], ...]:
     """Measured minus predicted length of every run, shape (n,) each [mm]."""
+    return tuple(of_residuals(model, observations, lambda _, residual_mm: residual_mm))
+
+
+@with_one_thread
+def of_residuals(
+    model: MachineModel,
+    observations: Sequence[Observation],
+    work: Callable[[Observation, NDArray[np.float64]], Found],
+) -> list[Found]:
+    """What `work` makes of every run and its measured minus predicted length, shape (n,) [mm]; each is kept no longer than that."""
     needs = frozenset[Need]().union(*(f.source.needs for f in model.sources if not f.source.of_currents))
-    return _residuals(model, looked_at(observations, needs))
+    runs = looked_at(observations, needs)
+
+    def of_run(run: Observation | RunNodes) -> Found:
+        return work(run.run if isinstance(run, RunNodes) else run, _residual(model, run))
+
+    return in_parallel(of_run, runs, _usual_length(runs))
 
 
 def _residuals(model: MachineModel, runs: Sequence[Observation | RunNodes]) -> tuple[NDArray[np.float64], ...]:
-    def of_run(run: Observation | RunNodes) -> NDArray[np.float64]:
-        if isinstance(run, RunNodes):
-            length = model.bar(run.coarse.motion()).length_mm
-            if smooth(length[:, None] - run.run.raw.circle.bar_mm):
-                return run.run.raw.length_mm - run.samples_of(length)
-            run = run.run
-        return run.raw.length_mm - model.bar(run.motion()).length_mm
+    return tuple(in_parallel(partial(_residual, model), runs, _usual_length(runs)))
 
-    return tuple(in_parallel(of_run, runs, _usual_length(runs)))
+
+def _residual(model: MachineModel, run: Observation | RunNodes) -> NDArray[np.float64]:
+    if isinstance(run, RunNodes):
+        length = model.bar(run.coarse.motion()).length_mm
+        if smooth(length[:, None] - run.run.raw.circle.bar_mm):
+            return run.run.raw.length_mm - run.samples_of(length)
+        run = run.run
+    return run.raw.length_mm - model.bar(run.motion()).length_mm
 
 
 def _usual_length(runs: Sequence[Observation | RunNodes]) -> int:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.fit.calibrate import residuals
+from dbbstation.calibration.fit.calibrate import of_residuals
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import range_uncertainty_mm
@@ -85,7 +85,6 @@ def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evalua
         TraceError: a run that is no circle.
         ModelError: a source needs what the runs do not give.
     """
-    # One after the other: residuals are a number a sample.
     before, nominal_rms_um = _under(MachineModel(model.machine), observations)
     after, left_rms_um = _under(model.of_the_machine(), observations)
     first = [_first_in_direction(observations, k) for k in range(len(observations))]
@@ -107,8 +106,13 @@ def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evalua
 
 def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[list[CircleFigures], float]:
     """Return the figures of every run under a model, and the root mean square of what it leaves of all [µm]."""
-    left = residuals(model, observations)
-    return [_figures_of(o, residual) for o, residual in zip(observations, left, strict=True)], rms_um(left)
+
+    def of_run(observation: Observation, residual_mm: NDArray[np.float64]) -> tuple[CircleFigures, float, int]:
+        return _figures_of(observation, residual_mm), float(residual_mm @ residual_mm), len(residual_mm)
+
+    # Run by run: residuals are a number a sample.
+    found, squares, counts = zip(*of_residuals(model, observations, of_run), strict=True)
+    return list(found), 1e3 * float(np.sqrt(sum(squares) / sum(counts)))
 
 
 def rms_um(residual_mm: Sequence[NDArray[np.float64]]) -> float:

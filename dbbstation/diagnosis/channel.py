@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.harmonics import Spectrum
     from dbbstation.inference.square_root import Columns
     from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource, Parameter
 
@@ -85,6 +86,7 @@ class CircleChannel:
         for key, source in self.sources.items():
             self._laid[key] = self._on_a_grid(source)
         self._refined: dict[tuple[str, str], tuple[Variant, ...]] = {}
+        self._last: tuple[Calibration, list[BarReading]] = calibration, self.readings
 
     @property
     def observations(self) -> tuple[Observation, ...]:
@@ -153,13 +155,18 @@ class CircleChannel:
         return same if same.any() else np.ones((len(variant.whole), 1))
 
     def beside_base(
-        self, noise_mm: float, scatter: float = 1.0, but_for: NDArray[np.bool_] | None = None
+        self,
+        noise_mm: float,
+        scatter: float = 1.0,
+        but_for: NDArray[np.bool_] | None = None,
+        only: NDArray[np.int64] | None = None,
     ) -> BesideBase:
         """Causes beside the base at a noise of one sample [mm], balls scattering `scatter` times as stated.
 
-        Rows that are held back, shape (n,), say nothing; targets must be zero there.
+        Rows that are held back, shape (n,), say nothing; targets must be zero there. `only` are the columns that are asked for then,
+        all if None.
         """
-        columns = self.columns if but_for is None else self.columns.but_for(but_for)
+        columns = self.columns if but_for is None else self.columns.but_for(but_for, only)
         return BesideBase(columns, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM))
 
     def target(self, fit: Calibration) -> NDArray[np.float64]:
@@ -218,7 +225,7 @@ class CircleChannel:
             fit: about which.
         """
         source = self.sources[name, law]
-        readings = self.readings if fit is self.calibration else [fit.model.bar(motion) for motion in self.motions]
+        readings = self._readings_about(fit)
         parameters = source.parameters(self.machine)
         shaped = [k for k, p in enumerate(parameters) if p.grid]
         amplitudes = [k for k, p in enumerate(parameters) if not p.grid]
@@ -254,6 +261,14 @@ class CircleChannel:
             )
             for variant in variants
         )
+
+    def _readings_about(self, fit: Calibration) -> list[BarReading]:
+        """Readings of all runs as a fit predicts them; several causes are laid out about one fit, one after the other."""
+        if fit is self.calibration:
+            return self.readings
+        if fit is not self._last[0]:
+            self._last = fit, [fit.model.bar(motion) for motion in self.motions]
+        return self._last[1]
 
     def _amplitudes_in(self, fit: Calibration, key: tuple[str, str]) -> NDArray[np.float64] | None:
         """Amplitudes of a cause in a fit; None where that fit is without it."""

@@ -30,6 +30,9 @@ def without_tests(explained: Explained) -> ChosenAnew | None:
         return None
     target = channel.target(settled.after)
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
+    # What was laid out before it was laid out better is asked for by nobody.
+    variants = [variant for cause in settled.causes for variant in cause.variants]
+    used = np.unique(np.concatenate([columns for one in variants for columns in (one.columns, one.slack)]))
 
     def of_others() -> Iterator[ModelComparison]:
         for group in np.unique(groups):
@@ -37,7 +40,7 @@ def without_tests(explained: Explained) -> ChosenAnew | None:
             for rows, own in zip(channel.runs, groups, strict=True):
                 out[rows] = own == group
             kept = np.where(out, 0.0, target)
-            yield channel.beside_base(noise_mm, settled.scatter, but_for=out).comparison(kept)
+            yield channel.beside_base(noise_mm, settled.scatter, but_for=out, only=used).comparison(kept)
 
     def choose(comparison: ModelComparison) -> Sequence[Member]:
         begin = [settled.best.members]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES
-from dbbstation.calibration.reporting.prediction import smooth_circularity_um
+from dbbstation.calibration.reporting.prediction import smooth_circularities_um, smooth_circularity_um
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.workspace import workspace
 from dbbstation.errors import KinematicsError
@@ -275,7 +275,8 @@ def _u_of_mean_g(
     for observation, effect, answers, circle in zip(observations, effects, spread, circles, strict=True):
         if answers is None:
             return None
-        changes.append([_own_g_um(observation.raw, effect + change) - circle.g_um for change in answers.T])
+        lengths = [observation.raw.circle.bar_mm + effect + change for change in answers.T]
+        changes.append(np.array(smooth_circularities_um(observation.raw, lengths)) - circle.g_um)
     return _norm_of_mean(np.array(changes))
 
 

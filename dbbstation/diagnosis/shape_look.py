@@ -7,7 +7,6 @@ is still exact but for the width of a piece. The best few of each kind are compa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ from scipy.fft import next_fast_len, rfft
 from scipy.linalg import qr
 from scipy.sparse import csr_array
 
+from dbbstation.diagnosis.directional_sums import DirectionalSums, NearbyWaves, sides, solved, squares, taken
 from dbbstation.diagnosis.shapes import (
     BALL,
     EVERY,
@@ -82,47 +82,6 @@ PLACE_MM = 5.0
 """Of the platform's position, either way [mm]."""
 
 
-@dataclass(frozen=True, eq=False)
-class DirectionalSums:
-    """Sums over the pieces of one variable, for what moves in d directions.
-
-    Attributes:
-        at: mean of the variable in each piece, shape (b,) or (b, c).
-        rest: gain times what the base leaves, shape (b, d).
-        gains: gain times gain, shape (b, d, d).
-        base: gain times what the base can do, along orthonormal directions, shape (b, d, k).
-    """
-
-    at: NDArray[np.float64]
-    rest: NDArray[np.float64]
-    gains: NDArray[np.float64]
-    base: NDArray[np.float64]
-
-    def explained(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weighted sum of squares that curves explain beside the base, shape (m,), from (b, m, p)."""
-        pieces, many, count = curves.shape
-        flat = curves.reshape(pieces, many * count).T
-        rest = (flat @ self.rest).reshape(many, count, -1)
-        base = (flat @ self.base.reshape(pieces, -1)).reshape(many, count, *self.base.shape[1:])
-        pairs = (curves[:, :, :, None] * curves[:, :, None, :]).reshape(pieces, -1)
-        gains = (pairs.T @ self.gains.reshape(pieces, -1)).reshape(many, count, count, *self.gains.shape[1:])
-        return _solved(rest, _taken(base), gains)
-
-
-def _taken(base: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What directions of the base take from the products of curves, (m, p d, p d), from its products with them, (m, p, d, k)."""
-    side = base.reshape(len(base), base.shape[1] * base.shape[2], -1)
-    return np.asarray(side @ side.transpose(0, 2, 1))
-
-
-def _solved(rest: NDArray[np.float64], taken: NDArray[np.float64], gains: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Explained sums of squares from products with curves: (m, p, d), as `_taken` has them, and (m, p, p, d, d)."""
-    many, size = len(rest), rest.shape[1] * rest.shape[2]
-    normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - taken + np.eye(size)
-    right = rest.reshape(many, size, 1)
-    return np.asarray((right * np.linalg.solve(normal, right)).sum(axis=(1, 2)))
-
-
 class TemplateScan:
     """What a fit leaves of all runs, and what its base can do, in units of noise.
 
@@ -155,7 +114,10 @@ class TemplateScan:
             columns[start:stop, free.shape[1] :] = own[:, random] / noise_mm
         np.fill_diagonal(columns[ends[-1] :, free.shape[1] :], 1.0 / base.prior[random])
         # Readings only: what the rows of the priors take part in is no reading.
-        self._base = qr(columns, overwrite_a=True, mode="economic", check_finite=False)[0][: ends[-1]]
+        # Row by row in memory, as sums over rows ask for them.
+        self._base = np.ascontiguousarray(
+            qr(columns, overwrite_a=True, mode="economic", check_finite=False)[0][: ends[-1]]
+        )
         self._rest = np.concatenate(residual) / noise_mm
 
     def sums(
@@ -169,11 +131,14 @@ class TemplateScan:
             values = values[:, strut - 1] if variable in OF_STRUTS else values
         gain = gain * (PLAUSIBLE_MM / self._noise)
         _, piece, number = np.unique(pieces(values), return_inverse=True, return_counts=True)
-        add = csr_array((np.ones(len(piece)), (piece, np.arange(len(piece)))), shape=(len(number), len(piece)))
         many, directions = len(values), gain.shape[1]
+        rows = np.argsort(piece, kind="stable")
+        ends = np.concatenate([[0], np.cumsum(number)])
 
-        def added(samples: NDArray[np.float64]) -> NDArray[np.float64]:
-            return np.asarray(add @ samples, dtype=np.float64)
+        def added(samples: NDArray[np.floating], times: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+            """Sums over the pieces, of samples times one number each."""
+            weights = np.ones(many) if times is None else times[rows]
+            return np.asarray(csr_array((weights, rows, ends), shape=(len(number), many)) @ samples, dtype=np.float64)
 
         at = added(values.reshape(many, -1)) / number[:, None]
         products = (gain[:, :, None] * gain[:, None, :]).reshape(many, -1)
@@ -181,7 +146,7 @@ class TemplateScan:
             at=at[:, 0] if values.ndim == 1 else at,
             rest=added(gain * self._rest[:, None]),
             gains=added(products).reshape(-1, directions, directions),
-            base=np.stack([added(gain[:, d : d + 1] * self._base) for d in range(directions)], axis=1),
+            base=np.stack([added(self._base, gain[:, d]) for d in range(directions)], axis=1),
         )
 
 
@@ -297,11 +262,11 @@ def _finer(
     extent = float(np.ptp(sums.at))
     found = []
     for k in _peaks(explained, MADE_FINER):
-        best = grid[k]
+        waves, best = NearbyWaves(sums, float(grid[k])), grid[k]
         for step in FINER:
             near = best + np.arange(-15, 16) * step / extent
             near = near[near > 0.25 / extent]
-            by_near = sums.explained(_cosines(sums.at, near))
+            by_near = waves.explained(near)
             best = near[int(by_near.argmax())]
         found.append((float(by_near.max()), Wave(float(best))))
     found.sort(key=lambda one: -one[0])
@@ -330,20 +295,10 @@ def _waves_of_time(
     grid = np.arange(first, last) / (size * width)
     directions = sums.rest.shape[1]
     rest = transformed(sums.rest, 1)
-    taken = np.zeros((len(grid), 2 * directions, 2 * directions))
+    of_base = np.zeros((len(grid), 2 * directions, 2 * directions))
     for first_column in range(0, sums.base.shape[2], AT_ONCE):
         some = sums.base[:, :, first_column : first_column + AT_ONCE].reshape(len(place), -1)
-        taken += _taken(_sides(transformed(some, 1).reshape(len(grid), directions, -1)))
+        of_base += taken(sides(transformed(some, 1).reshape(len(grid), directions, -1)))
     twice = transformed(sums.gains.reshape(len(place), -1), 2).reshape(len(grid), directions, directions)
-    mean = sums.gains.sum(axis=0)
-    gains = np.empty((len(grid), 2, 2, directions, directions))
-    # cos² = (1 + cos 2x) / 2, sin² = (1 - cos 2x) / 2, sin cos = sin 2x / 2; a transform has exp(-ix).
-    gains[:, 0, 0], gains[:, 1, 1] = (mean + twice.real) / 2.0, (mean - twice.real) / 2.0
-    gains[:, 0, 1] = gains[:, 1, 0] = -twice.imag / 2.0
-    explained = _solved(_sides(rest), taken, gains)
+    explained = solved(sides(rest), of_base, squares(sums.gains.sum(axis=0), twice))
     return _finer("time", strut, moves, sums, grid, explained)
-
-
-def _sides(transform: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Sums with cosine and with sine, shape (m, 2, ...)."""
-    return np.stack([transform.real, -transform.imag], axis=1)

@@ -142,30 +142,46 @@ def amplitudes(values: NDArray[np.float64], phase_rad: NDArray[np.float64], high
         phase_rad: shape (n,) [rad].
         highest: below half of the samples.
     """
-    moment, further = _sums([np.ones(len(phase_rad)), values], phase_rad, 2 * highest)
+    return amplitudes_of([values], phase_rad, highest)[0]
+
+
+def amplitudes_of(
+    several: Sequence[NDArray[np.float64]], phase_rad: NDArray[np.float64], highest: int
+) -> list[NDArray[np.complex128]]:
+    """Harmonics of several values at the same phases, each as `amplitudes` has them: one set of normal equations serves all."""
+    moment, *further = _sums([np.ones(len(phase_rad)), *several], phase_rad, 2 * highest)
     order = np.arange(-highest, highest + 1)
     apart = order[None, :] - order[:, None]
     normal = np.where(apart < 0, np.conj(moment[np.abs(apart)]), moment[np.abs(apart)])
-    sums = further[: highest + 1]
-    right = np.concatenate([sums[:0:-1], np.conj(sums)])
     if np.linalg.cond(normal) > WORST_CONDITION:
-        fitted, *_ = np.linalg.lstsq(basis(phase_rad, highest), values, rcond=None)
+        fitted, *_ = np.linalg.lstsq(basis(phase_rad, highest), np.column_stack(several), rcond=None)
         waves = np.sqrt(2.0) * (fitted[1 : highest + 1] - 1j * fitted[highest + 1 :])
-        return np.concatenate([fitted[:1].astype(np.complex128), waves])
-    found = np.linalg.solve(normal, right)[highest:]
+        return list(np.vstack([fitted[:1].astype(np.complex128), waves]).T)
+    right = [np.concatenate([sums[highest:0:-1], np.conj(sums[: highest + 1])]) for sums in further]
+    found = np.linalg.solve(normal, np.column_stack(right))[highest:]
     found[1:] *= 2.0  # negative harmonics are the conjugates of positive ones
-    return np.asarray(found, dtype=np.complex128)
+    return list(found.T)
 
 
 def smooth(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], highest: int = LOW) -> NDArray[np.float64]:
     """Residual without what lies above a harmonic, by least squares, shape (n,)."""
-    padded = np.zeros((highest // AT_ONCE + 1) * min(AT_ONCE, highest + 1), dtype=np.complex128)
-    padded[: highest + 1] = amplitudes(residual, phase_rad, highest)
-    parts = padded.reshape(highest // AT_ONCE + 1, -1)
-    found = np.empty(len(phase_rad))
+    return smooth_of([residual], phase_rad, highest)[0]
+
+
+def smooth_of(
+    several: Sequence[NDArray[np.float64]], phase_rad: NDArray[np.float64], highest: int
+) -> list[NDArray[np.float64]]:
+    """Several residuals at the same phases, each as `smooth` has it."""
+    if not several:
+        return []
+    padded = np.zeros((len(several), (highest // AT_ONCE + 1) * min(AT_ONCE, highest + 1)), dtype=np.complex128)
+    padded[:, : highest + 1] = amplitudes_of(several, phase_rad, highest)
+    parts = padded.reshape(len(several), highest // AT_ONCE + 1, -1)
+    found = [np.empty(len(phase_rad)) for _ in several]
     for rows in _stretches(len(phase_rad)):
         fine, coarse = _waves(phase_rad[rows], highest)
-        found[rows] = ((parts @ fine) * coarse).sum(axis=0).real
+        for values, part in zip(found, parts, strict=True):
+            values[rows] = ((part @ fine) * coarse).sum(axis=0).real
     return found
 
 

@@ -131,14 +131,16 @@ class CauseColumns:
         self.count = last
         return np.arange(first, last)
 
-    def but_for(self, rows: NDArray[np.bool_]) -> CauseColumns:
+    def but_for(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> CauseColumns:
         """The same causes as all other rows show them, the columns themselves shared; targets must be zero in these rows.
 
         Args:
             rows: that are held back, shape (n,).
+            only: columns that are asked for, in their order, shape (q,); products of the others are zero. All if None.
         """
         # The axes, orthonormal over all rows, are made so over the rows that are left: few products of what is held back tell how.
-        axes, out = self.axes[rows], self.samples[rows]
+        own = np.arange(self.count) if only is None else only
+        axes, out = self.axes[rows], self.samples.T[np.ix_(own, np.flatnonzero(rows))]
         share, turned = np.linalg.eigh(np.eye(axes.shape[1]) - axes.T @ axes)
         turned, size = turned[:, share > LEAST_SHARE], np.sqrt(share[share > LEAST_SHARE])
         left = np.where(rows[:, None], 0.0, self.axes) @ (turned / size)
@@ -146,9 +148,11 @@ class CauseColumns:
             np.where(rows[:, None], 0.0, self.base), room=0, along=(left, (turned * size).T @ self.on_axes)
         )
         kept._buffer, kept.count, kept._ready = self._buffer, self.count, self.count
-        products = out.T @ out
-        kept._products = np.subtract(self.gram, products, out=products)
-        kept._along = (turned / size).T @ (self.along - axes.T @ out)
+        kept._products = np.zeros((self.count, self.count))
+        products = out @ out.T
+        kept._products[np.ix_(own, own)] = np.subtract(self.gram[np.ix_(own, own)], products, out=products)
+        kept._along = np.zeros((len(size), self.count))
+        kept._along[:, own] = (turned / size).T @ (self.along[:, own] - (out @ axes).T)
         return kept
 
 

@@ -107,7 +107,9 @@ _COMPILING = threading.RLock()
 
 def in_blocks(kernel: Callable[[int, int], None], count: int) -> None:
     """Call `kernel(start, stop)` for blocks that cover `range(count)`, on all cores where that pays."""
-    workers = 1 if _is_worker() else min(os.cpu_count() or 1, count // SMALLEST_BLOCK)
+    workers = count // SMALLEST_BLOCK
+    if workers > 1:
+        workers = 1 if _is_worker() else min(os.cpu_count() or 1, workers)
     if workers <= 1:
         kernel(0, count)
         return

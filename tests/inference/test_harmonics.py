@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.inference import harmonics
-from dbbstation.inference.harmonics import STRETCH, WORST_CONDITION, amplitudes, basis, coefficients, smooth
+from dbbstation.inference.harmonics import STRETCH, WORST_CONDITION, amplitudes, basis, coefficients, smooth, smooth_of
 
 
 def written_out(phase, highest):
@@ -56,6 +56,10 @@ def test_low_pass_of_a_part_of_the_period_is_least_squares_too(share, highest, i
     assert (np.linalg.cond(columns.T @ columns) > WORST_CONDITION) == ill
     fitted, *_ = np.linalg.lstsq(columns, values[kept], rcond=None)
     assert smooth(values[kept], phase[kept], highest) == pytest.approx(columns @ fitted, abs=1e-8)
+    three = [values[kept], values[kept] ** 2, np.cos(values[kept])]
+    fitted, *_ = np.linalg.lstsq(columns, np.column_stack(three), rcond=None)
+    assert np.column_stack(smooth_of(three, phase[kept], highest)) == pytest.approx(columns @ fitted, abs=1e-8)
+    assert smooth_of([], phase[kept], highest) == []
 
 
 @pytest.mark.parametrize("count", [50, STRETCH, 2 * STRETCH + 1])

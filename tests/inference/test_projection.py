@@ -153,9 +153,9 @@ def test_columns_that_come_later_count_as_those_that_were_there(samples, rng):
     assert columns.gram == pytest.approx(causes.T @ causes)
 
 
-@pytest.mark.parametrize("alone", [False, True])
-def test_rows_that_are_held_back_say_nothing(samples, rng, alone):
-    """As columns of the other rows alone; also where a random effect is known to the rows held back only."""
+@pytest.mark.parametrize(("alone", "only"), [(False, None), (True, None), (True, np.array([0, 2, 4]))])
+def test_rows_that_are_held_back_say_nothing(samples, rng, alone, only):
+    """As columns of the other rows alone; also where a random effect is known to the rows held back only, and for some columns."""
     base, causes, target = samples
     out = np.zeros(SAMPLES, dtype=bool)
     out[25:45] = True
@@ -167,7 +167,7 @@ def test_rows_that_are_held_back_say_nothing(samples, rng, alone):
     whole.add(causes)
     others.add(causes[~out])
     members = [Member(cause("a", variant(0, 2)), variant(0, 2), 1.0), Member(cause("b", variant(4)), variant(4), 0.3)]
-    held_back = BesideBase(whole.but_for(out), KNOWN, held, NOISE).comparison(np.where(out, 0.0, target))
+    held_back = BesideBase(whole.but_for(out, only), KNOWN, held, NOISE).comparison(np.where(out, 0.0, target))
     expected = BesideBase(others, KNOWN, held, NOISE).comparison(target[~out])
     assert held_back.log_evidence(members) == pytest.approx(expected.log_evidence(members), rel=1e-8)
     assert held_back.estimates(members).values == pytest.approx(expected.estimates(members).values, rel=1e-8)

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import residuals
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.inference.harmonics import smooth
+from dbbstation.inference.harmonics import smooth_of
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.trace.analysis import figures
 
@@ -79,11 +79,21 @@ def predicted_circles(
 
 def smooth_circularity_um(raw: RawCircle, length_mm: NDArray[np.float64]) -> float:
     """Circularity up to 30 undulations per revolution of lengths, shape (n,) [mm], at a circle's angles [µm]."""
-    return figures(raw, smooth_lengths_mm(raw, length_mm)).circularity_um
+    return smooth_circularities_um(raw, [length_mm])[0]
+
+
+def smooth_circularities_um(raw: RawCircle, lengths_mm: Sequence[NDArray[np.float64]]) -> list[float]:
+    """The same of several lengths, each of shape (n,) [mm], at one circle's angles [µm]."""
+    return [figures(raw, smooth_mm).circularity_um for smooth_mm in _smooth_mm(raw, lengths_mm)]
 
 
 def smooth_lengths_mm(raw: RawCircle, length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     """Lengths up to 30 undulations per revolution, shape (n,) [mm]."""
-    highest = min(UNDULATIONS, max(len(length_mm) // SAMPLES_PER_UNDULATION, 2))
+    return _smooth_mm(raw, [length_mm])[0]
+
+
+def _smooth_mm(raw: RawCircle, lengths_mm: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    highest = min(UNDULATIONS, max(len(raw) // SAMPLES_PER_UNDULATION, 2))
     bar_mm = raw.circle.bar_mm
-    return bar_mm + smooth(length_mm - bar_mm, np.radians(raw.phi_deg), highest)
+    several = smooth_of([length_mm - bar_mm for length_mm in lengths_mm], np.radians(raw.phi_deg), highest)
+    return [bar_mm + one for one in several]

@@ -77,15 +77,19 @@ class RunStart(ErrorSource):
         length = motion.struts(machine).length_mm
         from scipy.interpolate import CubicSpline  # noqa: PLC0415 - takes a third of a second; every command knows all sources
 
-        standing = np.zeros(len(motion)), CubicSpline([0.0, 1.0], np.tile(length[:1], (2, 1)))
-        if motion.setup is None:
-            return standing
-        away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]
-        if np.hypot(*np.ptp(away, axis=0)) < SAME_DEG:
-            return standing
-        theta = np.degrees(np.unwrap(np.arctan2(away[:, 1], away[:, 0])))
-        travelled = np.abs(theta - theta[0])
+        travelled = _travelled_deg(motion)
         rising = np.append(True, np.diff(np.maximum.accumulate(travelled)) > SAME_DEG)
         if np.count_nonzero(rising) < FEWEST:
-            return standing
+            return np.zeros(len(motion)), CubicSpline([0.0, 1.0], np.tile(length[:1], (2, 1)))
         return travelled, CubicSpline(travelled[rising], length[rising])
+
+
+def _travelled_deg(motion: Motion) -> NDArray[np.float64]:
+    """Angle travelled about the fixed ball at each row, shape (n,) [deg]; zero where there is none, and where nothing moves."""
+    if motion.setup is None:
+        return np.zeros(len(motion))
+    away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]
+    if np.hypot(*np.ptp(away, axis=0)) < SAME_DEG:
+        return np.zeros(len(motion))
+    theta = np.degrees(np.unwrap(np.arctan2(away[:, 1], away[:, 0])))
+    return np.asarray(np.abs(theta - theta[0]))

@@ -1,0 +1,135 @@
+"""Sums of readings over narrow pieces of a variable, and what curves over it would explain beside a base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import jv
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionalSums:
+    """Sums over the pieces of one variable, for what moves in d directions.
+
+    Attributes:
+        at: mean of the variable in each piece, shape (b,) or (b, c).
+        rest: gain times what the base leaves, shape (b, d).
+        gains: gain times gain, shape (b, d, d).
+        base: gain times what the base can do, along orthonormal directions, shape (b, d, k).
+    """
+
+    at: NDArray[np.float64]
+    rest: NDArray[np.float64]
+    gains: NDArray[np.float64]
+    base: NDArray[np.float64]
+
+    def explained(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weighted sum of squares that curves explain beside the base, shape (m,), from (b, m, p)."""
+        pieces, many, count = curves.shape
+        flat = curves.reshape(pieces, many * count).T
+        rest = (flat @ self.rest).reshape(many, count, -1)
+        base = (flat @ self.base.reshape(pieces, -1)).reshape(many, count, *self.base.shape[1:])
+        pairs = (curves[:, :, :, None] * curves[:, :, None, :]).reshape(pieces, -1)
+        gains = (pairs.T @ self.gains.reshape(pieces, -1)).reshape(many, count, count, *self.gains.shape[1:])
+        return solved(rest, taken(base), gains)
+
+
+class NearbyWaves:
+    """What waves of any frequency near one explain: sums with a few polynomials stand for those with every such wave.
+
+    With the place x of a piece between -1 and 1, exp(i a x) = J_0(a) + 2 sum i^n J_n(a) T_n(x), Bessel functions and Chebyshev polynomials
+    [Jacobi and Anger; Abramowitz and Stegun, eqs 9.1.44 and 9.1.45]. Terms beyond `TERMS` are below rounding for all frequencies within
+    `REACH` waves over the extent.
+
+    Args:
+        sums: over pieces of a variable of one dimension.
+        frequency: near which [1 / unit of the variable].
+    """
+
+    def __init__(self, sums: DirectionalSums, frequency: float) -> None:
+        self._frequency = frequency
+        low, high = float(sums.at.min()), float(sums.at.max())
+        self._half = max((high - low) / 2.0, np.finfo(np.float64).tiny)
+        x = (sums.at - (low + high) / 2.0) / self._half
+        pieces, directions = sums.rest.shape
+        self._directions, self._mean = directions, sums.gains.sum(axis=0)
+        wave = np.exp(2j * np.pi * frequency * (sums.at - (low + high) / 2.0))
+        self._rest, self._base = (
+            _moments(wave, x, values.reshape(pieces, -1), TERMS) for values in (sums.rest, sums.base)
+        )
+        self._twice = _moments(wave**2, x, sums.gains.reshape(pieces, -1), TERMS_OF_SQUARES)
+
+    def explained(self, frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weighted sum of squares that waves explain beside the base, shape (m,), from (m,): as curves of cosine and sine would.
+
+        Args:
+            frequencies: within `REACH` waves over the extent of the one that was given [1 / unit of the variable].
+        """
+        many, d = len(frequencies), self._directions
+        turned = 2.0 * np.pi * (frequencies - self._frequency) * self._half
+        once, twice = _weights(turned, TERMS), _weights(2.0 * turned, TERMS_OF_SQUARES)
+        rest = sides((once @ self._rest).conj())
+        base = sides((once @ self._base).conj()).reshape(many, 2, d, -1)
+        return solved(rest, taken(base), squares(self._mean, (twice @ self._twice).conj().reshape(many, d, d)))
+
+
+REACH = 0.55
+"""Waves over the extent of the variable by which frequencies are off the one that sums are made near."""
+
+TERMS, TERMS_OF_SQUARES = 18, 24
+"""Polynomials: J_n(pi REACH) and J_n(2 pi REACH) are below 2e-17 from there on."""
+
+
+def _moments(
+    wave: NDArray[np.complex128], x: NDArray[np.float64], values: NDArray[np.float64], terms: int
+) -> NDArray[np.complex128]:
+    """Sums of wave times Chebyshev polynomial times values, shape (terms, q), from (b,), (b,) and (b, q)."""
+    curves = np.empty((terms, 2, len(x)))
+    before, now = x, np.ones(len(x))  # T_1, which is also T_-1, and T_0
+    for curve in curves:
+        np.multiply(wave.real, now, out=curve[0])
+        np.multiply(wave.imag, now, out=curve[1])
+        before, now = now, 2.0 * x * now - before
+    found = (curves.reshape(2 * terms, -1) @ values).reshape(terms, 2, -1)
+    return np.asarray(found[:, 0] + 1j * found[:, 1])
+
+
+def _weights(turned: NDArray[np.float64], terms: int) -> NDArray[np.complex128]:
+    """Weight of each polynomial in exp(i a x), shape (m, terms), from a, shape (m,)."""
+    order = np.arange(terms)
+    weights = jv(order, turned[:, None]) * 1j**order
+    weights[:, 1:] *= 2.0
+    return np.asarray(weights)
+
+
+def sides(transform: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Sums with cosine and with sine, shape (m, 2, ...), from those with exp(-ix), shape (m, ...)."""
+    return np.stack([transform.real, -transform.imag], axis=1)
+
+
+def squares(mean: NDArray[np.float64], twice: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Sums with products of cosine and sine, shape (m, 2, 2, d, d), from those with one, (d, d), and with exp(-2ix), (m, d, d)."""
+    # cos² = (1 + cos 2x) / 2, sin² = (1 - cos 2x) / 2, sin cos = sin 2x / 2
+    found = np.empty((len(twice), 2, 2, *mean.shape))
+    found[:, 0, 0], found[:, 1, 1] = (mean + twice.real) / 2.0, (mean - twice.real) / 2.0
+    found[:, 0, 1] = found[:, 1, 0] = -twice.imag / 2.0
+    return found
+
+
+def taken(base: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What directions of the base take from the products of curves, (m, p d, p d), from its products with them, (m, p, d, k)."""
+    side = base.reshape(len(base), base.shape[1] * base.shape[2], -1)
+    return np.asarray(side @ side.transpose(0, 2, 1))
+
+
+def solved(rest: NDArray[np.float64], of_base: NDArray[np.float64], gains: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Explained sums of squares from products with curves: (m, p, d), as `taken` has them, and (m, p, p, d, d)."""
+    many, size = len(rest), rest.shape[1] * rest.shape[2]
+    normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - of_base + np.eye(size)
+    right = rest.reshape(many, size, 1)
+    return np.asarray((right * np.linalg.solve(normal, right)).sum(axis=(1, 2)))

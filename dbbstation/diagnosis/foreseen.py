@@ -1,0 +1,244 @@
+"""Tests that could be measured: circles within reach, and what their readings would say of base and causes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from dbbstation.errors import MachineError
+from dbbstation.machine.travel import check_travel
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.plan.circle import Circle, Direction
+from dbbstation.sources.contract import Motion, Need, Setup
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.channel import CircleChannel
+    from dbbstation.inference.model_comparison import Variant
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import BarReading
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource
+
+SAMPLES = 180
+TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0), (23.0, 0.0), (-23.0, 0.0), (0.0, 23.0))
+ELEVATIONS_DEG = (0.0, 10.0, -10.0)
+WAITS_S = (0.0, 3600.0)
+FEEDS = (0.5, 2.0)
+"""Of what was measured, for sources that act while the machine moves; tried on upright circles with a level bar."""
+
+SPACING_S = 200.0
+"""From the start of a run to that of the next one [s]."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A circle that could be measured, so long after the session's last run."""
+
+    circle: Circle
+    wait_s: float
+    observation: Observation
+
+    @property
+    def text(self) -> str:
+        """What to do, in words."""
+        x, y, z = (round(value) for value in self.circle.ball_mm)
+        a, b, _ = self.circle.tilt_deg
+        parts = [f"a circle about the ball at X {x} Y {y} Z {z} mm, tilted A {a:g} B {b:g} degrees"]
+        if self.circle.elevation_deg:
+            parts.append(f"the bar raised by {self.circle.elevation_deg:g} degrees")
+        parts.append("both directions")
+        if self.circle.feed_mm_min != self.observation.raw.circle.feed_mm_min:
+            parts.append(f"at {self.circle.feed_mm_min:g} mm/min")
+        if self.wait_s:
+            parts.append(f"{self.wait_s / 3600:.0f} h after the last run")
+        return ", ".join(parts)
+
+
+_Form: TypeAlias = tuple[str, str, tuple[float, ...]]
+"""Name of a source, law that it follows, nonlinear parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """One direction of a proposal, and what it would say, its mounting taken out.
+
+    Attributes:
+        ball: orthonormal directions of what a shift of the ball could do, shape (n, 3).
+        weight: for the many samples of a run, of which a few stand here.
+        touched: base columns that it has to do with, shape (t,).
+        base: rows of these, shape (n, t).
+        of_sources: rows of the amplitudes of sources, by name, law and nonlinear parameters, shape (n, p).
+    """
+
+    ball: NDArray[np.float64]
+    weight: float
+    touched: NDArray[np.int64]
+    base: NDArray[np.float64]
+    of_sources: dict[_Form, NDArray[np.float64]] = field(default_factory=dict)
+
+
+class ForeseenTests:
+    """Tests that could be measured beside those of a channel; what each would say is worked out once, whatever is asked of it.
+
+    Args:
+        channel: what was measured.
+
+    Attributes:
+        channel: the same.
+    """
+
+    def __init__(self, channel: CircleChannel) -> None:
+        self.channel = channel
+        self._ends_s = _ends_s(channel)
+        self._samples = float(np.mean([len(o.raw) for o in channel.observations]))
+        self._reachable: dict[Circle, bool] = {}
+        self._runs: dict[tuple[Circle, float, str], _Run] = {}
+
+    def that_show(self, needs: Collection[Need]) -> list[Proposal]:
+        """Circles about the balls of the plan that the machine can run: at other tilts and elevations, and what needs ask for.
+
+        Args:
+            needs: of the sources that are to show: with the time come later tests, with time and path other feeds.
+        """
+        seen: dict[str, Observation] = {}
+        for observation in self.channel.observations:
+            seen.setdefault(observation.setup.ball, observation)
+        waits = WAITS_S if Need.TIME in needs else WAITS_S[:1]
+        feeds = FEEDS if {Need.TIME, Need.PATH}.issubset(needs) else ()
+        found = []
+        for observation in seen.values():
+            circle = observation.raw.circle
+            x, y, z = circle.ball_mm
+            for a, b in TILTS_DEG:
+                for elevation in ELEVATIONS_DEG:
+                    height = z + circle.bar_mm * float(np.sin(np.radians(elevation)))
+                    tried = replace(
+                        circle,
+                        tilt_deg=(a, b, 0.0),
+                        elevation_deg=elevation,
+                        centre_mm=(x, y, height),
+                        direction=Direction.CCW,
+                    )
+                    if self._is_reachable(tried):
+                        found += [Proposal(tried, wait, observation) for wait in waits]
+            upright = replace(circle, tilt_deg=(0.0, 0.0, 0.0), elevation_deg=0.0, centre_mm=(x, y, z))
+            for share in feeds:
+                tried = replace(upright, feed_mm_min=share * circle.feed_mm_min, direction=Direction.CCW)
+                if self._is_reachable(tried):
+                    found.append(Proposal(tried, waits[0], observation))
+        return found
+
+    def rows(
+        self,
+        proposal: Proposal,
+        direction: Direction,
+        asked: Sequence[tuple[ErrorSource, Variant]],
+    ) -> NDArray[np.float64]:
+        """What a proposed run would say of base columns and of sources, compressed to few rows, shape (r, k).
+
+        Its mounting is new and tells nothing else, so what a shift of the ball could do is taken out of the rows.
+
+        Args:
+            proposal: the test.
+            direction: of the run.
+            asked: sources, whose columns stand behind those of the base, in all sets that they have.
+        """
+        run = self._run(proposal, direction, asked)
+        place = len(self.channel.base.prior)
+        touched, parts = [run.touched], [run.base]
+        for source, variant in asked:
+            own = run.of_sources[_form(source, variant)]
+            seen = np.flatnonzero(np.any(own != 0.0, axis=0))
+            touched.append(place + seen)
+            parts.append(own[:, seen])
+            # A source of the measurement has further sets, of other sessions and mountings, which this run does not touch.
+            place += len(variant.columns)
+        triangle = np.linalg.qr(np.hstack(parts), mode="r")
+        compressed = np.zeros((len(triangle), place))
+        compressed[:, np.concatenate(touched)] = triangle
+        return compressed
+
+    def _is_reachable(self, circle: Circle) -> bool:
+        if circle not in self._reachable:
+            self._reachable[circle] = _reachable(self.channel.machine, circle)
+        return self._reachable[circle]
+
+    def _run(self, proposal: Proposal, direction: Direction, asked: Sequence[tuple[ErrorSource, Variant]]) -> _Run:
+        """The run with what it would say of these sources; what it says of base and sources is kept, its reading is not."""
+        key = replace(proposal.circle, direction=direction), proposal.wait_s, proposal.observation.setup.ball
+        run = self._runs.get(key)
+        if run is None or any(_form(*one) not in run.of_sources for one in asked):
+            reading = MachineModel(self.channel.machine).bar(_motion(proposal, direction, self._ends_s))
+            run = self._runs[key] = run or self._of_base(reading)
+            for source, variant in asked:
+                if _form(source, variant) not in run.of_sources:
+                    run.of_sources[_form(source, variant)] = self._of_source(run, reading, source, variant)
+        return run
+
+    def _of_base(self, reading: BarReading) -> _Run:
+        motion = reading.actual.motion
+        ball, _ = np.linalg.qr(reading.sensitivity.direction[motion.kept])
+        layout = self.channel.calibration.layout
+        rows = np.zeros((len(reading.length_mm), len(layout.nominal)))
+        for term in layout.terms:
+            if term.acts_on(motion):
+                rows[:, term.columns] = reading.by_source(
+                    term.source, self.channel.machine, layout.nominal[term.columns]
+                )
+        touched = np.flatnonzero(np.any(rows != 0.0, axis=0))
+        weight = float(np.sqrt(self._samples / len(rows)))
+        return _Run(ball, weight, touched, _without(ball, rows[:, touched]) * weight)
+
+    def _of_source(self, run: _Run, reading: BarReading, source: ErrorSource, variant: Variant) -> NDArray[np.float64]:
+        parameters = source.parameters(self.channel.machine)
+        amplitudes = [k for k, p in enumerate(parameters) if not p.grid]
+        values = np.zeros(len(parameters))
+        values[[k for k, p in enumerate(parameters) if p.grid]] = variant.nonlinear
+        derivative = reading.by_source(source, self.channel.machine, values)[:, amplitudes]
+        return _without(run.ball, derivative) * run.weight
+
+
+def _form(source: ErrorSource, variant: Variant) -> _Form:
+    return source.name, source.varies_with, variant.nonlinear
+
+
+def _without(ball: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows without what lies along orthonormal directions."""
+    return np.asarray(rows - ball @ (ball.T @ rows), dtype=np.float64)
+
+
+def _reachable(machine: Machine, circle: Circle) -> bool:
+    try:
+        check_travel(machine, circle.envelope(step_deg=15.0), where="proposal")
+    except MachineError:
+        return False
+    return True
+
+
+def _ends_s(channel: CircleChannel) -> float:
+    """Return the end of the last run, on the clock of its session [s]; zero where times are unknown."""
+    clocks = [o.started_s + float(o.raw.t_s[-1]) for o in channel.observations if o.started_s is not None]
+    return max(clocks, default=0.0)
+
+
+def _motion(proposal: Proposal, direction: Direction, ends_s: float) -> Motion:
+    """One of two directions one after the other, mounted anew on the same ball, so long after the end of the last run [s]."""
+    first_s = ends_s + proposal.wait_s + SPACING_S
+    before: Setup = proposal.observation.setup
+    moving_s = (*before.moving_s, (first_s, first_s + SPACING_S * len(Direction)))
+    phi = np.linspace(-45.0, 360.0, SAMPLES + SAMPLES // 8, endpoint=False)
+    circle = replace(proposal.circle, direction=direction)
+    begun = first_s + SPACING_S * tuple(Direction).index(direction)
+    return Motion(
+        poses=circle.poses(circle.theta_deg(phi)),
+        is_path=True,
+        kept=slice(SAMPLES // 8, None),
+        time_s=begun + phi / circle.turning_deg_s,
+        setup=replace(before, mounting="proposed", moving_s=moving_s),
+    )

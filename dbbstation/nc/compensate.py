@@ -86,6 +86,8 @@ class Compensation:
         tilt_um: largest correction of the tilt that was left out, as felt at `LEVER_MM` [µm].
         seconds: time in moves at feed, by the planner's rule [s].
         nominal_seconds: of the toolpath that was compensated [s].
+        rapid_seconds: time in rapids, by the same rule; 0 where the control looks ahead [s].
+        nominal_rapid_seconds: of the toolpath that was compensated [s].
         slow: where the feed is lost; None where it is kept.
     """
 
@@ -96,6 +98,8 @@ class Compensation:
     tilt_um: float
     seconds: float
     nominal_seconds: float
+    rapid_seconds: float
+    nominal_rapid_seconds: float
     slow: Slow | None
 
 
@@ -175,7 +179,8 @@ def compensate_toolpath(
     corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
     done = _assembled(toolpath, pieces, commanded, runs, model.machine, corner_mm)
     turned = toolpath.turn_deg[pieces.row[_written(toolpath, pieces)]] > 0.0
-    done = replace(done, corners_mm=rapids.corners_mm(done, turned, planner, model.machine.feed_limit_mm_min))
+    fastest = model.machine.feed_limit_mm_min
+    done = replace(done, corners_mm=rapids.corners_mm(done, turned, planner, fastest))
     slow = _slowest(toolpath, done, _Of(runs, runs[pieces.row[_written(toolpath, pieces)]]), planner, short)
     if slow is not None and prefer is Prefer.ACCURACY:
         done = _slowed(done, planner)
@@ -188,6 +193,8 @@ def compensate_toolpath(
         tilt_um=1e3 * tilt_left_mm,
         seconds=float(_seconds(done, planner, in_chords=True).sum()),
         nominal_seconds=float(_seconds(toolpath, planner).sum()),
+        rapid_seconds=rapids.seconds(done, planner, fastest),
+        nominal_rapid_seconds=rapids.seconds(toolpath, planner, fastest),
         slow=slow,
     )
 
@@ -362,10 +369,10 @@ def _assembled(
 
 
 def _written(toolpath: Toolpath, pieces: Pieces) -> NDArray[np.bool_]:
-    """Which pieces become a row: all at feed, the last one of a rapid."""
+    """Which pieces become a row: all at feed, the last one of a rapid, or of those that go on in one direction."""
     row = pieces.row
     last = np.append(row[1:] != row[:-1], True)[: len(row)]
-    return np.asarray(last | (toolpath.kind[row] == RowKind.FEED))
+    return np.asarray((last & ~rapids.go_on(toolpath)[row]) | (toolpath.kind[row] == RowKind.FEED))
 
 
 def _until(toolpath: Toolpath, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

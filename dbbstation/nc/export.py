@@ -14,7 +14,7 @@ from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import CHORD_MM, Prefer, Slow, compensate_toolpath
-from dbbstation.nc.kept import TooSlowError, check_chord, check_feed, cost
+from dbbstation.nc.kept import TooSlowError, check_chord, check_feed, cost, slower_rapids
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.mark import marked
 from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
@@ -81,7 +81,10 @@ class Program:
         tilt_left_um: correction of the tilt that was left out, as felt 100 mm from the tip [µm]; None in a nominal program.
         feed_s: time of all moves at feed, as the control plans them [s]; None in a nominal program.
         nominal_feed_s: of the program that it was made from [s]; None in a nominal program.
+        rapid_s: time of all rapids, as the control plans them at the machine's greatest feed; None in a nominal program [s].
+        nominal_rapid_s: of the program that it was made from [s].
         cost: what a preference cost, in words; empty without one.
+        slower_rapids: what rapids lose, in words; empty where that is next to nothing.
     """
 
     name: str
@@ -96,7 +99,10 @@ class Program:
     tilt_left_um: float | None = None
     feed_s: float | None = None
     nominal_feed_s: float | None = None
+    rapid_s: float | None = None
+    nominal_rapid_s: float | None = None
     cost: str = ""
+    slower_rapids: str = ""
 
 
 def circle_programs(
@@ -336,7 +342,10 @@ def _program(
         done.tilt_um,
         done.seconds,
         done.nominal_seconds,
+        done.rapid_seconds,
+        done.nominal_rapid_seconds,
         spent,
+        slower_rapids(done),
     )
 
 

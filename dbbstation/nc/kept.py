@@ -6,8 +6,12 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dbbstation.errors import StationError
 from dbbstation.nc.compensate import Prefer
+from dbbstation.nc.planner import KEPT
+from dbbstation.nc.toolpath import RowKind
 
 if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
@@ -103,6 +107,20 @@ def cost(done: Compensation, asked_um: float, prefer: Prefer) -> str:
     if prefer is Prefer.FEED:
         return f"--prefer feed costs a chord error of {up(done.chord_um)} µm in place of {asked_um:g} µm, and {slower}"
     return f"--prefer position-only leaves a tilt that is felt as {up(done.tilt_um)} µm {LEVER}, and costs {slower}"
+
+
+def slower_rapids(done: Compensation) -> str:
+    """Return what rapids lose, in words; empty where the whole program takes no more than `KEPT` of its time."""
+    takes, took = done.rapid_seconds, done.nominal_rapid_seconds
+    if takes + done.seconds <= KEPT * (took + done.nominal_seconds):
+        return ""
+    told = f"rapids are reckoned to take {takes:.1f} s in place of {took:.1f} s, since A, B and C are corrected in them"
+    path = done.toolpath
+    if np.isfinite(path.corners_mm[path.kind == RowKind.RAPID]).all():
+        return told
+    return (
+        f"{told}: where the program says how far corners may be rounded, as with G64 P0.05, they lose next to nothing"
+    )
 
 
 def where(name: str, line: int) -> str:

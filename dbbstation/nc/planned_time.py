@@ -35,9 +35,15 @@ OF_AN_ARC = np.sqrt(3.0) / 2.0
 OF_A_KINK = 0.1
 """Share of the acceleration that a kink may ask for in one servo cycle without an arc (`ARC_BLEND_KINK_RATIO`)."""
 
-WITH_ROOM = 1.1
-"""An exact path goes on over a kink that could be run this much faster. Measured at 20 mm/s: 0.26 degrees run and 0.28 not where 0.286 could be, at 1 m/s²;
-1.0 run and 1.3 not where 1.43 could be, at 5 m/s²."""
+OF_A_KINK_OF_ARCS = 0.5
+"""Share of that where one of both moves is an arc (`BLEND_ACC_RATIO_TANGENTIAL`)."""
+
+TURNS_BACK_RAD = np.radians(2.0)
+"""Where the way on is this near to the way back LinuxCNC stops (`SHARP_CORNER_DEG`)."""
+
+GAP_CYCLES = 4
+"""A straight move of which the arc in its corner leaves no more than this many servo cycles is planned with that arc as one
+(`ARC_BLEND_GAP_CYCLES`, `blendCheckConsume`)."""
 
 OF_A_MOVE = 0.25
 """Share of the shorter of two moves by which their corner is left at most, where nothing bounds it (`tolerance_ratio`)."""
@@ -63,7 +69,8 @@ class Segments:
         open: whether it ends where nothing follows, without an exact stop, shape (m,).
         allowed_mm: by how much the corner to the next one may be left, shape (m - 1,) [mm].
         half_sine: sine of half the angle of that corner, shape (m - 1,).
-        written_half_sine: the same between the moves that are written, which are chords where arcs are no longer arcs, shape (m - 1,).
+        kink: greatest difference of the directions before and after it along one axis, of the moves that are written, which are chords where arcs
+            are no longer arcs, shape (m - 1,).
     """
 
     rows: NDArray[np.int64]
@@ -77,7 +84,7 @@ class Segments:
     open: NDArray[np.bool_]
     allowed_mm: NDArray[np.float64]
     half_sine: NDArray[np.float64]
-    written_half_sine: NDArray[np.float64]
+    kink: NDArray[np.float64]
 
 
 def arc_radius_mm(toolpath: Toolpath) -> NDArray[np.float64]:
@@ -111,8 +118,10 @@ def segments_of(
     of, begins = np.cumsum(first) - 1, np.flatnonzero(first)
     ends = np.append(begins[1:], len(rows)) - 1
     into, out = rows[ends[:-1]], rows[begins[1:]]
-    half_sine = _half_sine(toolpath, into, out)
-    written = _half_sine(replace(toolpath, arc=None), into, out) if in_chords else half_sine
+    half_sine = np.minimum(np.linalg.norm(_turned(toolpath, into, out), axis=1) / 2.0, 1.0)
+    as_written = replace(toolpath, arc=None) if in_chords else toolpath
+    kink = np.abs(_turned(as_written, into, out)).max(axis=1, initial=0.0)
+    kink = np.where(half_sine > np.cos(TURNS_BACK_RAD / 2.0), np.inf, kink)
     length_mm = np.asarray(np.bincount(of, weights=toolpath.tip_mm[rows]), dtype=np.float64)
     corners = toolpath.corners_mm[rows[ends]]
     shorter = np.minimum(length_mm[1:], length_mm[:-1])
@@ -128,14 +137,14 @@ def segments_of(
     limits = limited[rows[begins]]
     return Segments(
         *(rows, of, length_mm, feed_mm_s, radius_mm, limits),
-        *(follows, goes_on, ends_open, allowed_mm, half_sine, written),
+        *(follows, goes_on, ends_open, allowed_mm, half_sine, kink),
     )
 
 
-def _half_sine(toolpath: Toolpath, into: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Sine of half the angle between the end of some rows and the begin of others, shape (k,)."""
+def _turned(toolpath: Toolpath, into: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Difference of the unit vectors at the begin of some rows and at the end of others, shape (k, 3)."""
     leaves, goes = _ways(toolpath, into, toolpath.poses), _ways(toolpath, out, toolpath.before)
-    return np.minimum(np.linalg.norm(goes - leaves, axis=1) / 2.0, 1.0)
+    return np.asarray(goes - leaves, dtype=np.float64)
 
 
 def _ways(toolpath: Toolpath, rows: NDArray[np.int64], at: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -189,12 +198,19 @@ def seconds_of(
     # What an arc takes for turning it does not have for speeding up.
     turning = np.minimum(feed**2 / (segments.radius_mm * a), 1.0)
     own = a * np.sqrt(np.maximum(1.0 - turning**2, 1.0 - OF_AN_ARC**2)) * np.where(halved, 0.5, 1.0)
-    slower = np.minimum(feed[1:], feed[:-1])
-    straight_on = segments.follows & (_kink_mm_s(segments.written_half_sine, a, cycle_s) >= WITH_ROOM * slower)
-    smooth = (segments.goes_on | straight_on) & ~turns
-    corner, cut_mm, along_s = _arcs_in_corners(segments, a, cycle_s)
-    corner, cut_mm, along_s = (np.where(smooth, each, 0.0) for each in (corner, cut_mm, along_s))
+    asks = _asked_of_kinks(segments, a, cycle_s)
+    smooth = (segments.goes_on | (segments.follows & (asks < 1.0))) & ~turns
+    kink_mm_s = np.minimum(feed[1:], feed[:-1]) / np.maximum(asks, 1.0)
+    corner, cut_mm, arc_mm = (np.where(smooth, each, 0.0) for each in _arcs_in_corners(segments, a, cycle_s, kink_mm_s))
+    # A kink that is run as it is takes its share of the acceleration of both moves.
+    taken = np.where((corner > 0.0) & (arc_mm == 0.0), OF_A_KINK * np.minimum(asks, 1.0), 0.0)
+    own *= 1.0 - np.maximum(np.append(taken, 0.0), np.append(0.0, taken))
     left_mm = np.maximum(length - np.append(cut_mm, 0.0) - np.append(0.0, cut_mm), 0.0)
+    # What an arc leaves of a short move is planned with it as one, which changes speed evenly and has half of the acceleration for that.
+    one = (arc_mm > 0.0) & (left_mm[:-1] <= GAP_CYCLES * cycle_s * corner) & np.isinf(segments.radius_mm[:-1])
+    left_mm[:-1] += np.where(one, arc_mm, 0.0)
+    own[:-1] = np.where(one, a / 2.0, own[:-1])
+    along_s = np.divide(arc_mm, corner, out=np.zeros_like(corner), where=(arc_mm > 0.0) & ~one)
     # Two that overlap: the second one speeds up while the first one slows down.
     reach = np.minimum(feed, np.where(halved, alone_mm_s, np.sqrt(a * length)))
     begins = np.append(0.0, np.where(overlapped, 0.0, corner))
@@ -210,6 +226,7 @@ def seconds_of(
     ramps_mm = (2.0 * peak**2 - begins**2 - ends**2) / (2.0 * own)
     takes = (2.0 * peak - begins - ends) / own
     takes += np.divide(np.maximum(left_mm - ramps_mm, 0.0), peak, out=np.zeros_like(peak), where=peak > 0.0)
+    takes[:-1] = np.where(one, 2.0 * left_mm[:-1] / np.maximum(begins + ends, 1e-12)[:-1], takes[:-1])
     takes += np.append(along_s, 0.0)
     # The first of two begins to hand over when it is as slow as that; from there on its time is counted with the second.
     takes[:-1] -= np.where(overlapped, np.minimum(overlap_s, peak[:-1] / own[:-1]), 0.0)
@@ -220,17 +237,21 @@ def seconds_of(
     return seconds
 
 
-def _kink_mm_s(half_sine: NDArray[np.float64], a: float, cycle_s: float) -> NDArray[np.float64]:
-    """Speed with which each corner can be run as it is, infinite where there is none, same shape [mm/s]."""
-    with np.errstate(divide="ignore"):
-        kink: NDArray[np.float64] = OF_A_KINK * a * cycle_s / (2.0 * half_sine)
-    return kink
+def _asked_of_kinks(segments: Segments, a: float, cycle_s: float) -> NDArray[np.float64]:
+    """What the kink in each corner asks for at full speed, as a share of what may be asked of it, shape (m - 1,) [`tpSetupTangent`].
+
+    The axis that changes most does so in one servo cycle, which speeds up by a beside.
+    """
+    slower = np.minimum(segments.feed_mm_s[1:], segments.feed_mm_s[:-1])
+    arc = np.isfinite(segments.radius_mm)
+    most = OF_A_KINK * a * np.where(arc[1:] | arc[:-1], OF_A_KINK_OF_ARCS, 1.0)
+    return np.asarray((slower / cycle_s + a) * segments.kink / most, dtype=np.float64)
 
 
 def _arcs_in_corners(
-    segments: Segments, a: float, cycle_s: float
+    segments: Segments, a: float, cycle_s: float, kink_mm_s: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Speed in each corner [mm/s], what its arc takes from both moves [mm], and the time along it [s], shapes (m - 1,)."""
+    """Speed in each corner [mm/s], what its arc takes from both moves and its length [mm], shapes (m - 1,)."""
     half_sine = np.maximum(segments.half_sine, LEAST_ANGLE_RAD / 2.0)  # no arc fits below that
     half_cosine = np.sqrt(1.0 - half_sine**2)
     slower, faster = (each(segments.feed_mm_s[1:], segments.feed_mm_s[:-1]) for each in (np.minimum, np.maximum))
@@ -245,13 +266,12 @@ def _arcs_in_corners(
         # As wide as the speed asks for, or as long as it would take without an arc, with half the acceleration.
         as_long = np.minimum(np.sqrt(a * most_mm), planned) / (a / 2.0) * planned / turn
         radius = np.maximum(planned**2 / (OF_AN_ARC * a), np.minimum(as_long, widest))
-    kink = np.minimum(_kink_mm_s(segments.half_sine, a, cycle_s), slower)
     radius = np.where(fits, radius, 0.0)
     on_arc = np.minimum(np.minimum(planned, slower), radius * turn / cycle_s)
-    rounds = fits & (on_arc > kink)
-    along_s = np.divide(radius * turn, on_arc, out=np.zeros_like(on_arc), where=rounds)
+    rounds = fits & (on_arc > kink_mm_s)
+    arc_mm = np.where(rounds, radius * turn, 0.0)
     cut_mm = np.divide(radius * half_sine, half_cosine, out=np.zeros_like(radius), where=rounds)
-    return np.where(rounds, on_arc, kink), cut_mm, along_s
+    return np.where(rounds, on_arc, kink_mm_s), cut_mm, arc_mm
 
 
 def _overlaps(

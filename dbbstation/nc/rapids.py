@@ -1,4 +1,4 @@
-"""Where the rapids of a compensated program stop between each other, so that they are as fast as those of the nominal one.
+"""The rapids of a compensated program: where they stop between each other or are joined so that they are as fast as those of the nominal one.
 
 A rapid whose A, B and C are corrected turns by some thousandths of a degree. LinuxCNC lets it overlap with the rapids beside it, and
 plans it with half the acceleration for that (`planned_time`), where it fitted arcs into the corners before. Where it stops at its ends,
@@ -18,12 +18,54 @@ from dbbstation.nc.toolpath import RowKind
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.nc.planned_time import Segments
     from dbbstation.nc.planner import Planner
     from dbbstation.nc.toolpath import Toolpath
 
 WORTH_A_STOP = (1.0 - np.sqrt(0.5)) ** 2
 """Share of L·sin(φ/2), for a rapid of length L with a corner of φ behind it, up to which the bound P of that corner makes a stop worth while:
 2·√(2L/a) - 2·√(L/a) is gained by the stop, 2·√(2P/(a·sin(φ/2))) by the overlap."""
+
+
+SAME_WAY = 1e-6
+"""Two rapids are one where their unit vectors differ by no more: what rounding to six decimals makes of lines of a metre."""
+
+
+def go_on(toolpath: Toolpath) -> NDArray[np.bool_]:
+    """Rapids that the next row goes on with in the same direction and coordinate system, without a word between them, shape (n,).
+
+    LinuxCNC runs such rapids as one, and would stop between them where A, B and C are corrected.
+    """
+    plain = (toolpath.kind == RowKind.RAPID) & (toolpath.tip_mm > 0.0) & (toolpath.turn_deg == 0.0)
+    way = np.where(plain[:, None], toolpath.poses[:, :3] - toolpath.before[:, :3], 0.0)
+    unit = way / np.where(plain, toolpath.tip_mm, 1.0)[:, None]
+    same = np.linalg.norm(unit[1:] - unit[:-1], axis=1) <= SAME_WAY
+    same &= (toolpath.system[1:] == toolpath.system[:-1]) & (toolpath.frame[1:] == toolpath.frame[:-1]).all(axis=1)
+    goes_on = np.append(plain[1:] & plain[:-1] & same, False)[: len(plain)]
+    goes_on[list(toolpath.text)] = False
+    return goes_on
+
+
+def seconds(toolpath: Toolpath, planner: Planner, fastest_mm_min: float) -> float:
+    """Return the time of all rapids that move the tool tip [s].
+
+    Args:
+        toolpath: nominal or compensated.
+        planner: the control on its machine.
+        fastest_mm_min: speed of a rapid [mm/min].
+    """
+    rows = np.flatnonzero((toolpath.kind == RowKind.RAPID) & (toolpath.tip_mm > 0.0))
+    if planner.look_ahead is None or len(rows) == 0:
+        return 0.0
+    segments = _segments(toolpath, rows, planner, fastest_mm_min)
+    alone = planner.reached_mm_s(segments.length_mm)
+    return float(seconds_of(segments, planner.acceleration_mm_s2, planner.look_ahead.cycle_s, alone).sum())
+
+
+def _segments(toolpath: Toolpath, rows: NDArray[np.int64], planner: Planner, fastest_mm_min: float) -> Segments:
+    fast = np.full(len(toolpath), fastest_mm_min)
+    as_fast = replace(toolpath, feed_mm_min=fast, feed_deg_min=fast, arc=None)
+    return segments_of(as_fast, rows, toolpath.turn_deg > 0.0, planner.acceleration_mm_s2)
 
 
 def corners_mm(
@@ -43,10 +85,8 @@ def corners_mm(
     rows = np.flatnonzero((done.kind == RowKind.RAPID) & (done.tip_mm > 0.0))
     if planner.look_ahead is None or len(rows) < 2:  # noqa: PLR2004 - a pair
         return done.corners_mm
-    fast = np.full(len(done), fastest_mm_min)
-    as_fast = replace(done, feed_mm_min=fast, feed_deg_min=fast, arc=None)
     a = planner.acceleration_mm_s2
-    segments = segments_of(as_fast, rows, done.turn_deg > 0.0, a)
+    segments = _segments(done, rows, planner, fastest_mm_min)
     alone = planner.reached_mm_s(segments.length_mm)
     run = np.concatenate([[0], np.cumsum(~segments.goes_on)])
     # None stop, all do, or those whose corner is too tight for an overlap to be worth half the acceleration.

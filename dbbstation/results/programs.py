@@ -34,8 +34,11 @@ class WrittenProgram:
         tilt_left_um: correction of the tilt that was left out, as felt 100 mm from the tip [µm].
         feed_s: time of all moves at feed, as the control plans them [s].
         nominal_feed_s: of the program that it was made from [s].
+        rapid_s: time of all rapids, as the control plans them at the machine's greatest feed [s].
+        nominal_rapid_s: of the program that it was made from [s].
         text: the program.
         cost: what a preference cost, in words; empty without one.
+        slower_rapids: what rapids lose, in words; empty where that is next to nothing.
     """
 
     file: str
@@ -50,8 +53,11 @@ class WrittenProgram:
     tilt_left_um: float | None
     feed_s: float | None
     nominal_feed_s: float | None
+    rapid_s: float | None
+    nominal_rapid_s: float | None
     text: Annotated[str, Kept] = field(repr=False)
     cost: Annotated[str, Kept] = ""
+    slower_rapids: Annotated[str, Kept] = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +93,8 @@ class ProgramsResult(Framed):
                 "chord_error_um": one.chord_error_um,
                 "feed_s": one.feed_s,
                 "nominal_feed_s": one.nominal_feed_s,
+                "rapid_s": one.rapid_s,
+                "nominal_rapid_s": one.nominal_rapid_s,
             }
             for one in self.programs
         ]
@@ -137,6 +145,9 @@ def _written(file: str, each: Program) -> WrittenProgram:
         tilt_left_um=each.tilt_left_um,
         feed_s=each.feed_s,
         nominal_feed_s=each.nominal_feed_s,
+        rapid_s=each.rapid_s,
+        nominal_rapid_s=each.nominal_rapid_s,
         text=each.text,
         cost=each.cost,
+        slower_rapids=each.slower_rapids,
     )

@@ -14,7 +14,7 @@ import pytest
 from dbbstation.errors import StationError
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse, compensated_program
-from dbbstation.nc.planner import KEPT
+from dbbstation.nc.planner import KEPT, Planner
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import RowKind, Toolpath
 from tests.nc.look_alikes import STYLES, look_alike
@@ -112,6 +112,9 @@ def check(seed: int, linuxcnc, model) -> str:
     first, second = feed_s(nominal, path), feed_s(ran, read)
     ratio, total = second / first, ran.moving_s / nominal.moving_s
     assert ratio <= KEPT, f"seed {seed}: {first} s at feed, compensated {second} s\n{text}"
+    assert total <= KEPT or done.slower_rapids, (
+        f"seed {seed}: {nominal.moving_s} s in all, compensated {ran.moving_s} s\n{text}"
+    )
     if bounded:
         assert off_mm < allowed_mm(read, mm_s2) + more_mm, f"seed {seed}: {off_mm} mm off\n{text}"
     cells = [f"{seed}", text[1:].split(" ")[0], f"{mm_s2 / 1e3:g}", prefer or "", f"{first:.2f}", f"{ratio:.4f}"]
@@ -132,6 +135,17 @@ def test_the_last_of_moves_that_turn_leaves_its_corner_by_more_than_p(ends, more
     expected_mm = 0.01 * beyond_bound(turned_rad, more / math.cos(turned_rad))
     # What servo cycles do: the second begins half of one too early or too late, and the cubic between them.
     assert abs(off_mm - expected_mm) < within_a_cycle_mm(path, 2000.0) / 2.0 + 2000.0 * 1e-6 / 6.0
+
+
+@pytest.mark.parametrize(("count", "chord_mm", "kink_deg", "mm_s2"), [(1, 0.1, 3.0, 1000.0), (10, 0.15, 2.7, 5000.0)])
+def test_short_chords_take_the_time_that_is_reckoned(count, chord_mm, kink_deg, mm_s2, linuxcnc):
+    """Within what servo cycles do at each end of a move that stops. Reckoned with the acceleration of lines they were 10 and 12 ms faster."""
+    at = np.cumsum(np.exp(1j * np.radians(kink_deg) * np.arange(count + 2)) * np.r_[np.full(count, chord_mm), 5.0, 5.0])
+    lines = "\n".join(f"G1 X{end.real:.6f} Y{end.imag:.6f} F1200" for end in at)
+    text = f"G21 G90 G94\nG61\nG0 X0 Y0 Z-1000 A0 B0 C0\nG64 P0.01 Q0\n{lines}\nG61\nG1 Z-1001\nM2\n"
+    path = read_program(text, "chords.ngc")
+    reckoned_s = Planner(mm_s2, linuxcnc.look_ahead).seconds(path).sum()
+    assert abs(feed_s(run(text, mm_s2=mm_s2, faster=FASTER), path) - reckoned_s) < 3 * PERIOD_NS / 1e9
 
 
 @pytest.mark.slow

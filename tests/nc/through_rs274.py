@@ -79,6 +79,8 @@ def compare_elsewhere(groups: list[Group], wanted: list[Event], done: list[Event
     place = 0
     for group, event in zip(groups, nominal, strict=True):
         place += len(group.done)
+        if not group.done:
+            continue
         last = compensated[place - 1]
         off = np.abs(event.pose + event.offset - last.pose - last.offset)
         if off[:3].max() > SHIFT_MM or off[3:].max() > SHIFT_MM:
@@ -124,6 +126,9 @@ class _Walk:
         for index, event in enumerate(self.wanted):
             end = self._end_of(index, place)
             pieces = self.done[place:end]
+            if not pieces and self._goes_on(index):
+                found.append(Group(event, []))
+                continue
             if not pieces:
                 raise DiffersError(f"nothing stands for move {index} to {event.pose}")
             if {self.spoken[index]} != set(self.spoken_done[place:end]):
@@ -143,8 +148,23 @@ class _Walk:
         _same("number of moves", place, len(self.done))
         return found
 
+    def _goes_on(self, index: int) -> bool:
+        """Whether a rapid goes on in the next one, in the same direction, coordinate system and path control, with nothing said between them."""
+        if not 0 < index < len(self.wanted) - 1:
+            return False
+        before, event, on = (self.wanted[i] for i in (index - 1, index, index + 1))
+        first, second = event.pose - before.pose, on.pose - event.pose
+        ways = first[:3] @ second[:3], np.linalg.norm(first[:3]) * np.linalg.norm(second[:3])
+        straight = ways[1] > 0.0 and ways[0] > (1.0 - 1e-6) * ways[1] and not first[3:].any() and not second[3:].any()
+        alike = (event.kind, event.corner) == (on.kind, on.corner) and np.array_equal(event.offset, on.offset)
+        return bool(straight and alike and event.kind == "RAPID" and self.spoken[index] == self.spoken[index + 1])
+
     def _end_of(self, index: int, place: int) -> int:
         event = self.wanted[index]
+        if event.kind == "RAPID" and self._goes_on(index):
+            off = np.abs(self.tool[place] - event.pose)
+            if off[:3].max() > 4.0 * PRINTED * (1.0 + event.unit_mm):
+                return place  # it is written as one with the next
         if event.kind == "RAPID" or index == 0:
             return place + 1
         before = self.wanted[index - 1]

@@ -45,6 +45,9 @@ GAP_CYCLES = 4
 """A straight move of which the arc in its corner leaves no more than this many servo cycles is planned with that arc as one
 (`ARC_BLEND_GAP_CYCLES`, `blendCheckConsume`)."""
 
+EVENLY_S = 0.01
+"""A move that goes on into the next one and takes less than this changes speed evenly over its length (`ARC_BLEND_RAMP_FREQ`)."""
+
 OF_A_MOVE = 0.25
 """Share of the shorter of two moves by which their corner is left at most, where nothing bounds it (`tolerance_ratio`)."""
 
@@ -200,34 +203,35 @@ def seconds_of(
     own = a * np.sqrt(np.maximum(1.0 - turning**2, 1.0 - OF_AN_ARC**2)) * np.where(halved, 0.5, 1.0)
     asks = _asked_of_kinks(segments, a, cycle_s)
     smooth = (segments.goes_on | (segments.follows & (asks < 1.0))) & ~turns
-    kink_mm_s = np.minimum(feed[1:], feed[:-1]) / np.maximum(asks, 1.0)
-    corner, cut_mm, arc_mm = (np.where(smooth, each, 0.0) for each in _arcs_in_corners(segments, a, cycle_s, kink_mm_s))
+    arcs = _arcs_in_corners(segments, a, cycle_s, np.minimum(feed[1:], feed[:-1]) / np.maximum(asks, 1.0), smooth)
     # A kink that is run as it is takes its share of the acceleration of both moves.
-    taken = np.where((corner > 0.0) & (arc_mm == 0.0), OF_A_KINK * np.minimum(asks, 1.0), 0.0)
+    taken = np.where((arcs.enters > 0.0) & (arcs.length_mm == 0.0), OF_A_KINK * np.minimum(asks, 1.0), 0.0)
     own *= 1.0 - np.maximum(np.append(taken, 0.0), np.append(0.0, taken))
-    left_mm = np.maximum(length - np.append(cut_mm, 0.0) - np.append(0.0, cut_mm), 0.0)
-    # What an arc leaves of a short move is planned with it as one, which changes speed evenly and has half of the acceleration for that.
-    one = (arc_mm > 0.0) & (left_mm[:-1] <= GAP_CYCLES * cycle_s * corner) & np.isinf(segments.radius_mm[:-1])
-    left_mm[:-1] += np.where(one, arc_mm, 0.0)
-    own[:-1] = np.where(one, a / 2.0, own[:-1])
-    along_s = np.divide(arc_mm, corner, out=np.zeros_like(corner), where=(arc_mm > 0.0) & ~one)
+    left_mm = np.maximum(length - np.append(arcs.cut_mm, 0.0) - np.append(0.0, arcs.cut_mm), 0.0)
+    # What an arc leaves of a short move is one move with it.
+    one = (
+        (arcs.length_mm > 0.0) & (left_mm[:-1] <= GAP_CYCLES * cycle_s * arcs.mm_s) & np.isinf(segments.radius_mm[:-1])
+    )
+    arc_mm = arcs.length_mm + np.where(one, left_mm[:-1], 0.0)
+    left_mm[:-1] = np.where(one, 0.0, left_mm[:-1])
+    # Moves and the arcs between them in turn.
+    begins, ends, accelerations, lengths = (np.zeros(2 * len(length) - 1) for _ in range(4))
+    lengths[0::2], lengths[1::2] = left_mm, arc_mm
+    accelerations[0::2], accelerations[1::2] = own, a / 2.0
+    begins[1::2], begins[2::2] = np.where(one, feed[:-1], arcs.enters), arcs.leaves
+    ends[:-1] = begins[1:]
+    _in_reach(begins, ends, accelerations, lengths)
+    along_s, _ = _takes(arc_mm, begins[1::2], ends[1::2], np.full_like(arc_mm, a / 2.0), arcs.mm_s)
+    begins, ends = begins[0::2], ends[0::2]
     # Two that overlap: the second one speeds up while the first one slows down.
     reach = np.minimum(feed, np.where(halved, alone_mm_s, np.sqrt(a * length)))
-    begins = np.append(0.0, np.where(overlapped, 0.0, corner))
-    ends = np.append(np.where(overlapped, 0.0, corner), 0.0)
-    _in_reach(begins, ends, own, left_mm)
     overlap_s, entered, beyond_s = _overlaps(segments, a, own, reach, overlapped)
     entered_mm = 0.5 * entered * overlap_s
     begins[1:] = np.where(overlapped, entered, begins[1:])
     left_mm[1:] = np.maximum(left_mm[1:] - np.where(overlapped, entered_mm, 0.0), 0.0)
-    peak = np.sqrt(np.maximum((2.0 * own * left_mm + begins**2 + ends**2) / 2.0, 0.0))
-    lost = np.where(halved, alone_mm_s / np.sqrt(own * length), 1.0)
-    peak = np.maximum(np.minimum(peak * np.minimum(lost, 1.0), feed), np.maximum(begins, ends))
-    ramps_mm = (2.0 * peak**2 - begins**2 - ends**2) / (2.0 * own)
-    takes = (2.0 * peak - begins - ends) / own
-    takes += np.divide(np.maximum(left_mm - ramps_mm, 0.0), peak, out=np.zeros_like(peak), where=peak > 0.0)
-    takes[:-1] = np.where(one, 2.0 * left_mm[:-1] / np.maximum(begins + ends, 1e-12)[:-1], takes[:-1])
-    takes += np.append(along_s, 0.0)
+    lost = np.where(halved, np.minimum(alone_mm_s / np.sqrt(own * length), 1.0), 1.0)
+    takes, peak = _takes(left_mm, begins, ends, own, feed, lost)
+    takes[:-1] += along_s
     # The first of two begins to hand over when it is as slow as that; from there on its time is counted with the second.
     takes[:-1] -= np.where(overlapped, np.minimum(overlap_s, peak[:-1] / own[:-1]), 0.0)
     takes[1:] += np.where(overlapped, overlap_s, 0.0)
@@ -235,6 +239,35 @@ def seconds_of(
     rows_in_each = np.bincount(segments.of)
     seconds: NDArray[np.float64] = (takes / rows_in_each)[segments.of]
     return seconds
+
+
+def _takes(
+    length_mm: NDArray[np.float64],
+    begins: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    acceleration: NDArray[np.float64],
+    most_mm_s: NDArray[np.float64],
+    of_peak: NDArray[np.float64] | float = 1.0,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Time of moves [s] and their greatest speed [mm/s], shapes (k,).
+
+    They speed up and slow down as fast as they may, and evenly over their length where that takes next to no time.
+
+    Args:
+        length_mm: shape (k,).
+        begins: speed at their begin, shape (k,) [mm/s].
+        ends: at their end.
+        acceleration: shape (k,) [mm/s²].
+        most_mm_s: speed that they do not exceed, shape (k,).
+        of_peak: share of the speed that they would reach.
+    """
+    peak = of_peak * np.sqrt(np.maximum((2.0 * acceleration * length_mm + begins**2 + ends**2) / 2.0, 0.0))
+    peak = np.maximum(np.minimum(peak, most_mm_s), np.maximum(begins, ends))
+    ramps_mm = (2.0 * peak**2 - begins**2 - ends**2) / (2.0 * acceleration)
+    takes = (2.0 * peak - begins - ends) / acceleration
+    takes += np.divide(np.maximum(length_mm - ramps_mm, 0.0), peak, out=np.zeros_like(peak), where=peak > 0.0)
+    evenly_s = np.divide(2.0 * length_mm, begins + ends, out=np.full_like(peak, np.inf), where=ends > 0.0)
+    return np.where(evenly_s < EVENLY_S, evenly_s, takes), peak
 
 
 def _asked_of_kinks(segments: Segments, a: float, cycle_s: float) -> NDArray[np.float64]:
@@ -248,30 +281,51 @@ def _asked_of_kinks(segments: Segments, a: float, cycle_s: float) -> NDArray[np.
     return np.asarray((slower / cycle_s + a) * segments.kink / most, dtype=np.float64)
 
 
+@dataclass(frozen=True, eq=False)
+class _Arcs:
+    """What is between two moves, shapes (m - 1,).
+
+    Attributes:
+        enters: speed at its begin, 0 where the first move stops or hands over to the second [mm/s].
+        leaves: at its end.
+        mm_s: greatest speed in an arc.
+        cut_mm: what an arc takes from both moves.
+        length_mm: of an arc; 0 where there is none.
+    """
+
+    enters: NDArray[np.float64]
+    leaves: NDArray[np.float64]
+    mm_s: NDArray[np.float64]
+    cut_mm: NDArray[np.float64]
+    length_mm: NDArray[np.float64]
+
+
 def _arcs_in_corners(
-    segments: Segments, a: float, cycle_s: float, kink_mm_s: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Speed in each corner [mm/s], what its arc takes from both moves and its length [mm], shapes (m - 1,)."""
+    segments: Segments, a: float, cycle_s: float, kink_mm_s: NDArray[np.float64], smooth: NDArray[np.bool_]
+) -> _Arcs:
+    """Fit arcs into corners that are not left otherwise, where an arc is faster than the kink as it is [mm/s]."""
     half_sine = np.maximum(segments.half_sine, LEAST_ANGLE_RAD / 2.0)  # no arc fits below that
     half_cosine = np.sqrt(1.0 - half_sine**2)
-    slower, faster = (each(segments.feed_mm_s[1:], segments.feed_mm_s[:-1]) for each in (np.minimum, np.maximum))
+    first, second = segments.feed_mm_s[:-1], segments.feed_mm_s[1:]
     shorter_mm = np.minimum(segments.length_mm[1:], segments.length_mm[:-1])
-    fits = (segments.half_sine > LEAST_ANGLE_RAD / 2.0) & (half_cosine > LEAST_ANGLE_RAD)
+    fits = smooth & (segments.half_sine > LEAST_ANGLE_RAD / 2.0) & (half_cosine > LEAST_ANGLE_RAD)
     with np.errstate(divide="ignore"):
         by_bound = segments.allowed_mm * half_sine / (1.0 - half_cosine)
         most_mm = np.where(fits, np.fmin(by_bound, shorter_mm / 2.0), 0.0)
         turn = 2.0 * np.arcsin(half_sine)
         widest = most_mm * half_cosine / half_sine
-        planned = np.minimum(np.sqrt(OF_AN_ARC * a * widest), faster)
+        planned = np.minimum(np.sqrt(OF_AN_ARC * a * widest), np.maximum(first, second))
         # As wide as the speed asks for, or as long as it would take without an arc, with half the acceleration.
         as_long = np.minimum(np.sqrt(a * most_mm), planned) / (a / 2.0) * planned / turn
         radius = np.maximum(planned**2 / (OF_AN_ARC * a), np.minimum(as_long, widest))
     radius = np.where(fits, radius, 0.0)
-    on_arc = np.minimum(np.minimum(planned, slower), radius * turn / cycle_s)
-    rounds = fits & (on_arc > kink_mm_s)
-    arc_mm = np.where(rounds, radius * turn, 0.0)
+    mm_s = np.minimum(planned, radius * turn / cycle_s)
+    rounds = fits & (mm_s > kink_mm_s)
+    enters, leaves = (
+        np.where(smooth, np.where(rounds, np.minimum(mm_s, each), kink_mm_s), 0.0) for each in (first, second)
+    )
     cut_mm = np.divide(radius * half_sine, half_cosine, out=np.zeros_like(radius), where=rounds)
-    return np.where(rounds, on_arc, kink_mm_s), cut_mm, arc_mm
+    return _Arcs(enters, leaves, mm_s, cut_mm, np.where(rounds, radius * turn, 0.0))
 
 
 def _overlaps(

@@ -139,7 +139,7 @@ def test_the_last_of_moves_that_turn_leaves_its_corner_by_more_than_p(ends, more
 
 @pytest.mark.parametrize(("count", "chord_mm", "kink_deg", "mm_s2"), [(1, 0.1, 3.0, 1000.0), (10, 0.15, 2.7, 5000.0)])
 def test_short_chords_take_the_time_that_is_reckoned(count, chord_mm, kink_deg, mm_s2, linuxcnc):
-    """Within what servo cycles do at each end of a move that stops. Reckoned with the acceleration of lines they were 10 and 12 ms faster."""
+    """Within what servo cycles do at each end of a move that stops. Reckoned with the acceleration of lines they were 10 and 4 ms faster."""
     at = np.cumsum(np.exp(1j * np.radians(kink_deg) * np.arange(count + 2)) * np.r_[np.full(count, chord_mm), 5.0, 5.0])
     lines = "\n".join(f"G1 X{end.real:.6f} Y{end.imag:.6f} F1200" for end in at)
     text = f"G21 G90 G94\nG61\nG0 X0 Y0 Z-1000 A0 B0 C0\nG64 P0.01 Q0\n{lines}\nG61\nG1 Z-1001\nM2\n"

@@ -120,7 +120,7 @@ def test_a_line_that_touches_a_circle_goes_on_into_it(linuxcnc):
 
 
 def test_a_short_move_is_one_with_the_arc_in_its_corner(linuxcnc):
-    """0.1 mm from rest, then 3 degrees: the arc begins in its middle. Both change speed evenly, 2L/v, in place of v/a over 0.05 mm and more behind it."""
+    """0.1 mm from rest, then 3 degrees: the arc begins in its middle. Both have half of the acceleration."""
     length, angle = 0.1, np.radians(3.0)
     radius = length / 2.0 / np.tan(angle / 2.0)
     on = f"X{length + 20 * np.cos(angle):.9f} Y{20 * np.sin(angle):.9f}"
@@ -130,6 +130,32 @@ def test_a_short_move_is_one_with_the_arc_in_its_corner(linuxcnc):
     on_mm = 20.0 - length / 2.0
     rest = on_mm / 20.0 + (20.0**2 / 2.0 + (20.0 - v) ** 2 / 2.0) / (A * 20.0)
     assert took.sum() == pytest.approx(2.0 * way / v + rest, rel=1e-5)
+
+
+@pytest.mark.parametrize(("length", "evenly"), [(0.28, True), (0.32, False)])
+def test_a_move_that_ends_within_ten_milliseconds_changes_speed_evenly(linuxcnc, length, evenly):
+    """From 10 to 50 mm/s at 5 m/s²: 8 ms with all of the acceleration. 2L/(v1 + v2) is 9.3 and 10.7 ms; LinuxCNC took 9.3 ms for the one and 8 for the other."""
+    planner = Planner(5000.0, LookAhead(0.5))
+    lines = f"G1 X5 F600\nG1 X{5 + length} F3000\nG1 X20"
+    path = linuxcnc.read(f"G21 G90 G94\nG64 P0.01\nG0 X0 Y0 Z-1000 A0 B0 C0\n{lines}\nM2\n", "even.ngc")
+    took = planner.seconds(path)[path.kind == RowKind.FEED][1]
+    ramp_s = 40.0 / 5000.0
+    assert took == pytest.approx(2 * length / 60.0 if evenly else ramp_s + (length - 30.0 * ramp_s) / 50.0, rel=1e-3)
+
+
+def test_an_arc_in_a_corner_changes_from_one_speed_to_the_other(linuxcnc):
+    """From 10 to 20 mm/s with half of the acceleration: 90 degrees, P 0.4 mm at 5 m/s² would allow 65 mm/s."""
+    planner = Planner(5000.0, LookAhead(0.5))
+    lines = "G1 X20 F600\nG1 Y20 F1200"
+    path = linuxcnc.read(f"G21 G90 G94\nG64 P0.4\nG0 X0 Y0 Z-1000 A0 B0 C0\n{lines}\nG0 Z-900\nM2\n", "turn.ngc")
+    bound = 0.4 * 0.5**0.5 / (1.0 - 0.5**0.5)
+    as_long = 20.0 * 20.0 / (5000.0 / 2.0) / (np.pi / 2)  # as long as it would take without an arc
+    radius = max(20.0**2 / (OF_AN_ARC * 5000.0), min(as_long, bound))
+    arc = radius * np.pi / 2
+    ramp_s = 10.0 / 2500.0
+    on_arc = 2 * arc / 30.0 if 2 * arc / 30.0 < 0.01 else ramp_s + (arc - 15.0 * ramp_s) / 20.0
+    straight = (20.0 - radius) / 10.0 + 10.0 / (2 * 5000.0) + (20.0 - radius) / 20.0 + 20.0 / (2 * 5000.0)
+    assert planner.seconds(path).sum() == pytest.approx(straight + on_arc, rel=1e-4)
 
 
 def test_moves_that_turn_overlap(linuxcnc):

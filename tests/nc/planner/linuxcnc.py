@@ -33,6 +33,9 @@ PERIOD_NS = 1_000_000
 GREATEST_MM_S, GREATEST_DEG_S, GREATEST_DEG_S2 = 500.0, 600.0, 10_000.0
 """Speeds of axes, and the acceleration of the angles: no limit for any program here."""
 
+RAMP_HZ = 100.0
+"""What `ARC_BLEND_RAMP_FREQ` is where a file does not say: moves that end within its period change speed evenly. It has a clock of its own."""
+
 
 BEHIND = "the interpreter fell behind the planner"
 """As `drive.py` has it."""
@@ -122,6 +125,7 @@ def _configure(folder: Path, mm_s2: float, faster: int) -> None:
         "deg_s": GREATEST_DEG_S * faster,
         "mm_s2": mm_s2 * faster**2,
         "deg_s2": GREATEST_DEG_S2 * faster**2,
+        "ramp_hz": RAMP_HZ * faster,
     }
     ini = [(HERE / "planner.ini").read_text().format(**limits)]
     for joint, axis in enumerate("XYZABC"):

@@ -232,13 +232,17 @@ class Bank:
         rest = target - self.base @ self.base_values(np.zeros(len(self.channel.residual)))
         seen = np.linalg.svd(self.base / innovation, compute_uv=False)
         seen = seen[seen > RANK * seen[:1]]
+        return self.log_level() - 0.5 * float(rest @ rest) / innovation**2 - float(np.log(seen).sum())
+
+    def log_level(self) -> float:
+        """The part of a log likelihood that is of the noise alone: how much is new in each row, less what its parameters cost."""
+        count = len(self.spread)
         uneven = 0.0 if self.whitening is None else float(np.log(self.whitening.diagonal()).sum())
-        squares = 0.5 * float(rest @ rest) / innovation**2
         parameters = self.noise.parameters + (1 if np.isfinite(self.tails) else 0)
         if self.channel.levels is not None:
             parameters += int(self.channel.levels.max())
-        cost = akaike_cost(parameters, len(target)) + (float(np.log(len(target))) if self.grows_with else 0.0)
-        return -len(target) * float(np.log(innovation)) + uneven - squares - float(np.log(seen).sum()) - cost
+        cost = akaike_cost(parameters, count) + (float(np.log(count)) if self.grows_with else 0.0)
+        return -count * float(np.log(self.noise.innovation)) + uneven - cost
 
     def tails_beyond(self, members: Sequence[Member]) -> float:
         """Log likelihood of what is new in the rows under Student's t, over that of the weighted Gaussian that stands for it."""

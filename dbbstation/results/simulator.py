@@ -229,7 +229,7 @@ class SimulatorResult(Framed):
         parameters: of the simulator.
         left: whether something is left beyond noise.
         next: what to record next.
-        not_asked: terms that could not be asked, and why, by name.
+        not_asked: terms that were not compared in the end, and why, by name.
         simulations: how many were run.
         out: file of the missing terms as code; absent where none was written.
         corrected: file of the corrected values; absent where none was written.

@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.diagnosis.simulator.fit import not_told_apart
 from dbbstation.diagnosis.simulator.held import held_out_error, parts
 from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
-from dbbstation.diagnosis.simulator.search import compared, search
+from dbbstation.diagnosis.simulator.search import compared, moves, search
 from dbbstation.diagnosis.simulator.separate import separations
 from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns
 from dbbstation.inference.jackknife import refits_without
@@ -70,7 +70,7 @@ class SimulatorComparison:
         held_out: error of parts that took no part; None where it was not asked for.
         as_simulated: measured less simulated values with the parameters as stated, shape (n,).
         nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term.
-        not_asked: candidates that could not be asked, and why.
+        not_asked: candidates that were not compared in the end, and why.
         separations: what would distinguish terms that these recordings do not.
         stopped: why it ended early; empty where it did not.
     """
@@ -138,7 +138,7 @@ def find(
         as_simulated = work.residuals([stated])[0]
     nodes = Nodes(work, own, progress)
     base = nodes.base(stated)
-    found = search(nodes, base, lambda node: compared(node.channel, progress))
+    found = search(nodes, base, lambda channel: compared(channel, progress))
     stopped, held_out = found.stopped, None
     if hold_out and not stopped:
         try:
@@ -187,7 +187,7 @@ def _said(
         held_out=held_out,
         as_simulated=as_simulated,
         nonlinear=nonlinear,
-        not_asked=node.asked[1],
+        not_asked=node.asked[1] | dict.fromkeys(found.refuted, REFUTED),
         separations=separations(nodes, found, findings),
         stopped=stopped,
     )
@@ -208,10 +208,22 @@ def _judged(one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, flo
         if name in values:
             values[name] = replace(values[name], value=number)
     one = replace(one, values=values)
+    asked = moves(found.node, found.settled).get(one.name, 0.0)
+    if asked > MOST_ASKED and one.verdict.rank < Verdict.AMBIGUOUS.rank:
+        what = f"Refitted it is {asked:.1f} standard uncertainties from where the comparison about the refit has it: no verdict."
+        return replace(one, verdict=Verdict.AMBIGUOUS, text=what)
     if nonlinear[one.name] > AGREE and one.verdict.rank < Verdict.AMBIGUOUS.rank:
         what = f"True and linear answer to it differ by {100.0 * nonlinear[one.name]:.0f} %: no verdict."
         return replace(one, verdict=Verdict.AMBIGUOUS, text=what)
     return one
+
+
+REFUTED = "it was put in and refitted, and is not worth it there"
+"""Why a term that linear answers asked for is not compared in the end."""
+
+MOST_ASKED = 1.0
+"""Standard uncertainties by which a term may be from where the comparison about its refit has it: beyond, its ± would not hold what two
+ways to the same number differ by."""
 
 
 def _nonlinear(work: SimulationRuns, found: SearchOutcome) -> dict[str, float]:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
     from dbbstation.diagnosis.simulator.search import SearchOutcome
     from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
+    from dbbstation.inference.channel import Channel
     from dbbstation.inference.settled import Settled
 
 
@@ -82,7 +83,7 @@ def held_out_error(
         with_all = float(np.sum(np.square(weight[rows] * one.residual[rows])))
         gains: dict[tuple[str, ...], float] = {}
         for term in one.node.names:
-            less = nodes.without(one.node, term, weigh, sigma)
+            less = nodes.without(one.node, term)
             _, left = near(work, less.fitted, weigh, sigma)
             gains[(term,)] = float(np.sum(np.square(weight[rows] * left[rows]))) - with_all
         before, middle, after = (_rms(values[rows]) for values in (as_simulated, refitted, one.residual))
@@ -90,9 +91,9 @@ def held_out_error(
     return HeldOutError(tuple(folds))
 
 
-def _without(node: Node, out: NDArray[np.bool_], found: SearchOutcome) -> Settled:
-    """Comparison about a node without some rows, shape (n,)."""
-    return compared_quickly(node.channel.without(out).thinned(FOLD_ROWS), found.settled.beginning)
+def _without(channel: Channel, out: NDArray[np.bool_], found: SearchOutcome) -> Settled:
+    """Comparison without some rows, shape (n,)."""
+    return compared_quickly(channel.without(out).thinned(FOLD_ROWS), found.settled.beginning)
 
 
 def _rms(values: NDArray[np.float64]) -> float:

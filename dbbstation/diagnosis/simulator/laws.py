@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
     from dbbstation.inference.channel import Discrepancy
 
-    Curves = Mapping[tuple[str, str], NDArray[np.float64]]
+    Departures = Mapping[tuple[str, TermForm, tuple[str, ...]], NDArray[np.float64]]
 
 FORM_UNCERTAINTY = 0.02
 """Share of its effect by which real objects depart from a form over their state, one standard deviation, as springs and geometry do in
@@ -69,12 +69,8 @@ def laws(
             refused[one.name] = "the answers to two small doses of it do not agree"
         else:
             columns[one.name] = np.stack([answers.columns[:, part] for part in parts])
-    curves = {
-        (one.term.port, one.term.signals[0]): columns[one.name][0]
-        for one in dosed
-        if one.term.form is TermForm.CURVE and one.name in columns
-    }
-    laid_out = [_law(one, columns[one.name], size, curves) for one in dosed if one.name in columns]
+    off = {departing(one): _off(columns[one.name]) for one in dosed if one.term.form in OFF and one.name in columns}
+    laid_out = [_law(one, columns[one.name], size, off) for one in dosed if one.name in columns]
     for one in found:
         if one.tried:
             law = _in_place(work, state, one, size)
@@ -85,16 +81,44 @@ def laws(
     return laid_out, refused
 
 
-def curve_answers(work: SimulationRuns, state: FittedState, curves: Sequence[Candidate], size: float) -> Curves:
-    """Answers to curves about a state, by port and signal; those that nothing answers to are left out."""
-    answers = work.answers(state, [d for one in curves for d in _directions(one, ())], size)
-    found, first = {}, 0
-    for one in curves:
+OFF = frozenset({TermForm.CONSTANT, TermForm.LINEAR, TermForm.CURVE, TermForm.SLIP, TermForm.MEMORY})
+"""Along what real objects depart from a form: smooth curves over the signals of its port, of which a constant and a straight line are
+parts, and what lags behind these or sticks. A spring has a little of a hysteresis, and a capacitor in place of one of a memory."""
+
+
+def departing(one: Candidate) -> tuple[str, TermForm, tuple[str, ...]]:
+    """Port, form and signals of what others may depart along."""
+    return one.term.port, one.term.form, one.term.signals
+
+
+def departures(work: SimulationRuns, state: FittedState, found: Sequence[Candidate], size: float) -> Departures:
+    """What other terms about a state may be off by, from candidates that are none of them; what nothing answers to is left out."""
+    points = [(one, point) for one in found for point in product(*(grid[::EVERY] for grid in one.grids))]
+    answers = work.answers(state, [d for one, point in points for d in _directions(one, point)], size)
+    off: dict[tuple[str, TermForm, tuple[str, ...]], list[NDArray[np.float64]]] = {}
+    first = 0
+    for one, _ in points:
         own = slice(first, first + len(one.term.amplitudes))
         first = own.stop
         if answers.seen[own].all():
-            found[(one.term.port, one.term.signals[0])] = answers.columns[:, own]
-    return found
+            off.setdefault(departing(one), []).append(answers.columns[:, own])
+    return {key: of_unit_size(parts) for key, parts in off.items()}
+
+
+def of_unit_size(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Columns of one form at several points, each shape (n, p), that are together as large as one of root mean square one."""
+    columns = np.hstack(parts)
+    rms = np.maximum(np.sqrt(np.mean(np.square(columns), axis=0)), 1e-300)
+    return np.asarray(columns / (rms * np.sqrt(len(parts))))
+
+
+EVERY = 2
+"""Of the points of a grid every second is taken for what other forms may be off by: between them answers hardly differ."""
+
+
+def _off(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What other forms may be off by, from columns of a candidate at all points of its grid, shape (points, n, p)."""
+    return of_unit_size(list(columns[::EVERY]))
 
 
 def form_uncertainty(one: Candidate) -> float:
@@ -104,14 +128,12 @@ def form_uncertainty(one: Candidate) -> float:
     return LOOSE_FORM_UNCERTAINTY if one.term.form in LOOSE else FORM_UNCERTAINTY
 
 
-def discrepancy(one: Candidate, curves: Curves) -> Discrepancy | None:
-    """Columns of what a form may be off by: smooth curves over the signals of its port, each as large as the effect."""
-    taken = one.term.signals if one.term.form is TermForm.CURVE else ()
-    own = [columns for (port, signal), columns in curves.items() if port == one.term.port and signal not in taken]
+def discrepancy(one: Candidate, off: Departures) -> Discrepancy | None:
+    """Columns of what a form may be off by: curves, lags and stick-slip over the signals of its port, each as large as the effect."""
+    own = [columns for key, columns in off.items() if key[0] == one.term.port and not _is_of(one, key)]
     if not own or not form_uncertainty(one):
         return None
     columns = np.hstack(own)
-    columns = columns / np.maximum(np.sqrt(np.mean(np.square(columns), axis=0)), 1e-300)
 
     def beside(
         effect: NDArray[np.float64], _nonlinear: tuple[float, ...], _amplitudes: NDArray[np.float64]
@@ -121,6 +143,10 @@ def discrepancy(one: Candidate, curves: Curves) -> Discrepancy | None:
     return beside
 
 
+def _is_of(one: Candidate, key: tuple[str, TermForm, tuple[str, ...]]) -> bool:
+    return one.term.form in OFF and key == departing(one)
+
+
 def _directions(one: Candidate, point: tuple[float, ...]) -> list[PerturbedParameter]:
     amplitudes = len(one.term.amplitudes)
     term = one.term.with_numbers([0.0] * amplitudes + list(point))
@@ -128,7 +154,7 @@ def _directions(one: Candidate, point: tuple[float, ...]) -> list[PerturbedParam
     return [PerturbedParameter(key, 1e-3, k, term) for k, key in enumerate(keys)]
 
 
-def _law(one: Candidate, columns: NDArray[np.float64], size: float, curves: Curves) -> Law:
+def _law(one: Candidate, columns: NDArray[np.float64], size: float, off: Departures) -> Law:
     """Law of a candidate from its columns at all points of its grid, shape (points, n, p)."""
     rms = np.sqrt(np.mean(np.square(columns), axis=(0, 1)))
     return Law(
@@ -142,7 +168,7 @@ def _law(one: Candidate, columns: NDArray[np.float64], size: float, curves: Curv
         log_odds=one.log_odds,
         reach=size if one.grids else None,
         form_uncertainty=form_uncertainty(one),
-        discrepancy=discrepancy(one, curves),
+        discrepancy=discrepancy(one, off),
     )
 
 

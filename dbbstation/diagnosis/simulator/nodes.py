@@ -14,26 +14,37 @@ import numpy as np
 
 from dbbstation.diagnosis.simulator.candidates import Candidate, candidates
 from dbbstation.diagnosis.simulator.fit import SimulatorFit, fit
-from dbbstation.diagnosis.simulator.laws import SHARE, curve_answers, discrepancy, form_uncertainty, laws
-from dbbstation.diagnosis.simulator.terms import TermForm
+from dbbstation.diagnosis.simulator.laws import (
+    OFF,
+    SHARE,
+    departing,
+    departures,
+    discrepancy,
+    form_uncertainty,
+    laws,
+    of_unit_size,
+)
+from dbbstation.diagnosis.simulator.noise_left import channel_of, noise_left
 from dbbstation.diagnosis.simulator.work import AGREE, FittedState, RanAwayError
-from dbbstation.diagnosis.table.data import rounding_of
-from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.bank import alike
+from dbbstation.inference.channel import Base, Law
 from dbbstation.inference.named_values import named_values
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.simulator.fit import Weigh
-    from dbbstation.diagnosis.simulator.laws import Curves
+    from dbbstation.diagnosis.simulator.laws import Departures
     from dbbstation.diagnosis.simulator.own import PortSource
     from dbbstation.diagnosis.simulator.work import SimulationRuns
+    from dbbstation.inference.channel import Channel
+    from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
 
-MOST_STEPS = 8
-"""Steps of a refit with a term put in: it begins at the answer of the linear comparison, and goes on where it is not settled."""
+MOST_NOISES = 4
+"""Refits with the same terms, each in the noise that the one before leaves, at the most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,18 +90,14 @@ class Node:
         return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST)
 
     @cached_property
-    def curves(self) -> Curves:
-        """Answers to curves over the signals at the ports of the terms that are put in, by port and signal."""
+    def off(self) -> Departures:
+        """What the terms that are put in may be off by: answers to curves, lags and stick-slip at their ports."""
         found = {
-            (one.term.port, one.term.signals[0]): self.answers_of(one.name)
-            for one in self.inside
-            if one.term.form is TermForm.CURVE
+            departing(one): of_unit_size([self.answers_of(one.name)]) for one in self.inside if one.term.form in OFF
         }
         ports = {one.term.port for one in self.inside if form_uncertainty(one)}
-        curves = [
-            one for one in (self.outside if ports else ()) if one.term.form is TermForm.CURVE and one.term.port in ports
-        ]
-        return {**found, **curve_answers(self.work, self.fitted.state, curves, self.size)}
+        others = [one for one in self.outside if one.term.form in OFF and one.term.port in ports] if ports else []
+        return {**found, **departures(self.work, self.fitted.state, others, self.size)}
 
     def answers_of(self, name: str) -> NDArray[np.float64]:
         """What one more of each amplitude of a term does, shape (n, p)."""
@@ -119,20 +126,13 @@ class Node:
             residual += columns[:, : len(term.amplitudes)] @ np.array(term.amplitudes)
             mine.append(self._law(one, columns, term.numbers))
         prior = np.array([np.inf if p.uncertainty is None else p.uncertainty for p in parameters])
-        names = tuple(f"{run.name}, {output.name}" for run in work.model.runs for output in work.model.outputs)
-        return Channel(
-            residual=residual,
-            unit=work.model.outputs[0].unit,
-            blocks=tuple(work.blocks),
-            names=names,
-            variables=(),
-            base=Base(tuple(p.name for p in parameters), fitted.columns[:, :count], prior, np.zeros(count, dtype=bool)),
-            laws=(*mine, *self.asked[0]),
-            time=work.time,
-            static=(),
-            least_noise=min(rounding_of(work.measured[rows]) / work.scale[rows.start] for rows in work.blocks),
-            levels=work.output if len(work.model.outputs) > 1 else None,
-        )
+        base = Base(tuple(p.name for p in parameters), fitted.columns[:, :count], prior, np.zeros(count, dtype=bool))
+        return channel_of(work, residual, base, (*mine, *self.asked[0]))
+
+    def but_for(self, refuted: Collection[str]) -> Channel:
+        """The channel without some of the terms that may be put in."""
+        laws_left = tuple(law for law in self.channel.laws if law.name not in refuted)
+        return replace(self.channel, laws=laws_left)
 
     def _law(self, one: Candidate, columns: NDArray[np.float64], numbers: Sequence[float]) -> Law:
         """Law of a term that is put in: its numbers of all kinds are amplitudes of its answers there."""
@@ -147,17 +147,23 @@ class Node:
             units=one.units,
             log_odds=one.log_odds,
             form_uncertainty=form_uncertainty(one),
-            discrepancy=discrepancy(one, self.curves),
+            discrepancy=discrepancy(one, self.off),
         )
 
-    def numbers_of(self, settled: Settled, one: Candidate) -> tuple[float, ...]:
-        """Numbers that a comparison about this node gives a candidate in the best hypothesis, or beside it."""
-        best = settled.best
-        member = next((m for m in best.members if m.cause.name == one.name), None)
+    def numbers_of(self, settled: Settled, one: Candidate, beside: Sequence[Member] | None = None) -> tuple[float, ...]:
+        """Numbers that a comparison about this node gives a candidate.
+
+        Args:
+            settled: the comparison.
+            one: the candidate.
+            beside: what it stands beside, itself there or not; None: the best hypothesis.
+        """
+        beside = settled.best.members if beside is None else beside
+        others = [m for m in beside if m.cause.name != one.name]
+        member = next((m for m in beside if m.cause.name == one.name), None)
         if member is None:
             cause = next(cause for cause in settled.causes if cause.name == one.name)
-            member = settled.comparison.scan(best.members, [cause]).best[0]
-        others = best.without(one.name)
+            member = settled.comparison.scan(others, [cause]).best[0]
         found = settled.comparison.estimates([member, *others])
         own = len(member.columns)
         values = named_values(settled, member, found.values[:own], found.covariance[:own, :own])
@@ -201,43 +207,51 @@ class Nodes:
         self.known[node.names] = node
         return node
 
-    def with_more(self, node: Node, one: Candidate, settled: Settled, weigh: Weigh, sigma: float) -> Node | None:
-        """A node with one more term, from what a comparison says of it; None where simulations with it run away."""
+    def with_more(self, node: Node, one: Candidate, settled: Settled) -> Node | None:
+        """A node with one more term, from what a comparison says of it alone; None where simulations with it run away."""
         names = node.names | {one.name}
         if names not in self.known:
             self.progress(f"refit with {one.name}")
-            numbers = np.array(_inside(one, node.numbers_of(settled, one)))
+            there = [member for member in settled.best.members if member.cause.name in node.names]
+            numbers = np.array(_inside(one, node.numbers_of(settled, one, there)))
             amplitudes = len(one.term.amplitudes)
             for share in SHARES:
                 begun = np.concatenate([share * numbers[:amplitudes], numbers[amplitudes:]])
                 term = one.term.with_numbers(begun.tolist())
                 state = FittedState(node.fitted.state.values, (*node.fitted.state.terms, term))
                 try:
-                    self.known[names] = self._fitted(node, state, (*node.inside, one), weigh, sigma)
+                    self.known[names] = self._fitted(node, state, (*node.inside, one))
                     break
                 except RanAwayError:
                     continue
         return self.known.get(names)
 
-    def instead(self, node: Node, more: Sequence[Candidate], settled: Settled) -> Node | None:
-        """A node with the best set of terms of a comparison, where it lacks some that are in a node and has others.
+    def instead(
+        self, node: Node, more: Sequence[Candidate], settled: Settled, beside: Sequence[Member] | None = None
+    ) -> Node | None:
+        """A node with other terms; None where simulations with it run away.
 
-        None where simulations with it run away.
+        Args:
+            node: that it begins from.
+            more: terms that are not in that.
+            settled: comparison about that.
+            beside: members of the comparison that are put in, those of `more` among them; None: those of its best hypothesis.
         """
-        names = settled.best.names & node.names | {one.name for one in more}
+        beside = settled.best.members if beside is None else beside
+        names = frozenset(member.cause.name for member in beside) & node.names | {one.name for one in more}
         if names not in self.known:
             self.progress(f"refit with {', '.join(sorted(names))}")
             terms = zip(node.inside, node.fitted.state.terms, strict=True)
             kept = [(one, term) for one, term in terms if one.name in names]
-            new = [one.term.with_numbers(_inside(one, node.numbers_of(settled, one))) for one in more]
+            new = [one.term.with_numbers(_inside(one, node.numbers_of(settled, one, beside))) for one in more]
             state = FittedState(node.fitted.state.values, (*(term for _, term in kept), *new))
             try:
-                self.known[names] = self._fitted(node, state, (*(one for one, _ in kept), *more), *noise_of(settled))
+                self.known[names] = self._fitted(node, state, (*(one for one, _ in kept), *more))
             except RanAwayError:
                 return None
         return self.known[names]
 
-    def without(self, node: Node, name: str, weigh: Weigh, sigma: float) -> Node:
+    def without(self, node: Node, name: str) -> Node:
         """A node with one term less."""
         names = node.names - {name}
         if names not in self.known:
@@ -246,18 +260,26 @@ class Nodes:
                 (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True) if one.name != name
             ]
             state = FittedState(node.fitted.state.values, tuple(term for _, term in kept))
-            self.known[names] = self._fitted(node, state, tuple(one for one, _ in kept), weigh, sigma)
+            self.known[names] = self._fitted(node, state, tuple(one for one, _ in kept))
         return self.known[names]
 
     def again(self, node: Node, weigh: Weigh, sigma: float) -> Node:
         """The same terms, refitted in other noise."""
-        self.known[node.names] = self._fitted(node, node.fitted.state, node.inside, weigh, sigma)
+        self.known[node.names] = replace(node, fitted=fit(self.work, node.fitted.state, weigh, sigma=sigma))
         return self.known[node.names]
 
-    def _fitted(
-        self, node: Node, state: FittedState, inside: tuple[Candidate, ...], weigh: Weigh, sigma: float
-    ) -> Node:
-        fitted = fit(self.work, state, weigh, sigma=sigma, most_steps=MOST_STEPS)
+    def _fitted(self, node: Node, state: FittedState, inside: tuple[Candidate, ...]) -> Node:
+        """Refit rows as they are, then in the noise that each refit leaves, until that is the same.
+
+        The noise of a comparison is that beside linear answers, which may be far from the true ones: it is no place to begin from.
+        """
+        fitted, before = fit(self.work, state), None
+        for _ in range(MOST_NOISES):
+            bank = noise_left(self.work, fitted.residual, fitted.columns)
+            if before is not None and alike(bank.noise, before):
+                break
+            before = bank.noise
+            fitted = fit(self.work, fitted.state, bank.whitened, sigma=before.innovation)
         return replace(node, fitted=fitted, inside=inside)
 
 

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.simulator.challenge import challenger, cost
 from dbbstation.diagnosis.simulator.fit import near
-from dbbstation.diagnosis.simulator.laws import discrepancy, form_uncertainty
 from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.work import BudgetSpentError
 from dbbstation.inference.named_values import named_values
 from dbbstation.inference.settle import settle
-from dbbstation.inference.verdict import SURE
+from dbbstation.inference.settled import Beginning
+from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from dbbstation.diagnosis.simulator.candidates import Candidate
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
     from dbbstation.diagnosis.simulator.work import FittedState
     from dbbstation.inference.channel import Channel
-    from dbbstation.inference.settled import Beginning, Settled
+    from dbbstation.inference.settled import Settled
 
-MOST_ROUNDS = 10
-"""Times that a term is put in or taken out, or everything refitted, at the most."""
+MOST_ROUNDS = 20
+"""Times that a term is put in, taken out or refuted, or everything refitted, at the most."""
 
 RIVALS = 3
 """Candidates that are each put in and refitted where one is wanted, at the most: the best by the linear comparison."""
@@ -33,6 +35,9 @@ RIVALS = 3
 RIVAL_SHARE = 0.5
 """Log posterior of a rival by the linear comparison, over that of the best, from which on it is put in: linear answers to a term that
 is not small may be off by about as much."""
+
+WORTH = math.log(SURE / ABSENT)
+"""Log odds that a term must have once it is refitted, those without it being one, to stay."""
 
 STILL = 0.1
 """Move, over its standard uncertainty, from which on a value has settled."""
@@ -48,6 +53,7 @@ class SearchOutcome:
         state: values, as fitted to the rows of that comparison.
         residual: measured less simulated at that state, shape (n,).
         is_settled: whether everything moved by less than a tenth of its uncertainty in the end, and the comparison wants nothing else.
+        refuted: terms that linear answers asked for, and that were not worth it once they were refitted.
         stopped: why it ended early; empty where it did not.
     """
 
@@ -56,6 +62,7 @@ class SearchOutcome:
     state: FittedState
     residual: np.ndarray
     is_settled: bool
+    refuted: frozenset[str] = frozenset()
     stopped: str = ""
 
 
@@ -65,12 +72,18 @@ def compared(channel: Channel, progress: Callable[[str], None] = lambda _: None)
 
 
 def compared_quickly(channel: Channel, beginning: Beginning) -> Settled:
-    """The same less widely, in noise from one beginning, as where rows are held back."""
-    return settle(channel, look=False, static=False, most_expanded=0, thorough=False, beginnings=(beginning,))
+    """The same less widely, as where rows are held back: in noise from one beginning, or beside everything.
+
+    The beginning is that which suits what all rows came to. About a simulator that lacks something large yet, that may be none.
+    """
+    beginnings = tuple(dict.fromkeys((beginning, Beginning.EVERYTHING)))
+    return settle(channel, look=False, static=False, most_expanded=0, thorough=False, beginnings=beginnings)
 
 
-def search(nodes: Nodes, base: Node, compare: Callable[[Node], Settled], *, refits: bool = True) -> SearchOutcome:
+def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, refits: bool = True) -> SearchOutcome:
     """Put in what is missing, one term after the other.
+
+    Terms that linear answers ask for, and that are not worth it once they are refitted, compete no more about the same terms.
 
     Args:
         nodes: that were visited.
@@ -79,26 +92,34 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Node], Settled], *, refi
         refits: refit each node in the noise that is found beside it, until nothing moves; False: where rows are held back, which are
             refitted from the node each time.
     """
-    node, been, refitted, stopped = base, {base.names}, 0, ""
-    settled = compare(node)
+    node, been, refuted, refitted, stopped = base, {base.names}, frozenset[str](), 0, ""
+    settled, still = compare(node.channel), False
     try:
         for _ in range(MOST_ROUNDS):
-            wanted = _wanted(nodes, node, settled)
+            wanted: Node | None = challenger(nodes, node, settled)
+            more: frozenset[str] = frozenset()
+            if wanted is None or wanted.names in been:
+                wanted, more = _wanted(nodes, node, settled)
             if wanted is not None and wanted.names not in been:
                 been.add(wanted.names)
-                settled, node, refitted = compare(wanted), wanted, 0
-                continue
-            if not refits or (refitted and _moves(node, settled) < STILL) or refitted >= MOST_REFITS:
+                settled, node, refuted, refitted = compare(wanted.channel), wanted, frozenset(), 0
+                still = False
+            elif more:
+                refuted |= more
+                settled = compare(node.but_for(refuted))
+            elif not refits or still or refitted >= MOST_REFITS:
                 break
-            again = nodes.again(node, *noise_of(settled))
-            settled, node, refitted = compare(again), again, refitted + 1
+            else:
+                again, before = nodes.again(node, *noise_of(settled)), _said(node, settled)
+                settled, node, refitted = compare(again.but_for(refuted)), again, refitted + 1
+                still = _still(before, _said(node, settled))
     except BudgetSpentError as error:
         if not refits:
             raise
         stopped = error.what
     if refits:
-        still = not stopped and _moves(node, settled) < STILL and node.names <= settled.best.names
-        return SearchOutcome(node, settled, node.fitted.state, node.fitted.residual, still, stopped)
+        still = still and not stopped and node.names <= settled.best.names
+        return SearchOutcome(node, settled, node.fitted.state, node.fitted.residual, still, refuted, stopped)
     state, residual = near(nodes.work, node.fitted, *noise_of(settled))
     return SearchOutcome(node, settled, state, residual, is_settled=True)
 
@@ -107,32 +128,30 @@ MOST_REFITS = 4
 """Refits of the same terms in noise found anew, at the most."""
 
 
-def _wanted(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
-    """Node that a comparison wants next: with the term that is worth most, or without one that is not needed; None: this one."""
-    weigh, sigma = noise_of(settled)
+def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, frozenset[str]]:
+    """Node that a comparison wants next: with the term that is worth most, or without one that is not needed; None: this one.
+
+    With it come terms that the comparison wants, and that are not worth it once they are refitted.
+    """
     outside = {one.name: one for one in node.outside}
     more = [member.cause.name for member in settled.best.members if member.cause.name in outside]
     if settled.averaged(settled.posterior.probability(outside), outside) < SURE:
         more = []  # the recordings do not want anything more for sure
-    if more and not node.names <= settled.best.names:
-        # Linear answers about a good fit are right: what is better than some of its terms stands in their place.
-        better = nodes.instead(node, [outside[name] for name in more], settled)
-        if better is not None:
-            return better
     if more:
         first = max(more, key=settled.best.log_factor)
-        rivals = [nodes.with_more(node, one, settled, weigh, sigma) for one in _rivals(node, settled, outside[first])]
-        tried = [one for one in rivals if one is not None]
-        if not tried:
-            return None  # with any of them the simulation runs away
-        costs = [_cost(nodes, one, settled) for one in tried]
+        # Linear answers about a good fit are right: what is better than some of its terms stands in their place.
+        displaced = not node.names <= settled.best.names
+        together = [nodes.instead(node, [outside[name] for name in more], settled)] if displaced else []
+        rivals = (nodes.with_more(node, one, settled) for one in _rivals(node, settled, outside[first]))
+        tried = [one for one in (*together, *rivals) if one is not None]
+        costs = [cost(nodes, one, settled) for one in tried]
+        if not tried or cost(nodes, node, settled) - min(costs) < WORTH:
+            return None, frozenset(more)  # by linear answers only, or the simulation runs away with them
         best = tried[int(np.argmin(costs))]
         nodes.progress(f"put in {', '.join(best.names - node.names)}")
-        return best
+        return best, frozenset()
     less = [name for name in node.names if name not in settled.best.names]
-    if less:
-        return nodes.without(node, less[0], weigh, sigma)
-    return None
+    return (nodes.without(node, less[0]) if less else None), frozenset()
 
 
 def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidate]:
@@ -147,45 +166,41 @@ def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidat
     return [first, *(outside[name] for name in enough[: RIVALS - 1])]
 
 
-def _cost(nodes: Nodes, node: Node, settled: Settled) -> float:
-    """Less its log posterior, of a node refitted to the rows of a comparison, in its noise [Schwarz's criterion].
-
-    What its forms may be off by is averaged over, by answers to curves.
-    """
-    weigh, sigma = noise_of(settled)
-    state, residual = near(nodes.work, node.fitted, weigh, sigma)
-    rows = weigh(residual) / sigma
-    numbers = sum(len(one.names) for one in node.inside)
-    odds = sum(one.log_odds for one in node.inside)
-    off = [np.zeros((len(rows), 0))]
-    for one, term in zip(node.inside, state.terms, strict=True):
-        columns = discrepancy(one, node.curves)
-        if columns is not None:
-            effect = node.answers_of(one.name) @ np.array(term.amplitudes)
-            off.append(weigh(columns(effect, (), np.zeros(0))) * (form_uncertainty(one) / sigma))
-    beside = np.hstack(off)
-    products = np.eye(beside.shape[1]) + beside.T @ beside
-    towards = beside.T @ rows
-    squares = float(rows @ rows - towards @ np.linalg.solve(products, towards))
-    spread = float(np.linalg.slogdet(products)[1])
-    return 0.5 * squares + 0.5 * spread + 0.5 * numbers * float(np.log(len(rows))) - odds
+def moves(node: Node, settled: Settled) -> dict[str, float]:
+    """By how much the numbers of each term differ from those that a comparison about it has, at the most, in standard uncertainties."""
+    terms = {one.name: (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
+    largest = dict.fromkeys((name for name, _ in _said(node, settled)), 0.0)
+    for (name, number), (value, uncertainty) in _said(node, settled).items():
+        one, term = terms[name]
+        before = dict(zip(one.names, term.numbers, strict=True))[number]
+        largest[name] = max(largest[name], abs(value - before) / uncertainty)
+    return largest
 
 
-def _moves(node: Node, settled: Settled) -> float:
-    """Largest move that a comparison about a node asks of a number of its terms, over its standard uncertainty."""
+def _said(node: Node, settled: Settled) -> dict[tuple[str, str], tuple[float, float]]:
+    """Value and uncertainty that a comparison about a node has of each number of its terms, by names of both."""
     members = [member for member in settled.best.members if member.cause.name in node.names]
-    found = settled.comparison.estimates(members) if members else None
-    first, moves = 0, [0.0]
+    if not members:
+        return {}
+    found, first, said = settled.comparison.estimates(members), 0, {}
     terms = {one.name: (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
     for member in members:
         own = slice(first, first + len(member.columns))
         first = own.stop
-        if found is None:
-            continue
         one, term = terms[member.cause.name]
         values = named_values(settled, member, found.values[own], found.covariance[own, own])
         for k, name in enumerate(one.names):
-            before = term.numbers[k] if k < len(term.amplitudes) else 0.0
+            # Answers to shapes are about the shape that was fitted.
+            about = term.numbers[k] if k >= len(term.amplitudes) else 0.0
             if values[name].uncertainty > 0.0:
-                moves.append(abs(values[name].value - before) / values[name].uncertainty)
-    return max(moves)
+                said[(one.name, name)] = about + values[name].value, values[name].uncertainty
+    return said
+
+
+def _still(
+    before: Mapping[tuple[str, str], tuple[float, float]], after: Mapping[tuple[str, str], tuple[float, float]]
+) -> bool:
+    """Whether comparisons about two refits of the same terms say the same."""
+    return before.keys() == after.keys() and all(
+        abs(after[key][0] - before[key][0]) < STILL * after[key][1] for key in after
+    )

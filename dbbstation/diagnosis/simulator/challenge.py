@@ -1,0 +1,91 @@
+"""Whether refitted terms are worth what they cost, and named terms in the place of a curve.
+
+A curve over a signal contains most terms over it. So it is challenged by each of these alone and in pairs.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import logsumexp
+
+from dbbstation.diagnosis.simulator.fit import near
+from dbbstation.diagnosis.simulator.laws import discrepancy, form_uncertainty
+from dbbstation.diagnosis.simulator.noise_left import log_probability_of, noise_left
+from dbbstation.diagnosis.simulator.terms import TermForm
+
+if TYPE_CHECKING:
+    from dbbstation.diagnosis.simulator.candidates import Candidate
+    from dbbstation.diagnosis.simulator.nodes import Node, Nodes
+    from dbbstation.inference.model_comparison import Cause, Member
+    from dbbstation.inference.settled import Settled
+
+SHARES = (0.0, 0.3, 1.0)
+"""How closely an object follows its forms, in units of what is stated: exactly, or as loosely as stated at the most."""
+
+FIRST = 6
+"""Terms that are each tried as the first of a pair, at the most: those that do best alone."""
+
+
+def cost(nodes: Nodes, node: Node, settled: Settled) -> float:
+    """Less its log posterior, of a node refitted to the rows of a comparison, in the noise that it leaves itself.
+
+    The noise is part of what is compared: that of a comparison is measured beside linear answers, which may be far from the true ones.
+    What its forms may be off by is averaged over, by answers to curves and memories.
+    """
+    work, fitted, channel = nodes.work, node.fitted, settled.channel
+    state, residual = fitted.state, fitted.residual
+    if not channel.kept.all():
+        own = noise_left(work, residual, fitted.columns, rows=channel)
+        state, residual = near(work, fitted, own.whitened, own.noise.innovation)
+    off = [np.zeros((len(residual), 0))]
+    for one, term in zip(node.inside, state.terms, strict=True):
+        columns = discrepancy(one, node.off)
+        if columns is not None:
+            effect = node.answers_of(one.name) @ np.array(term.amplitudes)
+            off.append(columns(effect, (), np.zeros(0)) * form_uncertainty(one))
+    beside = np.hstack(off)
+    numbers = sum(len(one.names) for one in node.inside)
+    odds = sum(one.log_odds for one in node.inside)
+    worth = []
+    for share in SHARES if beside.shape[1] else SHARES[:1]:
+        bank = noise_left(work, residual, fitted.columns, share * beside, channel)
+        worth.append(log_probability_of(bank, residual, share * beside, numbers))
+    return -odds - float(logsumexp(worth)) + math.log(len(worth))
+
+
+def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
+    """A node with one or two named terms in the place of a curve, where that is more probable; None where none is."""
+    for one in node.inside:
+        if one.term.form is not TermForm.CURVE or one.name not in settled.best.names:
+            continue
+        others = [member for member in settled.best.without(one.name) if member.cause.name in node.names]
+        outside = {each.name: each for each in node.outside if each.term.form is not TermForm.CURVE}
+        named = _best_named(settled, others, outside)
+        if not named:
+            continue
+        found = nodes.instead(node, [outside[member.cause.name] for member in named], settled, [*others, *named])
+        if found is not None and cost(nodes, found, settled) < cost(nodes, node, settled):
+            return found
+    return None
+
+
+def _best_named(settled: Settled, others: list[Member], outside: dict[str, Candidate]) -> list[Member]:
+    """The most probable one or two terms of those outside, beside others, by linear answers."""
+
+    def scanned(beside: list[Member], causes: list[Cause]) -> list[tuple[float, Member]]:
+        scan = settled.comparison.scan(beside, causes)
+        worth = [float(f) + cause.log_prior_odds for f, cause in zip(scan.log_factor, scan.causes, strict=True)]
+        return sorted(zip(worth, scan.best, strict=True), key=lambda pair: -pair[0])
+
+    causes = [cause for cause in settled.causes if cause.name in outside]
+    best: tuple[float, list[Member]] = (0.0, [])
+    for worth, member in scanned(others, causes)[:FIRST]:
+        rest = [cause for cause in causes if cause.name != member.cause.name]
+        more, second = scanned([*others, member], rest)[0] if rest else (-np.inf, member)
+        for found in ((worth, [member]), (worth + more, [member, second])):
+            if found[0] > best[0]:
+                best = found
+    return best[1]

@@ -128,7 +128,8 @@ def _acting(
         of_machine = source.belongs_to is Owner.MACHINE
         # A model says where the machine goes; how that differs between directions and days has its usual size.
         known = of_machine and identified is not None and source.needs <= {Need.POSE}
-        if source.of_currents or known or not source.needs <= {Need.POSE, Need.PATH, Need.TIME}:
+        # What happens once is what a verdict is there to find. A sound run has none of it.
+        if source.happens_once or source.of_currents or known or not source.needs <= {Need.POSE, Need.PATH, Need.TIME}:
             continue
         try:
             source.require(motion)

@@ -91,3 +91,27 @@ def against_limit(finding: Finding) -> str:
         return ""
     limit = "" if finding.limit is None else f" of {finding.limit:.2f}"
     return f"{finding.value:.2f}{limit} {finding.unit}".rstrip()
+
+
+def stricter(one: Finding, other: Finding) -> Finding:
+    """Return of two findings of the same thing, held against what two bodies of knowledge say, the one that leaves less open.
+
+    A sound run agrees with both. Wrong goes before good, and good before what cannot be told. Of two that are decided alike the
+    one counts that has more of its limit. Whether another circle explains the readings better is asked of all circles that a
+    body of knowledge holds: who knows fewer of them does not settle what the other one cannot tell.
+
+    Args:
+        one: by the body of knowledge that holds more circles.
+        other: by the one that holds fewer.
+    """
+    if one.wrong or other.wrong:
+        return max((each for each in (one, other) if each.wrong), key=_share)
+    if one.verdict is other.verdict:
+        return max(one, other, key=_share)
+    doubted = one.name is Name.TEST and one.value is not None
+    return other if one.verdict is FindingVerdict.CANNOT_TELL and not doubted else one
+
+
+def _share(finding: Finding) -> float:
+    """What a value has of its limit; nothing where one of both is missing."""
+    return finding.value / finding.limit if finding.value is not None and finding.limit else 0.0

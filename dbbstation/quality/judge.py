@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.quality.between import direction, other_direction, repeat
-from dbbstation.quality.finding import Finding, Name
+from dbbstation.quality.finding import Finding, Name, stricter
 from dbbstation.quality.knowledge import Others, Run, Seen, across, apart_um, seen
 from dbbstation.quality.local import local_difference, locally_apart_um
 from dbbstation.quality.place import bore, radius
@@ -83,24 +84,40 @@ class SessionRuns:
 
     @with_one_thread
     def judge(self, one: Seen) -> Judgement:
-        """Judge one run, of these or another of the same session."""
-        others = self._others(one)
-        findings = list(by_itself(one, others))
+        """Judge one run, of these or another of the same session.
+
+        Where there is a model, a run must agree with it, and with what other runs show of a machine whose errors have usual sizes.
+        """
+        findings = list(by_itself(one, self._others(one)))
         if one.analysis is not None:
-            both = together(one, others)
-            expected, by_others = one.run.expected, expected_beside(both)
-            findings += [
-                direction(one, others, by_others or expected),
-                of_its_test(one, both),
-                radius(one.analysis, by_others or expected, by_others=by_others is not None),
-                bore(one.analysis, by_others or expected, by_others=by_others is not None),
-                other_direction(one, others),
-                repeat(one, others),
-                local_difference(one, others),
-            ]
+            known = self._beside(one, one.analysis)
+            if one.run.usual is not None:
+                without = self._without_model._beside(one.without_model, one.analysis)  # noqa: SLF001 - the same class
+                known = [stricter(by_model, by_usual) for by_model, by_usual in zip(known, without, strict=True)]
+            findings += known
         order = list(Name)
         findings.sort(key=lambda finding: order.index(finding.name))
         return Judgement(one.run, one.analysis, tuple(findings))
+
+    @cached_property
+    def _without_model(self) -> SessionRuns:
+        return SessionRuns([one.without_model for one in self._runs])
+
+    def _beside(self, one: Seen, analysis: CircleAnalysis) -> list[Finding]:
+        """What is found of a run by what is known of its circle and by the other runs."""
+        others = self._others(one)
+        both = together(one, others)
+        by_others = expected_beside(both)
+        expected = by_others or one.run.expected
+        return [
+            direction(one, others, expected),
+            of_its_test(one, both),
+            radius(analysis, expected, by_others=by_others is not None),
+            bore(analysis, expected, by_others=by_others is not None),
+            other_direction(one, others),
+            repeat(one, others),
+            local_difference(one, others),
+        ]
 
     def _others(self, one: Seen) -> Others:
         analyses = [o.analysis for o in self._runs if o is not one and o.analysis is not None]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -129,6 +130,7 @@ class Run:
         largest_loss_percent: share of samples that may be lost [%].
         planned: all circles of its plan, where a model says what they look like.
         started_s: when it began, on the clock of its session [s]; None where not noted.
+        usual: where it should lie by the usual sizes of all causes, where `expected` is by a model; None without a model.
     """
 
     test: str
@@ -140,6 +142,7 @@ class Run:
     largest_loss_percent: float = 0.0
     planned: tuple[Planned, ...] = ()
     started_s: float | None = None
+    usual: Expected | None = None
 
     @property
     def label(self) -> str:
@@ -174,6 +177,13 @@ class Seen:
     coefficients_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(COEFFICIENTS))
     unusable: int = 0
     local_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(LOCAL_COEFFICIENTS))
+
+    @cached_property
+    def without_model(self) -> Seen:
+        """The same run, of whose circle no model says anything; itself where none does."""
+        if self.run.usual is None:
+            return self
+        return replace(self, run=replace(self.run, expected=self.run.usual, usual=None, planned=()))
 
     @property
     def u_um(self) -> float:

@@ -2,7 +2,8 @@
 
 `python -m tests.quality.sabotage` prints the table of docs/circles.md: how often each finding is made of runs that are spoilt by
 half its limit, by its limit and by twice its limit, and how often of runs that are sound. `--equipment 3` prints the table of what goes
-wrong with balls, programs and gauges, and `--drifting 1000` how often good circles on drifting days have a finding.
+wrong with balls, programs and gauges, and `--drifting 1000` how often good circles on drifting days have a finding, with `--model` of
+machines with a model.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from tests.quality.shares import spoil
 from tests.quality.spoilers import SPOILERS
 
 
-def false_alarms(folder: Path, seed: int, wanted: int) -> None:
+def false_alarms(folder: Path, seed: int, wanted: int, *, with_model: bool) -> None:
     """Good circles on drifting days, each judged at the machine, beside those before it, and in the end, beside all."""
     seen_so_far = 0
     alarms: dict[str, collections.Counter[str]] = {
@@ -30,7 +31,7 @@ def false_alarms(folder: Path, seed: int, wanted: int) -> None:
         "in the end": collections.Counter(),
     }
     while seen_so_far < wanted:
-        whole = drifting_session(folder / f"drift{seed}", seed)
+        whole = drifting_session(folder / f"drift{seed}", seed, with_model=with_model)
         session = SessionRuns(whole.runs)
         for k, one in enumerate(whole.runs[: wanted - seen_so_far]):
             live = SessionRuns(whole.runs[: k + 1]).judge(one)
@@ -51,11 +52,12 @@ def main() -> None:
     parser.add_argument("--clean", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--drifting", type=int, default=0, help="good circles on drifting days, in place of all else")
+    parser.add_argument("--model", action="store_true", help="each good session has its own calibration as a model")
     parser.add_argument("--equipment", type=int, default=0, help="sessions whose equipment fails, in place of all else")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         if given.drifting:
-            false_alarms(Path(folder), given.seed, given.drifting)
+            false_alarms(Path(folder), given.seed, given.drifting, with_model=given.model)
         counted: Row = collections.Counter()
         for seed in range(given.seed, given.seed + given.equipment):
             counted.update(equipment(Path(folder) / str(seed), 1000 + seed))

@@ -89,9 +89,14 @@ def read(folder: Path, model: IdentifiedModel | None = None) -> Sound:
 def calibrated(folder: Path, seed: int) -> Sound:
     """A session whose circles are expected where its own calibration puts them."""
     sound(folder / "spoilt", seed, TESTS)
-    outcome = call("calibrate", folder / "spoilt", "--out", folder / "model.yaml")
+    return read(folder / "spoilt", calibration(folder / "spoilt", folder / "model.yaml"))
+
+
+def calibration(session: Path, model: Path) -> IdentifiedModel:
+    """The session's own calibration, written to a file."""
+    outcome = call("calibrate", session, "--out", model)
     assert outcome.code == 0, outcome.err
-    return read(folder / "spoilt", read_model(folder / "model.yaml", every_source(())))
+    return read_model(model, every_source(()))
 
 
 def finding_of(judgement: Judgement, name: Name) -> Finding | None:
@@ -102,8 +107,11 @@ DRIFTS_UM_MIN, WARMINGS_K_H = (0.0, 1.0), (0.0, 1.0)
 """Bar's drift and warming of struts and frame, from and to, that good circles have [µm/min, K/h]."""
 
 
-def drifting_session(folder: Path, seed: int) -> Sound:
-    """A good session on a day of its own: drift, warming, and noise that is white or remembers."""
+def drifting_session(folder: Path, seed: int, *, with_model: bool = False) -> Sound:
+    """A good session on a day of its own: drift, warming, and noise that is white or remembers.
+
+    With a model circles are expected where the session's own calibration puts them; the bar's drift is none of it.
+    """
     rng = np.random.default_rng([seed, 134])
     rise_k, slow_s = 100.0 * rng.uniform(*WARMINGS_K_H), 360e3
     warming = Warming(rise_k=rise_k, time_constant_s=slow_s)
@@ -112,6 +120,8 @@ def drifting_session(folder: Path, seed: int) -> Sound:
     also = (ThermalStruts(warming=warming), ThermalFrame(warming=warming))
     whole = sound(folder, seed, also=also, noise=noise)
     um_s = rng.uniform(*DRIFTS_UM_MIN) / 60.0
+    if with_model:
+        whole = read(folder, calibration(folder, folder.with_suffix(".yaml")))
     return Sound([seen(replace(one.run, recording=_warmed(one.run, um_s))) for one in whole.runs])
 
 

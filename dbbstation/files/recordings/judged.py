@@ -76,13 +76,16 @@ def run_of(
         planned: of `planned_circles`.
     """
     circle, recording = session.circle(run), replace(recording, name=run.label)
+    # A compensated program is there to put the circle where it is planned. That is where it is expected.
+    of_it = None if run.program is not None else model
     return Run(
         test=run.test,
         repeat=run.repeat,
         mounting=session.setup(run).mounting,
         circle=circle,
         recording=recording,
-        expected=_expected(session, run, recording, model),
+        expected=_expected(session, run, recording, of_it),
+        usual=None if of_it is None else _expected(session, run, recording, None),
         largest_loss_percent=session.plan.largest_loss_percent,
         # Compensated programs are there to make all circles alike: what one looks like says nothing.
         planned=() if run.program is not None else planned,
@@ -126,12 +129,9 @@ def _ideal(circle: Circle) -> RawCircle:
 def _expected(
     session: SessionFolder, run: RunEntry, recording: Recording, model: IdentifiedModel | None
 ) -> Expected | None:
-    """Where the circle should lie; None for a recording that shows none, or a circle that the machine cannot take.
-
-    A compensated program is there to put the circle where it is planned: that is where it is expected.
-    """
+    """Where the circle should lie; None for a recording that shows none, or a circle that the machine cannot take."""
     try:
-        return _expected_of(session, run, cut(recording, session.circle(run)), None if run.program else model)
+        return _expected_of(session, run, cut(recording, session.circle(run)), model)
     except (TraceError, MachineError):
         return None
 

@@ -68,6 +68,7 @@ ONLY_OF = {
 @click.option(
     "--scheduler", metavar="ADDRESS", default="", help="Dask scheduler that does it, such as tcp://server:8786."
 )
+@click.option("--apart", is_flag=True, help="Count each session without a serial number as a machine of its own.")
 @click.option("--anew", is_flag=True, help="Work out again what is up to date.")
 @click.option("--force", is_flag=True, help="Replace an existing --table.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -87,6 +88,7 @@ def fleet(
     out_table: Path | None,
     jobs: int | None,
     scheduler: str,
+    apart: bool,
     anew: bool,
     force: bool,
     as_json: bool,
@@ -140,6 +142,7 @@ def fleet(
             processes=jobs or os.cpu_count() or 1,
             scheduler=scheduler,
             false_alarms=false_alarms,
+            apart=apart,
             anew=anew,
             provenance=provenance,
             progress=lambda _, done=0, of=0: progress(done, of),

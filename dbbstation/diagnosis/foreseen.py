@@ -60,8 +60,8 @@ class Proposal:
         return ", ".join(parts)
 
 
-_Form: TypeAlias = tuple[str, str, tuple[float, ...]]
-"""Name of a source, law that it follows, nonlinear parameters."""
+_Form: TypeAlias = tuple[str, str, tuple[float, ...], float]
+"""Name of a source, law that it follows, nonlinear parameters, wait before the run where it follows time [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class _Run:
         weight: for the many samples of a run, of which a few stand here.
         touched: base columns that it has to do with, shape (t,).
         base: rows of these, shape (n, t).
-        of_sources: rows of the amplitudes of sources, by name, law and nonlinear parameters, shape (n, p).
+        of_sources: rows of the amplitudes of sources, by their form and the wait where that counts, shape (n, p).
     """
 
     ball: NDArray[np.float64]
@@ -153,7 +153,7 @@ class ForeseenTests:
         place = len(self.channel.base.prior)
         touched, parts = [run.touched], [run.base]
         for source, variant in asked:
-            own = run.of_sources[_form(source, variant)]
+            own = run.of_sources[_form(proposal, source, variant)]
             seen = np.flatnonzero(np.any(own != 0.0, axis=0))
             touched.append(place + seen)
             parts.append(own[:, seen])
@@ -171,14 +171,16 @@ class ForeseenTests:
 
     def _run(self, proposal: Proposal, direction: Direction, asked: Sequence[tuple[ErrorSource, Variant]]) -> _Run:
         """The run with what it would say of these sources; what it says of base and sources is kept, its reading is not."""
-        key = replace(proposal.circle, direction=direction), proposal.wait_s, proposal.observation.setup.ball
+        wait_s = proposal.wait_s if Need.TIME in self.channel.calibration.layout.needs else 0.0
+        key = replace(proposal.circle, direction=direction), wait_s, proposal.observation.setup.ball
         run = self._runs.get(key)
-        if run is None or any(_form(*one) not in run.of_sources for one in asked):
+        if run is None or any(_form(proposal, *one) not in run.of_sources for one in asked):
             reading = MachineModel(self.channel.machine).bar(_motion(proposal, direction, self._ends_s))
             run = self._runs[key] = run or self._of_base(reading)
             for source, variant in asked:
-                if _form(source, variant) not in run.of_sources:
-                    run.of_sources[_form(source, variant)] = self._of_source(run, reading, source, variant)
+                form = _form(proposal, source, variant)
+                if form not in run.of_sources:
+                    run.of_sources[form] = self._of_source(run, reading, source, variant)
         return run
 
     def _of_base(self, reading: BarReading) -> _Run:
@@ -204,8 +206,9 @@ class ForeseenTests:
         return _without(run.ball, derivative) * run.weight
 
 
-def _form(source: ErrorSource, variant: Variant) -> _Form:
-    return source.name, source.varies_with, variant.nonlinear
+def _form(proposal: Proposal, source: ErrorSource, variant: Variant) -> _Form:
+    wait_s = proposal.wait_s if Need.TIME in source.needs else 0.0
+    return source.name, source.varies_with, variant.nonlinear, wait_s
 
 
 def _without(ball: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -145,8 +145,9 @@ def _told(
     covariance: NDArray[np.float64], rows: NDArray[np.float64], noise_mm: float, own: slice
 ) -> NDArray[np.float64]:
     """Covariance of some columns once further rows have been measured."""
-    gain = rows @ covariance[:, own]
-    answer = rows @ covariance @ rows.T + noise_mm**2 * np.eye(len(rows))
+    seen = np.flatnonzero(rows.any(axis=0))
+    gain = rows[:, seen] @ covariance[seen, own]
+    answer = rows[:, seen] @ covariance[np.ix_(seen, seen)] @ rows[:, seen].T + noise_mm**2 * np.eye(len(rows))
     return np.asarray(covariance[own, own] - gain.T @ np.linalg.solve(answer, gain), dtype=np.float64)
 
 

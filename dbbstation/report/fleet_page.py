@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.report.history_words import DASH
 from dbbstation.report.html import environment
+from dbbstation.text.digits import decimals_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,7 +62,7 @@ def fleet_html(result: FleetResult, provenance: Provenance) -> bytes:
         "comparison": result.comparison,
         "headline": headline_of(result),
         "rows": rows,
-        "unlike": () if result.comparison is None else result.comparison.unlike,
+        "unlike": [] if result.comparison is None else [(one, _digits(one)) for one in result.comparison.unlike],
         "expected": _expected(result),
         "size": (WIDTH, HEIGHT),
         "ticks": ticks,
@@ -81,6 +83,14 @@ def headline_of(result: FleetResult) -> str:
     if not unlike:
         return f"{done}. No machine is unlike its sisters."
     return f"{done}. {len(unlike)} of {result.comparison.machines} machines {'is' if len(unlike) == 1 else 'are'} unlike the others."
+
+
+def _digits(one: Scored) -> tuple[str, ...]:
+    """Return value, u, usual value, scatter and smallest departure that is seen, all to the decimals that u, or else scatter, gives."""
+    sure = one.uncertainty or one.scatter
+    numbers = (one.value, one.uncertainty, one.usual, one.scatter, one.smallest_seen)
+    form = f".{decimals_of(sure)}f" if sure else ".4g"
+    return tuple(DASH if number is None else f"{number:{form}}" for number in numbers)
 
 
 def _expected(result: FleetResult) -> str:

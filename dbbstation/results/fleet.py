@@ -77,7 +77,8 @@ class FleetSession:
 
     Attributes:
         session: its folder, from the folder that was named.
-        machine: serial number, or the name in its machine file; empty where the session cannot be read.
+        machine: serial number, or the name in its machine file, with the session where each is a machine of its own; empty where the
+            session cannot be read.
         started: start of its first run, ISO 8601; None where none is noted.
         state: `done`, `up-to-date` or `failed`.
         problem: why it failed; empty where it did not.
@@ -196,6 +197,7 @@ class FleetResult(Framed):
         table: file with every value.
         page: file with a row for each machine.
         sessions: in the order of their names.
+        notes: which sessions were counted as one machine, or each as its own, since they have no serial number.
         comparison: of the machines; None where the task has no values to compare.
     """
 
@@ -204,6 +206,7 @@ class FleetResult(Framed):
     table: str
     page: str
     sessions: tuple[FleetSession, ...]
+    notes: tuple[str, ...]
     comparison: Annotated[FleetComparison | None, Absent]
 
     @property

@@ -58,6 +58,7 @@ class _Named:
         session: what its file says; None where that cannot be read.
         inputs: SHA-256 of the files that decide what comes out of it.
         problem: why it cannot be read; empty where it can.
+        apart: whether it is a machine of its own where it has no serial number.
     """
 
     name: str
@@ -65,11 +66,14 @@ class _Named:
     session: SessionFolder | None = None
     inputs: Mapping[str, str] | None = None
     problem: str = ""
+    apart: bool = False
 
     @property
     def machine(self) -> str:
-        """Serial number of the machine, or the name in its file."""
-        return "" if self.session is None else self.session.serial_number or self.session.machine.name
+        """Serial number of the machine, or the name in its file; with the session where each is a machine of its own."""
+        if self.session is None or self.session.serial_number:
+            return "" if self.session is None else self.session.serial_number
+        return f"{self.session.machine.name} ({self.name})" if self.apart else self.session.machine.name
 
     @property
     def started(self) -> str | None:
@@ -93,6 +97,7 @@ def fleet(
     processes: int = 1,
     scheduler: str = "",
     false_alarms: float = FALSE_ALARMS,
+    apart: bool = False,
     anew: bool = False,
     provenance: Callable[[], Provenance] = from_python,
     progress: Progress = silent,
@@ -112,6 +117,7 @@ def fleet(
         processes: of this computer.
         scheduler: address of a Dask scheduler whose workers do it in place of them; empty for none.
         false_alarms: probability that like machines show any value as unlike.
+        apart: each session without a serial number is of a machine of its own; else those of one name are of one machine.
         anew: work everything out again.
         provenance: asked, when all is done, where table and page come from.
         progress: told how many sessions are done.
@@ -129,7 +135,7 @@ def fleet(
     telling = Telling(progress, stop, say)
     kept = FleetFolder(Path(out), task)
     with input_book():
-        named = _once(_sessions(paths_of(folders), telling), telling)
+        named = [replace(one, apart=apart) for one in _once(_sessions(paths_of(folders), telling), telling)]
         extra = {str(path): digest_of(path) for path in options.source_files}
     program = program_identity()
     about = {"task": task, "options": _plain(options), "sources": list(extra.values()), "program": program}
@@ -161,7 +167,10 @@ def fleet(
             if outcomes[place].found is None:
                 say(f"failed: {named[place].name}: {outcomes[place].session.problem}")
             telling.stage(WORKING, done, len(pieces))
-    result = _result(task, kept, named, [outcomes[place] for place in range(len(named))], false_alarms)
+    notes = _without_number(named)
+    for note in notes:
+        say(note)
+    result = _result(task, kept, named, [outcomes[place] for place in range(len(named))], false_alarms, notes)
     for one in named:
         if one.session is not None:
             note_known(one.folder / SESSION_FILE, one.session.sha256)
@@ -270,8 +279,29 @@ def _failed(one: _Named, problem: str) -> _Outcome:
     return _Outcome(about, None)
 
 
+def _without_number(named: Sequence[_Named]) -> tuple[str, ...]:
+    """Say which sessions of one name were taken for one machine, or for several, since nobody noted a serial number."""
+    of_name: dict[str, list[_Named]] = {}
+    for one in named:
+        if one.session is not None and not one.session.serial_number:
+            of_name.setdefault(one.session.machine.name, []).append(one)
+    return tuple(
+        f"{len(several)} sessions of {name} have no serial number: each is counted as a machine of its own"
+        if several[0].apart
+        else f"{len(several)} sessions of {name} have no serial number: they are counted as one machine, and the last of them is compared; "
+        "--apart counts each as a machine of its own"
+        for name, several in of_name.items()
+        if len(several) > 1
+    )
+
+
 def _result(
-    task: str, kept: FleetFolder, named: Sequence[_Named], outcomes: Sequence[_Outcome], false_alarms: float
+    task: str,
+    kept: FleetFolder,
+    named: Sequence[_Named],
+    outcomes: Sequence[_Outcome],
+    false_alarms: float,
+    notes: tuple[str, ...],
 ) -> FleetResult:
     """Put the outcomes together, and compare the last session of each machine."""
     last: dict[str, int] = {}
@@ -295,5 +325,6 @@ def _result(
         table=str(kept.table),
         page=str(kept.page),
         sessions=sessions,
+        notes=notes,
         comparison=compared(sisters, false_alarms) if has_values else None,
     )

@@ -6,6 +6,7 @@ import csv
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import pytest
 
@@ -40,6 +41,21 @@ def calibrated(recorded, tmp_path_factory):
     spoilt.write_text(spoilt.read_text("utf-8") + "1,2,3,4,5,6,7\n", "utf-8")
     outcome = call("fleet", sessions, "--do", "calibrate", "--out", folder / "out", "--jobs", "2", "--json")
     return folder, outcome
+
+
+class InThisProcess:
+    """A pool that works here: to start processes takes seconds, and `test_executors.py` and the tests of whole commands do it."""
+
+    def __init__(self, *_):
+        pass
+
+    def each(self, work, pieces):
+        yield from enumerate(map(work, pieces))
+
+
+@pytest.fixture
+def here(monkeypatch):
+    monkeypatch.setattr(fleet_module, "WorkPool", InThisProcess)
 
 
 def states(result):
@@ -88,30 +104,29 @@ def test_one_table_has_every_value_and_one_page_a_row_for_each_machine(calibrate
     for name in ("M00", "m01", "M02", "M03"):  # the file of m01 was changed: nobody knows whose it is
         assert f" {name} " in page.text
     assert "3 of 4 sessions done, 1 failed" in page.text
-    assert page.tags.count("svg") == COUNT
+    assert page.tags.count("svg") == COUNT - 1  # what failed has no scores
 
 
+@pytest.mark.usefixtures("here")
 def test_what_is_up_to_date_is_not_done_again(sessions, tmp_path, monkeypatch):
-    out = tmp_path / "out"
-    assert set(states(fleet([sessions], "circles", out)).values()) == {"done"}
-    assert set(states(fleet([sessions], "circles", out)).values()) == {"up-to-date"}
+    out, one_test = tmp_path / "out", fleet_module.FleetOptions(tests=("a",))
+
+    def again(options=one_test, **how):
+        return states(fleet([sessions], "circles", out, options=options, **how))
+
+    assert set(again().values()) == {"done"}
+    assert set(again().values()) == {"up-to-date"}
     # Another recording, another option, another program, or the wish: each is done anew, and nothing else.
     path = sessions / "m02" / "session.yaml"
     path.write_text(path.read_text("utf-8").replace("ambient_temp_c: 20.0", "ambient_temp_c: 21.0"), "utf-8")
-    assert states(fleet([sessions], "circles", out)) == {
-        "m00": "up-to-date",
-        "m01": "up-to-date",
-        "m02": "done",
-        "m03": "up-to-date",
-    }
-    findings = fleet_module.FleetOptions(findings=True)
-    assert set(states(fleet([sessions], "circles", out, options=findings)).values()) == {"done"}
-    assert set(states(fleet([sessions], "circles", out)).values()) == {"up-to-date"}
-    assert set(states(fleet([sessions], "circles", out, anew=True)).values()) == {"done"}
+    assert again() == {"m00": "up-to-date", "m01": "up-to-date", "m02": "done", "m03": "up-to-date"}
+    assert set(again(replace(one_test, findings=True)).values()) == {"done"}
+    assert set(again().values()) == {"up-to-date"}
+    assert set(again(anew=True).values()) == {"done"}
     own = fleet_module.program_identity()
     monkeypatch.setattr(fleet_module, "program_identity", lambda: {**own, "code": "0" * 64})
     with pytest.raises(Exception, match="another program"):
-        fleet([sessions], "circles", out)
+        again()
 
 
 def test_an_interruption_goes_on_where_it_stopped(sessions, tmp_path):
@@ -128,6 +143,7 @@ def test_an_interruption_goes_on_where_it_stopped(sessions, tmp_path):
     assert sorted(again.values()) == ["done"] * (COUNT - len(kept)) + ["up-to-date"] * len(kept)
 
 
+@pytest.mark.usefixtures("here")
 def test_half_a_result_is_no_result(sessions, tmp_path):
     """A file that was cut off by a power failure of a disk that lied is worked out again."""
     fleet([sessions], "circles", tmp_path / "out")
@@ -136,6 +152,7 @@ def test_half_a_result_is_no_result(sessions, tmp_path):
     assert states(fleet([sessions], "circles", tmp_path / "out"))["m03"] == "done"
 
 
+@pytest.mark.usefixtures("here")
 def test_copies_are_done_once(sessions, tmp_path):
     shutil.copytree(sessions / "m00", sessions / "m00-copy")
     notes = []
@@ -144,6 +161,7 @@ def test_copies_are_done_once(sessions, tmp_path):
     assert any("m00-copy is a copy of m00" in one for one in notes)
 
 
+@pytest.mark.usefixtures("here")
 def test_a_machine_of_another_geometry_is_compared_in_figures_only_and_that_is_said(sessions, tmp_path):
     """Its frame is higher by 10 mm: its circles are circles as well, its parameters are departures from another nominal machine."""
     path = sessions / "m03" / "machine.yaml"
@@ -175,6 +193,26 @@ def test_reports_and_tables_as_parquet(sessions, tmp_path):
     written = call("fleet", sessions / "m00", "--do", "report", "--out", tmp_path / "reports")
     assert written.code == DONE, written.err
     assert len(list((tmp_path / "reports" / "report").glob("m00-*.html"))) == 1
+
+
+@pytest.mark.usefixtures("here")
+def test_sessions_without_a_serial_number_are_one_machine_or_each_its_own_and_that_is_said(sessions, tmp_path):
+    for path in sessions.glob("*/session.yaml"):
+        path.write_text(re.sub(r"serial_number: M\d\d\n", "", path.read_text("utf-8")), "utf-8")
+    together = call("fleet", sessions, "--do", "circles", "--out", tmp_path / "out", "--test", "a", "--json")
+    (name,) = {one["machine"] for one in together.data["sessions"]}
+    (note,) = together.data["notes"]
+    assert note.startswith(f"{COUNT} sessions of {name} have no serial number: they are counted as one machine")
+    assert note in together.err
+    assert together.data["comparison"]["machines"] == 1
+    page = Page((tmp_path / "out" / "circles.html").read_text("utf-8"))
+    assert note in page.text
+    apart = call("fleet", sessions, "--do", "circles", "--out", tmp_path / "out", "--test", "a", "--json", "--apart")
+    assert {one["machine"] for one in apart.data["sessions"]} == {f"{name} (m{k:02d})" for k in range(COUNT)}
+    assert {one["state"] for one in apart.data["sessions"]} == {"up-to-date"}
+    assert apart.data["comparison"]["machines"] == COUNT
+    (note,) = apart.data["notes"]
+    assert "each is counted as a machine of its own" in note
 
 
 def test_words_that_fit_nothing_are_refused(sessions, tmp_path):

@@ -129,8 +129,10 @@ class Runs:
 
     def allow(self, first: Sequence[SimulationRequest]) -> float:
         """Run a first simulation, set the number that may be run where none was given, and return its time [s]."""
-        self(first)  # whatever a process does once only is no part of a simulation's time
+        self(first)
         again = list(dict.fromkeys(first))
+        if not self.ran:
+            self._simulated(again)  # it was kept: whatever a process does once only is no part of a simulation's time
         before = monotonic()
         self._simulated(again)
         one = max((monotonic() - before) / max(len(again), 1), SHORTEST_S)

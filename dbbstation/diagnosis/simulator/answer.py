@@ -208,9 +208,10 @@ def _judged(one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, flo
         if name in values:
             values[name] = replace(values[name], value=number)
     one = replace(one, values=values)
-    asked = moves(found.node, found.settled).get(one.name, 0.0)
-    if asked > MOST_ASKED and one.verdict.rank < Verdict.AMBIGUOUS.rank:
-        what = f"Refitted it is {asked:.1f} standard uncertainties from where the comparison about the refit has it: no verdict."
+    farthest = max(moves(found.node, found.settled).items(), key=lambda pair: pair[1], default=("", 0.0))
+    if farthest[1] > MOST_ASKED and one.verdict.rank < Verdict.AMBIGUOUS.rank:
+        it = "it" if farthest[0] == one.name else farthest[0]
+        what = f"Refitted, {it} is {farthest[1]:.1f} standard uncertainties from where the comparison about the refit has it: no verdict."
         return replace(one, verdict=Verdict.AMBIGUOUS, text=what)
     if nonlinear[one.name] > AGREE and one.verdict.rank < Verdict.AMBIGUOUS.rank:
         what = f"True and linear answer to it differ by {100.0 * nonlinear[one.name]:.0f} %: no verdict."
@@ -221,9 +222,9 @@ def _judged(one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, flo
 REFUTED = "it was put in and refitted, and is not worth it there"
 """Why a term that linear answers asked for is not compared in the end."""
 
-MOST_ASKED = 1.0
-"""Standard uncertainties by which a term may be from where the comparison about its refit has it: beyond, its ± would not hold what two
-ways to the same number differ by."""
+MOST_ASKED = 2.0
+"""Standard uncertainties by which a term may be from where the comparison about its refit has it: beyond, which is one case in twenty, what
+is put in is not what these answers are about, and no term beside it is sure."""
 
 
 def _nonlinear(work: SimulationRuns, found: SearchOutcome) -> dict[str, float]:

@@ -29,6 +29,9 @@ is a curve."""
 LENGTHS = 5
 """Time constants, widths and places that answers are taken at, at the most; between them they are interpolated."""
 
+REACH = 10.0
+"""Factor by which a time constant or a width may be beyond the ends of its grid."""
+
 INNER = 2
 """Knots of a smooth curve inside the range of its signal, which then is a cubic spline of four functions beside a straight line."""
 
@@ -190,8 +193,12 @@ def _candidate(
 ) -> Candidate:
     count = len(names) - bool(grid)
     middle = (grid[len(grid) // 2],) if grid else ()
+    if grid and form is not TermForm.HINGE:
+        bounds: tuple[tuple[float, float], ...] = ((grid[0] / REACH, grid[-1] * REACH),)
+    else:
+        bounds = ()
     return Candidate(
-        Term(port.name, form, signals, (0.0,) * count, middle, fixed),
+        Term(port.name, form, signals, (0.0,) * count, middle, fixed, bounds=bounds),
         names,
         units,
         (grid,) if grid else (),

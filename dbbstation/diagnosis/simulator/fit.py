@@ -94,19 +94,10 @@ def bounds_of(work: SimulationRuns, state: FittedState) -> tuple[NDArray[np.floa
     high = [p.high for p in work.model.parameters]
     for term in state.terms:
         count, positive = len(term.amplitudes), term.form in IN_PLACE
-        shapes = [
-            sorted((number / REACH, number * REACH))
-            if term.own is None and number and term.form.value != "hinge"
-            else (-np.inf, np.inf)
-            for number in term.shape
-        ]
+        shapes = term.bounds or ((-np.inf, np.inf),) * len(term.shape)
         low += [0.0 if positive else -np.inf] * count + [bound[0] for bound in shapes]
         high += [np.inf] * count + [bound[1] for bound in shapes]
     return np.array(low), np.array(high)
-
-
-REACH = 10.0
-"""Factor by which a time constant or a width may move in one fit: from any point of its grid beyond the next ones."""
 
 
 def fit(
@@ -242,6 +233,9 @@ def near(
     if not rows.shape[1]:
         return state, residual
     scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    # What these rows hardly see stays: the initial state of a recording whose first rows are held back.
+    seen = scale / np.maximum(np.linalg.norm(fitted.columns, axis=0), 1e-300)
+    scale = np.where(seen < HARDLY * seen.max(), np.inf, scale)
     for _ in range(rounds):
         step = np.linalg.lstsq(rows / scale, before, rcond=1e-10)[0] / scale
         share = 1.0
@@ -260,6 +254,9 @@ def near(
             break
     return state, residual
 
+
+HARDLY = 1e-4
+"""Share of what all rows see of a number, over the largest such share, below which some of them do not see it."""
 
 SMALLEST = 0.1
 """Share of a step below which none is tried: the answers of all rows no longer hold there, or nothing is left to gain."""

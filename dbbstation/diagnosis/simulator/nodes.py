@@ -191,12 +191,16 @@ class Nodes:
         work: simulations.
         own: physics of the user's own.
         progress: called with what is being done.
+        begun: from which terms others were refitted already.
+        bettered: terms for which a better minimum was found than that which had been compared.
     """
 
     work: SimulationRuns
     own: Sequence[PortSource] = ()
     progress: Callable[[str], None] = lambda _: None
     known: dict[frozenset[str], Node] = field(default_factory=dict)
+    begun: set[tuple[frozenset[str], frozenset[str]]] = field(default_factory=set)
+    bettered: set[frozenset[str]] = field(default_factory=set)
 
     def base(self, start: FittedState) -> Node:
         """The simulator as it is, refitted from several starts."""
@@ -239,28 +243,38 @@ class Nodes:
         """
         beside = settled.best.members if beside is None else beside
         names = frozenset(member.cause.name for member in beside) & node.names | {one.name for one in more}
-        if names not in self.known:
-            self.progress(f"refit with {', '.join(sorted(names))}")
-            terms = zip(node.inside, node.fitted.state.terms, strict=True)
-            kept = [(one, term) for one, term in terms if one.name in names]
-            new = [one.term.with_numbers(_inside(one, node.numbers_of(settled, one, beside))) for one in more]
-            state = FittedState(node.fitted.state.values, (*(term for _, term in kept), *new))
-            try:
-                self.known[names] = self._fitted(node, state, (*(one for one, _ in kept), *more))
-            except RanAwayError:
-                return None
-        return self.known[names]
+        terms = zip(node.inside, node.fitted.state.terms, strict=True)
+        kept = [(one, term) for one, term in terms if one.name in names]
+        new = [one.term.with_numbers(_inside(one, node.numbers_of(settled, one, beside))) for one in more]
+        state = FittedState(node.fitted.state.values, (*(term for _, term in kept), *new))
+        return self._known_or_begun(node, state, (*(one for one, _ in kept), *more))
 
     def without(self, node: Node, name: str) -> Node:
         """A node with one term less."""
-        names = node.names - {name}
-        if names not in self.known:
-            self.progress(f"refit without {name}")
-            kept = [
-                (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True) if one.name != name
-            ]
-            state = FittedState(node.fitted.state.values, tuple(term for _, term in kept))
-            self.known[names] = self._fitted(node, state, tuple(one for one, _ in kept))
+        terms = zip(node.inside, node.fitted.state.terms, strict=True)
+        kept = [(one, term) for one, term in terms if one.name != name]
+        state = FittedState(node.fitted.state.values, tuple(term for _, term in kept))
+        return self._known_or_begun(node, state, tuple(one for one, _ in kept)) or node
+
+    def _known_or_begun(self, node: Node, state: FittedState, inside: tuple[Candidate, ...]) -> Node | None:
+        """The better of a node that is known and the same terms refitted from another state; None where simulations run away.
+
+        A refit may end in a wrong minimum: with more terms, or others in their place, a better place to begin from is found.
+        """
+        names, place = frozenset(one.name for one in inside), (node.names, frozenset(one.name for one in inside))
+        known = self.known.get(names)
+        if place in self.begun:
+            return known
+        self.begun.add(place)
+        self.progress(f"refit with {', '.join(sorted(names))}" if names else "refit")
+        try:
+            found = self._fitted(node, state, inside)
+        except RanAwayError:
+            return known
+        if known is None or _left(found) < BETTER * _left(known):
+            self.known[names] = found
+            if known is not None:
+                self.bettered.add(names)
         return self.known[names]
 
     def again(self, node: Node, weigh: Weigh, sigma: float) -> Node:
@@ -281,6 +295,15 @@ class Nodes:
             before = bank.noise
             fitted = fit(self.work, fitted.state, bank.whitened, sigma=before.innovation)
         return replace(node, fitted=fitted, inside=inside)
+
+
+BETTER = 0.9
+"""What another minimum must leave of the residual, over what the one that is known leaves, to be another: the same refit in other noise
+leaves about as much."""
+
+
+def _left(node: Node) -> float:
+    return float(np.sqrt(np.mean(np.square(node.fitted.residual))))
 
 
 def _inside(one: Candidate, numbers: Sequence[float]) -> list[float]:

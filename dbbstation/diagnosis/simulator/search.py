@@ -100,6 +100,8 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
             more: frozenset[str] = frozenset()
             if wanted is None or wanted.names in been:
                 wanted, more = _wanted(nodes, node, settled)
+            been -= nodes.bettered
+            nodes.bettered.clear()
             if wanted is not None and wanted.names not in been:
                 been.add(wanted.names)
                 settled, node, refuted, refitted = compare(wanted.channel), wanted, frozenset(), 0

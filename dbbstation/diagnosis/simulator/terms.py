@@ -67,6 +67,7 @@ class Term:
         shape: numbers that the term is not proportional to, such as a time constant, shape (s,).
         fixed: numbers that are not fitted: knots of a curve, period of an angle and order.
         own: physics of the user's own.
+        bounds: least and greatest value of each number of the shape, shape (s, 2); empty where they are not limited.
     """
 
     port: str
@@ -76,6 +77,7 @@ class Term:
     shape: tuple[float, ...] = ()
     fixed: tuple[float, ...] = ()
     own: PortSource | None = None
+    bounds: tuple[tuple[float, float], ...] = ()
 
     @property
     def name(self) -> str:

@@ -155,6 +155,43 @@ class Estimates:
     covariance: NDArray[np.float64]
 
 
+class _Forms:
+    """Forms of causes, those of one number of amplitudes together.
+
+    Args:
+        causes: any.
+        gram: products of all columns, shape (n, n).
+
+    Attributes:
+        causes: the same.
+        needed: columns of all forms, shape (q,).
+        groups: numbers of forms that have one number of amplitudes, shape (m,); places of their columns in `needed` and plausible sizes,
+            shape (m, p) each; products of these columns, shape (m, p, p).
+        weights: log probability of each form among those of its cause.
+        ends: where the forms of each cause begin and end.
+        slim: which forms of each cause have fewer than `FLEXIBLE` amplitudes.
+    """
+
+    def __init__(self, causes: tuple[Cause, ...], gram: NDArray[np.float64]) -> None:
+        variants = [variant for cause in causes for variant in cause.variants]
+        self.causes = causes
+        self.needed = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(v.columns for v in variants)]))
+        place = np.zeros(len(gram), dtype=np.int64)
+        place[self.needed] = np.arange(len(self.needed))
+        by_size: dict[int, list[int]] = {}
+        for number, variant in enumerate(variants):
+            by_size.setdefault(len(variant.columns), []).append(number)
+        self.groups = []
+        for numbers in by_size.values():
+            columns = np.array([variants[number].columns for number in numbers])
+            plausible = np.array([variants[number].plausible for number in numbers])
+            blocks = gram[columns[:, :, None], columns[:, None, :]]
+            self.groups.append((numbers, place[columns], plausible, blocks))
+        self.weights = np.array([variant.log_weight for variant in variants])
+        self.ends = np.cumsum([0, *(len(cause.variants) for cause in causes)])
+        self.slim = [[i for i, v in enumerate(cause.variants) if len(v.columns) < FLEXIBLE] for cause in causes]
+
+
 class ModelComparison:
     """Marginal likelihoods over sets of causes.
 
@@ -166,6 +203,7 @@ class ModelComparison:
     def __init__(self, gram: NDArray[np.float64], towards: NDArray[np.float64]) -> None:
         self._gram, self._towards = gram, towards
         self._last: tuple[tuple[Member, ...], _Eliminated] | None = None
+        self._forms: dict[str, _Forms] = {}
 
     def log_evidence(self, members: Sequence[Member]) -> float:
         """Log marginal likelihood of base and members over that of the base alone."""
@@ -179,7 +217,7 @@ class ModelComparison:
     def estimates(self, members: Sequence[Member]) -> Estimates:
         """Posterior means and covariance of the amplitudes and the slack of members."""
         columns, sd = _stacked(members)
-        information = sd[:, None] * self._gram[np.ix_(columns, columns)] * sd + np.eye(len(sd))
+        information = self._information(columns, sd)
         factor = cholesky(information)
         values = cho_solve((factor, True), sd * self._towards[columns])
         inverse = cho_solve((factor, True), np.eye(len(sd)))
@@ -235,11 +273,8 @@ class ModelComparison:
             members: of a hypothesis.
             causes: none of theirs.
         """
-        causes = tuple(causes)
-        variants = [(k, variant) for k, cause in enumerate(causes) for variant in cause.variants]
-        needed = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(v.columns for _, v in variants)]))
-        place = np.zeros(len(self._towards), dtype=np.int64)
-        place[needed] = np.arange(len(needed))
+        forms = self._forms_of(tuple(causes))
+        causes, needed = forms.causes, forms.needed
         towards = self._towards[needed]
         across = np.zeros((0, len(needed)))
         if members:
@@ -249,28 +284,20 @@ class ModelComparison:
                 lower, sd[:, None] * self._gram[np.ix_(taken, needed)], lower=True, check_finite=False
             )
             towards = towards - across.T @ z
-        by_size: dict[int, list[int]] = {}
-        for number, (_, variant) in enumerate(variants):
-            by_size.setdefault(len(variant.columns), []).append(number)
-        factors = np.empty((len(variants), len(SCALES)))
-        for numbers in by_size.values():
-            columns = np.array([variants[number][1].columns for number in numbers])
-            own, plausible = place[columns], np.array([variants[number][1].plausible for number in numbers])
-            blocks = self._gram[columns[:, :, None], columns[:, None, :]]
+        factors = np.empty((len(forms.weights), len(SCALES)))
+        for numbers, own, plausible, products in forms.groups:
+            left = products
             if members:
                 beside = across.T[own]
-                blocks = blocks - beside @ beside.transpose(0, 2, 1)
-            blocks = plausible[:, :, None] * blocks * plausible[:, None, :]
-            seen, axes = np.linalg.eigh(blocks)
+                left = products - beside @ beside.transpose(0, 2, 1)
+            seen, axes = np.linalg.eigh(plausible[:, :, None] * left * plausible[:, None, :])
             along = np.square(np.einsum("mpq,mp->mq", axes, plausible * towards[own]))
             factors[numbers] = _log_factors(np.maximum(seen, 0.0), along)
-        weights = np.array([variant.log_weight for _, variant in variants])
-        weighted = factors + weights[:, None] + LOG_SCALE_WEIGHTS
-        owner = np.array([k for k, _ in variants], dtype=np.int64)
+        weighted = factors + forms.weights[:, None] + LOG_SCALE_WEIGHTS
         log_factor, log_best = np.empty(len(causes)), np.empty(len(causes))
         best: list[Member] = []
         narrow: list[Member | None] = []
-        ends = np.searchsorted(owner, np.arange(len(causes) + 1))
+        ends = forms.ends
         for k, cause in enumerate(causes):
             own = weighted[ends[k] : ends[k + 1]]
             form, scale = divmod(int(own.argmax()), len(SCALES))
@@ -279,7 +306,7 @@ class ModelComparison:
             best.append(Member(cause, cause.variants[form], float(SCALES[scale])))
             log_best[k] = factors[ends[k] + form, scale]
             narrow.append(None)
-            slim = [i for i, v in enumerate(cause.variants) if len(v.columns) < FLEXIBLE]
+            slim = forms.slim[k]
             if slim and form not in slim:
                 slot, size = divmod(int(own[slim].argmax()), len(SCALES))
                 narrow[-1] = Member(cause, cause.variants[slim[slot]], float(SCALES[size]))
@@ -296,7 +323,7 @@ class ModelComparison:
             variant; and that of its best size without weights.
         """
         columns, sd = _stacked(members)
-        information = sd[:, None] * self._gram[np.ix_(columns, columns)] * sd + np.eye(len(sd))
+        information = self._information(columns, sd)
         inverse = np.linalg.inv(information)
         values = inverse @ (sd * self._towards[columns])
         found, first = [], 0
@@ -315,6 +342,23 @@ class ModelComparison:
             found.append((replace(member, scale=float(SCALES[best])), averaged, float(factors[best])))
         return found
 
+    def _information(self, columns: NDArray[np.int64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Information of amplitudes in units of their priors, that of the priors with it, shape (p, p)."""
+        information = self._gram[np.ix_(columns, columns)]
+        information *= sd[:, None]
+        information *= sd
+        information.flat[:: len(sd) + 1] += 1.0
+        return information
+
+    def _forms_of(self, causes: tuple[Cause, ...]) -> _Forms:
+        """Forms of causes as `scan` takes them; kept where it is one cause, which a search scans again and again."""
+        if len(causes) != 1:
+            return _Forms(causes, self._gram)
+        known = self._forms.get(causes[0].name)
+        if known is None or known.causes[0] is not causes[0]:
+            known = self._forms[causes[0].name] = _Forms(causes, self._gram)
+        return known
+
     def _eliminated(self, members: Sequence[Member]) -> _Eliminated:
         """Cholesky factor of the members' information, what it makes of the target, and their log evidence."""
         if not members:
@@ -323,7 +367,7 @@ class ModelComparison:
         if self._last is not None and len(self._last[0]) == len(members) and all(map(is_, self._last[0], members)):
             return self._last[1]
         columns, sd = _stacked(members)
-        information = sd[:, None] * self._gram[np.ix_(columns, columns)] * sd + np.eye(len(sd))
+        information = self._information(columns, sd)
         lower = cholesky(information)
         z = solve_triangular(lower, sd * self._towards[columns], lower=True, check_finite=False)
         found = lower, z, 0.5 * float(z @ z) - float(np.log(np.diag(lower)).sum())

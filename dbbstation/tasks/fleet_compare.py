@@ -167,7 +167,7 @@ def _causes(sisters: Sequence[Sister]) -> tuple[SharedCause, ...]:
             name=name,
             found_in=tuple(of),
             machines=asked[name],
-            false_claims=sum(1.0 - probability for probability in of.values()),
+            false_claims=sum(max(0.0, 1.0 - probability) for probability in of.values()),
         )
         for name, of in sorted(there.items(), key=lambda pair: (len(pair[1]), pair[0]))
     )

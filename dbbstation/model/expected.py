@@ -63,10 +63,13 @@ def expected_circle(
     again = np.zeros((COEFFICIENTS, COEFFICIENTS))
     effects: dict[tuple[str, str], NDArray[np.float64]] = {}
     local: dict[tuple[str, str], NDArray[np.float64]] = {}
+    moving: set[tuple[str, str]] = set()
     shapes = form_columns(theta - start)[:, HIGHER]
     for cause in _acting(reading, motion, model, identified, causes, shapes, observation.test):
         effects[cause.key] = effect = to_form @ cause.columns_mm
         again += cause.scatters * effect @ effect.T
+        if cause.moving:
+            moving.add(cause.key)
         if to_local is not None and not cause.at_a_pose:
             local[cause.key] = to_local @ cause.columns_mm
         if cause.at_a_pose:
@@ -85,6 +88,7 @@ def expected_circle(
         form_um=to_form @ long_mm,
         effects_um=effects,
         local_um=local,
+        moving=frozenset(moving),
         again_um2=again,
         place_um=1e3 * float(np.hypot(mounting_mm, observation.setup.ball_uncertainty_mm)),
     )
@@ -100,12 +104,14 @@ class _Acting:
         at_a_pose: whether it acts wherever the machine stands, whatever the way there and the time.
         scatters: variances of it that the difference of two runs of one circle has: two where each mounting has its own, one of
             what grows with time.
+        moving: whether it acts where the machine moves, and not where it stands.
     """
 
     key: tuple[str, str]
     columns_mm: NDArray[np.float64]
     at_a_pose: bool
     scatters: float = 0.0
+    moving: bool = False
 
 
 def _acting(
@@ -146,7 +152,7 @@ def _acting(
         if np.all(np.isfinite(columns)):
             scatters = 2.0 if source.belongs_to is Owner.MOUNTING else float(source.varies_with == "time")
             key = source.name, source.shared_by(motion)
-            yield _Acting(key, columns, at_a_pose=at_a_pose, scatters=scatters)
+            yield _Acting(key, columns, at_a_pose=at_a_pose, scatters=scatters, moving=Need.PATH in source.needs)
 
 
 def _as_circle(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

@@ -67,14 +67,17 @@ def cause_of(finding: Finding) -> str:
 
 EXPLAINS = (
     (Name.HELD, Name.LOST),
+    (Name.REPEATED,),
     (Name.FEED,),
     (Name.CIRCLE,),
+    (Name.SCALE,),
     (Name.SPIKE, Name.BUMP, Name.CLOSURE, Name.DRIFT, Name.NOISE),
     (Name.TEST, Name.DIRECTION),
     (Name.LOCAL,),
     (Name.RADIUS,),
     (Name.OTHER_DIRECTION, Name.REPEAT),
     (Name.BORE,),
+    (Name.FORM,),
 )
 """Findings in the order in which one brings others about: a feed that is not the programmed one also moves the end of the turn and
 differs from the other direction, and neither of these changes the feed. A drift moves centre and mean. A ball that moved between both directions stands in the wrong
@@ -108,6 +111,9 @@ DO = {
     Name.SPIKE: "check plug, cable and earth of the gauge, run the circle again",
     Name.BUMP: "look for chips, a cable that pulls and what touches the bar there, run the circle again",
     Name.BORE: "check bore, holder, how the plate sits and the zero point, press the holder home, run the circle again",
+    Name.FORM: "check tilt, plane (G17) and radius in the program and how the plate sits, run the circle again",
+    Name.REPEATED: "ask the gauge less often: the rate in the instrument's file, or what the display renews; run the circle again",
+    Name.SCALE: "check the gauge at a gauge block and its counts per millimetre, then the feed-in of plan and program; run the circle again",
     Name.CLOSURE: "tighten holder and ball, let bar and machine warm through, run the circle again",
     Name.DRIFT: "tighten holder and ball, let bar and machine warm through, run the circle again",
     Name.NOISE: "clean balls and cups, look for what shakes, run the circle again",

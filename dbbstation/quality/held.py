@@ -35,6 +35,22 @@ ROUNDED = 1.0 / 12.0
 """Variance that rounding to a step adds to readings, in steps squared [GUM 4.3.7]."""
 
 
+def chance_equal(squares_mm2: float, count: int, step_mm: float) -> float:
+    """Return how probable it is at the most that a sound reading is the same as the one before; one where no bound is known.
+
+    Args:
+        squares_mm2: sum of the squares of second differences where the length does not stand still [mm²].
+        count: how many of them there are.
+        step_mm: smallest difference of two readings [mm].
+    """
+    if not count or not 0.0 < step_mm < inf:
+        return 1.0
+    known = max(1.0 - quantile(inf) / sqrt(2.0 * INDEPENDENT_SHARE * count), 0.0)
+    variance = known**2 * squares_mm2 / count / SECOND_DIFFERENCE - ROUNDED * step_mm**2
+    finer = sqrt(max(variance, 0.0) * 2.0 * pi) / step_mm
+    return 1.0 / finer if finer > 1.0 else 1.0
+
+
 def equal_limit(squares_mm2: float, count: int, step_mm: float, readings: float) -> float:
     """Return how many equal readings in a row a sound turn has with probability SHARE at the most.
 
@@ -47,12 +63,8 @@ def equal_limit(squares_mm2: float, count: int, step_mm: float, readings: float)
     Returns:
         Their number; infinite where the step is not finer than the noise, by the lower limit of what is known of it.
     """
-    if not count or not 0.0 < step_mm < inf:
-        return inf
-    known = max(1.0 - quantile(inf) / sqrt(2.0 * INDEPENDENT_SHARE * count), 0.0)
-    variance = known**2 * squares_mm2 / count / SECOND_DIFFERENCE - ROUNDED * step_mm**2
-    finer = sqrt(max(variance, 0.0) * 2.0 * pi) / step_mm
-    return 1.0 + ceil(log(max(readings, 1.0) / SHARE) / log(finer)) if finer > 1.0 else inf
+    chance = chance_equal(squares_mm2, count, step_mm)
+    return 1.0 + ceil(log(max(readings, 1.0) / SHARE) / -log(chance)) if chance < 1.0 else inf
 
 
 @dataclass

@@ -13,7 +13,8 @@ from dbbstation.quality.between import direction, other_direction, repeat
 from dbbstation.quality.finding import Finding, Name, stricter
 from dbbstation.quality.knowledge import Others, Run, Seen, across, apart_um, seen
 from dbbstation.quality.local import local_difference, locally_apart_um
-from dbbstation.quality.place import bore, radius
+from dbbstation.quality.place import bore, form, radius
+from dbbstation.quality.scale import scale
 from dbbstation.quality.single import by_itself
 from dbbstation.quality.stated import sigmas_apart
 from dbbstation.quality.swapped import of_its_test
@@ -114,6 +115,8 @@ class SessionRuns:
             of_its_test(one, both),
             radius(analysis, expected, by_others=by_others is not None),
             bore(analysis, expected, by_others=by_others is not None),
+            form(one, expected, by_others=by_others is not None),
+            scale(one, others),
             other_direction(one, others),
             repeat(one, others),
             local_difference(one, others),

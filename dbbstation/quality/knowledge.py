@@ -12,6 +12,7 @@ from dbbstation.circles.analysis import CircleAnalysis, analyse, feed_shown
 from dbbstation.errors import TraceError
 from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, amplitudes
 from dbbstation.trace.cut import cut, edges_of, lost_on_turn, unusable_on_turn
+from dbbstation.trace.feeding import FeedingWay, feeding_ways
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -79,8 +80,11 @@ class Expected:
         effects_um: what one standard deviation of each cause's parameters does to these coefficients, shape (7, p) each, by the
             cause and the set of values that it shares with other runs [µm].
         local_um: the same of causes that act along a path or with time, on the coefficients of `local_columns`, shape (59, p) each [µm].
+        moving: keys of the causes that act where the machine moves, and not where it stands.
         again_um2: covariance of the difference of two runs of this circle, each on a mounting of its own, shape (7, 7) [µm²].
         place_um: standard deviation of the ball's place that the plan states, CMM and holder, per axis [µm].
+        known_um2: covariance of a sound run's form, noise included, where other tests say what the machine is like, shape (7, 7)
+            [µm²]; None where they do not.
     """
 
     centre_mm: NDArray[np.float64]
@@ -92,8 +96,10 @@ class Expected:
     form_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(COEFFICIENTS))
     effects_um: Mapping[tuple[str, str], NDArray[np.float64]] = field(default_factory=dict)
     local_um: Mapping[tuple[str, str], NDArray[np.float64]] = field(default_factory=dict)
+    moving: frozenset[tuple[str, str]] = frozenset()
     again_um2: NDArray[np.float64] = field(default_factory=lambda: np.zeros((COEFFICIENTS, COEFFICIENTS)))
     place_um: float = 0.0
+    known_um2: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +172,7 @@ class Seen:
         coefficients_um: orthonormal Fourier coefficients of the readings less the bar's length, harmonics 0 to 3 by
             commanded angle from the start of the turn towards +Y: mean, cosines, sines, shape (7,) [µm].
         local_um: the same up to `LOCAL_HARMONIC` undulations, as of `local_columns`, shape (59,) [µm]; zeros where samples are too few.
+        ways: feed-in and feed-out by the readings; None where they are not in the recording.
     """
 
     run: Run
@@ -177,6 +184,7 @@ class Seen:
     coefficients_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(COEFFICIENTS))
     unusable: int = 0
     local_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(LOCAL_COEFFICIENTS))
+    ways: tuple[FeedingWay, FeedingWay] | None = None
 
     @cached_property
     def without_model(self) -> Seen:
@@ -215,7 +223,7 @@ def seen(run: Run) -> Seen:
     local = np.zeros(LOCAL_COEFFICIENTS)
     if len(raw) > SAMPLES_PER_HARMONIC * LOCAL_HARMONIC:
         local = _orthonormal(amplitudes(long_um, np.radians(raw.theta_deg), LOCAL_HARMONIC))
-    return Seen(run, analysis, "", lost, analysis.feed_mm_min, _longer_s(run), orthonormal, unusable, local)
+    return Seen(run, analysis, "", lost, analysis.feed_mm_min, _longer_s(run), orthonormal, unusable, local, _ways(run))
 
 
 def _orthonormal(found: NDArray[np.complex128]) -> NDArray[np.float64]:
@@ -239,6 +247,15 @@ def _longer_s(run: Run) -> float | None:
     except TraceError:
         return None
     return ended_s - begun_s - due_s(run.circle)
+
+
+def _ways(run: Run) -> tuple[FeedingWay, FeedingWay] | None:
+    if run.recording.theta_deg is not None:
+        return None
+    try:
+        return feeding_ways(run.recording, run.circle, edges_of(run.recording, run.circle))
+    except TraceError:
+        return None
 
 
 def due_s(circle: Circle) -> float:

@@ -1,4 +1,4 @@
-"""Findings about where a circle lies: radius and bore, against the numbers that were expected."""
+"""Findings about where a circle lies and what it looks like: radius, bore and form, against what was expected."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.quality.finding import Finding, Name, found, undecided
+from dbbstation.quality.knowledge import HIGHER
 from dbbstation.quality.limits import length_quantile, quantile
+from dbbstation.quality.stated import limit_along
+from dbbstation.quality.together import own_um2
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis
-    from dbbstation.quality.knowledge import Expected
+    from dbbstation.quality.knowledge import Expected, Seen
 
 BY_OTHERS = " by the other tests"
 """What texts say of an expectation that other tests of the session give."""
@@ -63,3 +66,30 @@ def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = Fa
         stated,
         f"{stated}: check bore, holder and its seat, and the ball's entry in the plan",
     )
+
+
+def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Finding:
+    """Mean, centre, ellipse and triangle together against the expected ones.
+
+    A tilt, a plane or a radius that is wrong in both directions alike changes all of them a little, each by less than its limit: the causes that
+    move one of these numbers move the others with it.
+
+    Args:
+        one: the run.
+        expected: what is known of its form; None where nothing is.
+        by_others: whether other tests of the session say so.
+    """
+    if expected is None:
+        return undecided(Name.FORM, "no expected form is known", "µm")
+    covariance = expected.known_um2
+    if covariance is None:
+        effects = np.hstack([np.zeros((len(expected.form_um), 1)), *expected.effects_um.values()])
+        covariance = effects @ effects.T + np.diag(own_um2(one))
+    # The centre of a ball that was put up under the spindle says nothing.
+    rows = list(range(len(expected.form_um))) if expected.place_known else [0, *HIGHER]
+    off = (one.coefficients_um - expected.form_um)[rows]
+    value, limit = float(np.linalg.norm(off)), limit_along(covariance[np.ix_(rows, rows)], off)
+    where = f"expected{BY_OTHERS if by_others else ''}"
+    stated = f"{value:.1f} µm rms from where mean, centre, ellipse and triangle are {where}"
+    wrong = f"{stated}: check tilt, plane and radius of the program, and how the plate sits"
+    return found(Name.FORM, value, limit, "µm", stated, wrong)

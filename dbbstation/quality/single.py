@@ -12,6 +12,7 @@ from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, und
 from dbbstation.quality.held import held
 from dbbstation.quality.knowledge import Others, due_s
 from dbbstation.quality.limits import FEWEST_OTHERS, joined, quantile, scale_of
+from dbbstation.quality.repeated import repeated
 from dbbstation.quality.spike import spike
 from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE
 from dbbstation.trace.loss import AFTER_LOSS, share_lost
@@ -232,5 +233,6 @@ def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
         bump(one.analysis, reversals),
         spike(one.analysis, reversals),
         held(one.analysis.raw),
+        repeated(one.analysis.raw),
         feed(one, others),
     )

@@ -91,11 +91,11 @@ def _covariances(runs: Sequence[Seen]) -> tuple[NDArray[np.float64], NDArray[np.
     rate = float(np.sqrt(np.mean([each.drift_um_s**2 for each in runs])))
     drift = np.concatenate([rate * (each.run.started_s or 0.0) * np.eye(n)[0] for each in runs])
     rest += np.outer(drift, drift)
-    own = np.concatenate([_own_um2(each) for each in runs])
+    own = np.concatenate([own_um2(each) for each in runs])
     return machine, rest + np.diag(own)
 
 
-def _own_um2(one: Seen) -> NDArray[np.float64]:
+def own_um2(one: Seen) -> NDArray[np.float64]:
     """Variance of each coefficient that a run shares with no other, shape (7,) [µm²]."""
     own = np.full(COEFFICIENTS, 0.5 * unseen_um2(one, one))
     if one.run.expected is not None and not one.run.expected.place_known:
@@ -158,7 +158,7 @@ def _straying(both: Together, size: float) -> float:
 def _placed(
     own: Expected, circle: Circle, more_um: NDArray[np.float64], covariance_um2: NDArray[np.float64]
 ) -> Expected:
-    """Return an expectation whose centre and mean reading are moved by a form along the travel [µm]."""
+    """Return an expectation whose form, centre and mean reading are moved by a form along the travel [µm]."""
     start = np.radians(circle.start_deg)
     # A shift d along the bar at the start is sqrt 2 of a cosine's coefficient; a raised bar sees cos e of it.
     along = np.sqrt(2.0) * circle.bar_mm / circle.radius_mm
@@ -168,8 +168,11 @@ def _placed(
     to_place[2, 0] = 1.0
     to_place *= 1e-3 * along_travel(circle)
     off_mm = to_place @ more_um
+    signs = along_travel(circle)
     return replace(
         own,
+        form_um=own.form_um + signs * more_um,
+        known_um2=signs[:, None] * covariance_um2 * signs,
         centre_mm=own.centre_mm + off_mm[:2],
         radial_mm=own.radial_mm + float(off_mm[2]),
         covariance_mm2=to_place @ covariance_um2 @ to_place.T,

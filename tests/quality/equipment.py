@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -17,7 +18,7 @@ from dbbstation.quality.knowledge import Seen, seen
 from dbbstation.trace.recording import Recording
 from tests.plant.run import Slot
 from tests.quality.sessions import TESTS, Sound, calibrated, finding_of, read, sound
-from tests.quality.spoilers import begun_elsewhere, elsewhere, mirrored, progress
+from tests.quality.spoilers import begun_elsewhere, coming_twice, elsewhere, mirrored, overridden, progress, scaled
 
 
 class Fault(StrEnum):
@@ -30,6 +31,11 @@ class Fault(StrEnum):
     KNOCKED = "knocked ball"
     STUCK = "stuck length"
     CLIPPED = "clipped length"
+    SCALED = "gauge counts too much"
+    TWICE = "readings that come twice"
+    OVERRIDE = "feed too slow, then too quick"
+    TILT_BOTH = "wrong tilt, both directions"
+    EXCHANGED = "exchanged balls, both directions"
 
 
 SIZES: dict[Fault, tuple[float, ...]] = {
@@ -38,8 +44,36 @@ SIZES: dict[Fault, tuple[float, ...]] = {
     Fault.KNOCKED: (1.0, 2.0, 5.0),
     Fault.STUCK: (1.0, 2.0, 5.0),
     Fault.CLIPPED: (1.0, 2.0, 5.0),
+    Fault.SCALED: (1.0, 2.0, 5.0),
+    Fault.OVERRIDE: (5.0, 20.0),
+    Fault.TILT_BOTH: (5.0, 10.0, 15.0),
+    Fault.EXCHANGED: (36.0, 100.0),
 }
-"""Tilt and start are off by so many degrees, a ball by as many limits, a length stands still for as many limits."""
+"""Tilt and start are off by so many degrees, a knocked ball by as many limits, a length stands still for as many limits, a gauge counts so many
+percent too much, a feed is off by as many; exchanged balls are off by so many micrometres, either way."""
+
+SPOILT_BY: dict[Fault, Callable[[Recording, Circle, float], Recording]] = {
+    Fault.START: begun_elsewhere,
+    Fault.DIRECTION: mirrored,
+    Fault.SCALED: scaled,
+    Fault.TWICE: lambda recording, circle, _size: coming_twice(recording, circle),
+    Fault.OVERRIDE: overridden,
+    Fault.EXCHANGED: elsewhere,
+}
+"""What spoils the recording of a run by a size; one where a fault has none."""
+
+ALIKE: dict[Fault, Callable[[str, str], bool]] = {
+    Fault.SCALED: lambda _one, _other: True,
+    Fault.TWICE: lambda _one, _other: True,
+    Fault.TILT_BOTH: lambda one, other: one == other,
+    Fault.EXCHANGED: lambda one, other: other in {one, _partner(one)},
+}
+"""Faults that were there before, in other runs too: whether in those of another test."""
+
+
+def _partner(test: str) -> str:
+    """The test whose ball is exchanged with that of a test."""
+    return TESTS[TESTS.index(test) ^ 1]
 
 
 class When(StrEnum):
@@ -63,12 +97,12 @@ def faulty(whole: Sound, tilted: dict[float, Sound], run: int, fault: Fault, siz
     one = whole.runs[run].run
     if fault is Fault.OTHER_TEST:
         return seen(replace(one, recording=whole.runs[int(size)].run.recording))
-    if fault is Fault.TILT:
+    if fault in {Fault.TILT, Fault.TILT_BOTH}:
         return seen(replace(one, recording=tilted[size].runs[run].run.recording))
-    if fault is Fault.START:
-        return seen(replace(one, recording=begun_elsewhere(one.recording, one.circle, size)))
-    if fault is Fault.DIRECTION:
-        return seen(replace(one, recording=mirrored(one.recording, one.circle, 1.0)))
+    if fault in SPOILT_BY:
+        if fault is Fault.EXCHANGED and TESTS.index(one.test) % 2:
+            size = -size
+        return seen(replace(one, recording=SPOILT_BY[fault](one.recording, one.circle, size)))
     name = Name.OTHER_DIRECTION if fault is Fault.KNOCKED else Name.HELD
     found = finding_of(SessionRuns([*known, whole.runs[run]]).judge(whole.runs[run]), name)
     limit = 0.0 if found is None or found.limit is None else found.limit
@@ -110,7 +144,8 @@ def equipment(folder: Path, seed: int) -> Row:
     for with_model in (False, True):
         whole = modelled if with_model else read(folder / "spoilt")
         tilted = {
-            degrees: tilted_by(folder / f"t{degrees}{with_model}", seed, degrees) for degrees in SIZES[Fault.TILT]
+            degrees: tilted_by(folder / f"t{degrees}{with_model}", seed, degrees)
+            for degrees in sorted({*SIZES[Fault.TILT], *SIZES[Fault.TILT_BOTH]})
         }
         runs = [k for k, one in enumerate(whole.runs) if one.run.repeat == 1]
         # The second direction of each test: the first has been accepted.
@@ -135,10 +170,20 @@ def _count(counted: Row, whole: Sound, tilted: dict[float, Sound], run: int, whe
             if when is When.REPEATED:
                 # The run before was wrong in the same way, and rejected; this is its repeat.
                 spoilt = replace(spoilt, run=replace(spoilt.run, repeat=2))
-            judged = SessionRuns([*known, spoilt]).judge(spoilt)
+            before_it = known
+            if fault in ALIKE:
+                before_it = [_alike(whole, tilted, k, one, fault, size) for k in known]
+            judged = SessionRuns([*before_it, spoilt]).judge(spoilt)
             shown = 0.0 if fault is Fault.OTHER_TEST else size
             counted[fault, shown, when, with_model, "of"] += 1
             counted[fault, shown, when, with_model, "found"] += bool(judged.wrong)
+
+
+def _alike(whole: Sound, tilted: dict[float, Sound], known: Seen, one: Seen, fault: Fault, size: float) -> Seen:
+    """A run that was there before, with the same fault where it has that too."""
+    if not ALIKE[fault](one.run.test, known.run.test):
+        return known
+    return faulty(whole, tilted, whole.runs.index(known), fault, size, [])
 
 
 def print_equipment(counted: Row) -> None:

@@ -97,6 +97,28 @@ def _turn(recording: Recording, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return even, np.hstack([np.ones((len(orders), 1)), np.cos(orders), np.sin(orders)]) @ found
 
 
+def scaled(recording: Recording, circle: Circle, percent: float) -> Recording:
+    """Read by a gauge that counts so much too much from where it was set to the bar's length."""
+    return longer(recording, 10.0 * percent * (recording.length_mm - circle.bar_mm))
+
+
+def coming_twice(recording: Recording, _circle: Circle, times: int = 2) -> Recording:
+    """Of so many readings in a row all are the first one."""
+    return replace(recording, length_mm=recording.length_mm[np.arange(len(recording)) // times * times])
+
+
+def overridden(recording: Recording, circle: Circle, percent: float) -> Recording:
+    """By so much too slow on the first half of the way from feed-in to feed-out and as much too quick on the second."""
+    begun_s, ended_s = edges_of(recording, circle)
+    half_s, share = 0.5 * (ended_s - begun_s), 0.01 * percent
+    late_s = recording.t_s - begun_s
+    turning_s = half_s / (1.0 - share)
+    path_s = np.where(late_s < turning_s, late_s * (1.0 - share), half_s + (late_s - turning_s) * (1.0 + share))
+    path_s = np.where(late_s < 0.0, late_s, np.minimum(path_s, late_s))
+    at = np.searchsorted(recording.t_s, begun_s + path_s - 0.5 * float(np.median(np.diff(recording.t_s))))
+    return replace(recording, length_mm=recording.length_mm[np.minimum(at, len(recording) - 1)])
+
+
 def larger(recording: Recording, _circle: Circle, um: float) -> Recording:
     return longer(recording, np.full(len(recording), um))
 

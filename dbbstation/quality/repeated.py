@@ -1,0 +1,55 @@
+"""Readings that come more than once: a gauge that is asked more often than it has new ones, or rows that are written twice.
+
+Such readings change no figure. Each says as much as one reading, and its time is wrong by up to the time it was kept for: U of what
+many readings determine comes out too small.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import bdtrik
+
+from dbbstation.quality.finding import Finding, Name, found, undecided
+from dbbstation.quality.held import SHORTEST_S, chance_equal
+from dbbstation.quality.limits import SHARE
+
+if TYPE_CHECKING:
+    from dbbstation.trace.circle import RawCircle
+
+HARMLESS = 0.19
+"""Share of readings that may be repeated without harm: of n readings 0.81 n are new, and U of slow figures is too small by a tenth, as
+1 / sqrt(0.81); U is stated to two digits."""
+
+
+def repeated(raw: RawCircle) -> Finding:
+    """Return how many readings of the turn are the same as the one before, of those that do not stand still for long."""
+    differs = np.diff(raw.length_mm)
+    ends = np.flatnonzero(differs != 0.0)
+    if not len(ends):
+        return undecided(
+            Name.REPEATED, "all readings of the turn are the same: the step is not finer than the noise", "%"
+        )
+    first, last = np.append(0, ends + 1), np.append(ends, len(raw) - 1)
+    short = raw.t_s[last] - raw.t_s[first] < SHORTEST_S
+    moving = np.repeat(short, last - first + 1)[1:-1]
+    squares = np.diff(raw.length_mm, 2)[moving] ** 2
+    chance = chance_equal(float(squares.sum()), len(squares), float(np.min(np.abs(differs[ends]))))
+    count = int(np.count_nonzero(moving))
+    share = float(np.sum((last - first)[short])) / max(count, 1)
+    if chance >= 1.0:
+        why = f"{100.0 * share:.0f} % of the readings are the same as the one before; their step is not finer than their noise"
+        return undecided(Name.REPEATED, why, "%", 100.0 * share)
+    limit = max(HARMLESS, float(bdtrik(1.0 - SHARE, count, chance)) / count)
+    stated = f"{100.0 * share:.0f} % of the readings are the same as the one before"
+    return found(
+        Name.REPEATED,
+        100.0 * share,
+        100.0 * limit,
+        "%",
+        stated,
+        f"{stated}: the gauge is asked more often than it has new readings, or rows come twice; set the rate to what it renews, and "
+        "repeat the run",
+        f"{100.0 * share:.0f} % of the readings come more than once",
+    )

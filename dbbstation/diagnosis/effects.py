@@ -96,7 +96,7 @@ class CauseEffect:
     circles: tuple[CuredCircle, ...]
 
 
-COMPENSATION = "compensate programs with the model (`dbbstation program`, `dbbstation compensate`), or enter the geometry into the control"
+COMPENSATION = "Compensate programs with the model (`dbbstation program`, `dbbstation compensate`), or enter the geometry into the control."
 REMEASURE = (
     "measure the same circles under compensated programs: their centres and G come down to what is left of other causes"
 )

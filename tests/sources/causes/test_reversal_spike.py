@@ -80,11 +80,11 @@ def test_it_follows_a_loop_over_the_way(reference):
         turned |= np.sign(step) != last
         way = np.where(np.sign(step) != last, 0.0, way) + np.abs(step)
         last = np.sign(step)
-        rise = 1 - np.exp(-way / np.maximum(2e-3 * np.abs(heights), 1e-9))
+        rise = 1 - np.exp(-way / np.maximum(1.1e-3 * np.abs(heights), 1e-9))
         loop[k] = np.where(turned, -last * heights * rise * np.exp(-np.sqrt(way / decay)), 0.0)
-    # The fine rows miss the turning point by up to half a step: 30 mm (0.005 deg)^2 = 0.0002 mm of 0.006.
+    # The fine rows miss the turning point by up to half a step, 30 mm (0.005 deg)^2 = 0.0002 mm; a spike grows by as much there.
     assert np.abs(loop).max() > 1.5
-    assert np.allclose(spike_um(reference, coarse, heights, decay), loop[::50], rtol=0, atol=0.06)
+    assert np.allclose(spike_um(reference, coarse, heights, decay), loop[::50], rtol=0, atol=0.2)
 
 
 def test_it_fades_exponentially_in_time_behind_a_turning_point(reference):
@@ -122,8 +122,8 @@ def test_travel_and_error_together_always_grow(reference, height_um, decay_mm):
     since, spikes = since_turning(length), 1e-3 * spike_um(reference, motion, height_um, decay_mm)
     same = (np.sign(since[1:]) == np.sign(since[:-1])) & (since[1:] != 0)
     ratio = np.diff(spikes, axis=0)[same] / np.diff(length, axis=0)[same]
-    assert ratio.min() > -0.5
-    assert ratio.max() < 0.5
+    assert ratio.min() > -1.0
+    assert np.abs(ratio).max() == pytest.approx(1 / 1.1, rel=0.05)  # a strut that sticks hardly moves
 
 
 def test_way_since_the_turning_point(rng):
@@ -190,9 +190,9 @@ def test_the_way_does_not_jump_where_two_rows_are_equally_far_out():
 
 def test_both_ends_of_the_travel_have_opposite_spikes_and_each_strut_its_own(reference):
     motion = run(PLACE, TILT, step_deg=0.25)
-    # Greatest value of (1 - exp(-d / 2a)) exp(-sqrt(d / l)), of many.
+    # Greatest value of (1 - exp(-d / 1.1 a)) exp(-sqrt(d / l)), of many.
     way = np.geomspace(1e-4, 1, 10000)
-    greatest = 3.0 * ((1 - np.exp(-way / 0.006)) * np.exp(-np.sqrt(way / 0.2))).max()
+    greatest = 3.0 * ((1 - np.exp(-way / 0.0033)) * np.exp(-np.sqrt(way / 0.2))).max()
     for i in range(6):
         spikes = spike_um(reference, motion, 3.0 * np.eye(6)[i])
         assert not np.delete(spikes, i, axis=1).any()

@@ -83,7 +83,7 @@ def log_said(text: str) -> None:
 
 def _text(cell: object) -> str:
     if isinstance(cell, float):
-        return f"{cell:.1f}"
+        return f"{cell:z.1f}"
     text = on_one_line(str(cell))
     return text if len(text) <= _LONGEST_CELL else f"{text[:_LONGEST_CELL]}…"
 

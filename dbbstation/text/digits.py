@@ -38,6 +38,6 @@ def with_uncertainty(value: float, expanded: float | None, plain: int = 1) -> tu
         plain: decimals of a value that has no uncertainty.
     """
     if expanded is None:
-        return f"{value:.{plain}f}", "-"
+        return f"{value:z.{plain}f}", "-"
     decimals = decimals_of(expanded)
-    return f"{value:.{decimals}f}", f"{expanded:.{decimals}f}"
+    return f"{value:z.{decimals}f}", f"{expanded:.{decimals}f}"

@@ -59,6 +59,7 @@ HELP = {
         ),
         {
             **_RUN_KEYS,
+            "e": "Results of the session, when the plan is through: calibrate, diagnose, programs, report.",
             "g": (
                 "As measured; complete circles about their own centre on a scale of their own; the form counter-clockwise less that clockwise."
             ),

@@ -9,7 +9,7 @@ from textual.containers import Horizontal, Vertical
 from textual.widgets import Footer
 
 from dbbstation.service.live_trace import View
-from dbbstation.station.states import VERDICT
+from dbbstation.station.states import VERDICT, State
 from dbbstation.tui.board_screen import RunScreen
 from dbbstation.tui.figures_panel import FiguresPanel
 from dbbstation.tui.findings_panel import FindingsPanel
@@ -45,7 +45,11 @@ class MeasureScreen(RunScreen):
 
     help_name = "measure"
 
-    BINDINGS: ClassVar[list[BindingType]] = [("g", "view", "View")]
+    BINDINGS: ClassVar[list[BindingType]] = [
+        # The next step when the plan is through; before, the application has the key and the footer no room.
+        ("e", "to_results", "Results"),
+        ("g", "view", "View"),
+    ]
 
     def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(desk, shown, clock=clock)
@@ -91,7 +95,13 @@ class MeasureScreen(RunScreen):
         """Only keys that mean something now stand in the footer and do something."""
         if action == "view":
             return len(self.desk.board.views) > 1
+        if action == "to_results":
+            return self.desk.board.state is State.FINISHED and bool(self.app.check_action("results", ()))
         return super().check_action(action, parameters)
+
+    async def action_to_results(self) -> None:
+        """Show what can be done with what is measured."""
+        await self.run_action("app.results")
 
     def action_view(self) -> None:
         """Show the next of the views that there are."""

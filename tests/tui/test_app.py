@@ -453,6 +453,24 @@ def test_behind_the_last_circle_it_is_written_into_the_session(tmp_path: Path) -
     assert dict(conditions(session, [], ""))["temperature of the shop"] == "20.4 °C before, 20.9 °C after"
 
 
+@pytest.mark.parametrize(("happening", "shown"), [(complete, False), (finished, True)])
+def test_the_footer_names_results_when_the_plan_is_through(
+    tmp_path: Path, happening: Callable[[], Happening], *, shown: bool
+) -> None:
+    folder = tmp_path / "session"
+    shutil.copytree(shipped_folder("fixtures") / "sessions" / "sealed", folder)
+    happens = happening()
+    happens.events[0] = replace(happens.events[0], session=str(folder))
+    found: list[bool] = []
+
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.pause()
+        found.append(any(key == "e" and one.binding.show for key, one in app.screen.active_bindings.items()))
+
+    played(happens, play)
+    assert found == [shown]
+
+
 def test_a_session_that_another_process_writes_into_says_so_and_can_be_left(tmp_path: Path) -> None:
     folder = tmp_path / "session"
     shutil.copytree(shipped_folder("fixtures") / "sessions" / "sealed", folder)

@@ -177,11 +177,12 @@ def compensate_toolpath(
         np.concatenate(each) for each in zip(*((p.commanded, p.shift_mm, p.off_mm) for p in parts), strict=True)
     )
     corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
-    done = _assembled(toolpath, pieces, commanded, runs, model.machine, corner_mm)
-    turned = toolpath.turn_deg[pieces.row[_written(toolpath, pieces)]] > 0.0
+    written = _written(toolpath, pieces)
+    done = _assembled(toolpath, pieces, written, commanded, runs, model.machine, corner_mm)
+    turned = toolpath.turn_deg[pieces.row[written]] > 0.0
     fastest = model.machine.feed_limit_mm_min
     done = replace(done, corners_mm=rapids.corners_mm(done, turned, planner, fastest))
-    slow = _slowest(toolpath, done, _Of(runs, runs[pieces.row[_written(toolpath, pieces)]]), planner, short)
+    slow = _slowest(toolpath, done, _Of(runs, runs[pieces.row[written]]), planner, short)
     if slow is not None and prefer is Prefer.ACCURACY:
         done = _slowed(done, planner)
     worst = int(np.argmax(off_mm)) if len(off_mm) else 0
@@ -341,6 +342,7 @@ def _slowed(done: Toolpath, planner: Planner) -> Toolpath:
 def _assembled(
     toolpath: Toolpath,
     pieces: Pieces,
+    written: NDArray[np.bool_],
     commanded: NDArray[np.float64],
     runs: NDArray[np.int64],
     machine: Machine,
@@ -352,7 +354,7 @@ def _assembled(
     no more at full feed, and no less.
     """
     row = pieces.row
-    written, of = _written(toolpath, pieces), runs[row]
+    of = runs[row]
     begin_mm, begin_s = _until(toolpath, pieces.begin)
     end_mm, end_s = _until(toolpath, pieces.end)
     bare = toolpath.divided(row[written], rounded(commanded[written]))

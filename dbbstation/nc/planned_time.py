@@ -221,7 +221,7 @@ def seconds_of(
     begins[1::2], begins[2::2] = np.where(one, feed[:-1], arcs.enters), arcs.leaves
     ends[:-1] = begins[1:]
     _in_reach(begins, ends, accelerations, lengths)
-    along_s, _ = _takes(arc_mm, begins[1::2], ends[1::2], np.full_like(arc_mm, a / 2.0), arcs.mm_s)
+    along_s, _ = _takes(arc_mm, begins[1::2], ends[1::2], accelerations[1::2], arcs.mm_s)
     begins, ends = begins[0::2], ends[0::2]
     # Two that overlap: the second one speeds up while the first one slows down.
     reach = np.minimum(feed, np.where(halved, alone_mm_s, np.sqrt(a * length)))

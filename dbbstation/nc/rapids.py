@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.nc.planned_time import Segments
-    from dbbstation.nc.planner import Planner
+    from dbbstation.nc.planner import LookAhead, Planner
     from dbbstation.nc.toolpath import Toolpath
 
 WORTH_A_STOP = (1.0 - np.sqrt(0.5)) ** 2
@@ -54,12 +54,22 @@ def seconds(toolpath: Toolpath, planner: Planner, fastest_mm_min: float) -> floa
         planner: the control on its machine.
         fastest_mm_min: speed of a rapid [mm/min].
     """
-    rows = np.flatnonzero((toolpath.kind == RowKind.RAPID) & (toolpath.tip_mm > 0.0))
+    rows = _rows(toolpath)
     if planner.look_ahead is None or len(rows) == 0:
         return 0.0
     segments = _segments(toolpath, rows, planner, fastest_mm_min)
+    return float(_each_s(segments, planner, planner.look_ahead).sum())
+
+
+def _rows(toolpath: Toolpath) -> NDArray[np.int64]:
+    """Rapids that move the tool tip."""
+    return np.flatnonzero((toolpath.kind == RowKind.RAPID) & (toolpath.tip_mm > 0.0))
+
+
+def _each_s(segments: Segments, planner: Planner, look_ahead: LookAhead) -> NDArray[np.float64]:
+    """Time of each row of the segments [s]."""
     alone = planner.reached_mm_s(segments.length_mm)
-    return float(seconds_of(segments, planner.acceleration_mm_s2, planner.look_ahead.cycle_s, alone).sum())
+    return seconds_of(segments, planner.acceleration_mm_s2, look_ahead.cycle_s, alone)
 
 
 def _segments(toolpath: Toolpath, rows: NDArray[np.int64], planner: Planner, fastest_mm_min: float) -> Segments:
@@ -82,22 +92,19 @@ def corners_mm(
         planner: the control on its machine.
         fastest_mm_min: speed of a rapid [mm/min].
     """
-    rows = np.flatnonzero((done.kind == RowKind.RAPID) & (done.tip_mm > 0.0))
+    rows = _rows(done)
     if planner.look_ahead is None or len(rows) < 2:  # noqa: PLR2004 - a pair
         return done.corners_mm
-    a = planner.acceleration_mm_s2
     segments = _segments(done, rows, planner, fastest_mm_min)
-    alone = planner.reached_mm_s(segments.length_mm)
     run = np.concatenate([[0], np.cumsum(~segments.goes_on)])
     # None stop, all do, or those whose corner is too tight for an overlap to be worth half the acceleration.
     shorter_mm = np.minimum(segments.length_mm[1:], segments.length_mm[:-1])
     tight = segments.allowed_mm < WORTH_A_STOP * shorter_mm * segments.half_sine
     ways = [segments.goes_on & stop for stop in (np.zeros_like(tight), np.ones_like(tight), tight)]
     each_s = (
-        seconds_of(replace(segments, goes_on=segments.goes_on & ~stop), a, planner.look_ahead.cycle_s, alone)
-        for stop in ways
+        _each_s(replace(segments, goes_on=segments.goes_on & ~stop), planner, planner.look_ahead) for stop in ways
     )
-    best = np.argmin([np.bincount(run, weights=seconds) for seconds in each_s], axis=0)
+    best = np.argmin([np.bincount(run, weights=each) for each in each_s], axis=0)
     told = np.bincount(run, weights=turned[rows] | np.isnan(done.corners_mm[rows])) == 0.0
     stops = np.choose(best[run[:-1]], ways) & told[run[:-1]]
     corners = done.corners_mm.copy()

@@ -166,9 +166,9 @@ def _placed(
     to_place = np.zeros((3, COEFFICIENTS))
     to_place[:2, [FIRST_COSINE, FIRST_SINE]] = turned
     to_place[2, 0] = 1.0
-    to_place *= 1e-3 * along_travel(circle)
-    off_mm = to_place @ more_um
     signs = along_travel(circle)
+    to_place *= 1e-3 * signs
+    off_mm = to_place @ more_um
     return replace(
         own,
         form_um=own.form_um + signs * more_um,

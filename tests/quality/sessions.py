@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -54,6 +54,21 @@ class Sound:
         """Judge one run with another recording beside the others as they are."""
         one = seen(replace(self.runs[run].run, recording=recording))
         return SessionRuns([*self.runs[:run], one, *self.runs[run + 1 :]]).judge(one)
+
+
+def run(whole: Sound, name: str) -> Seen:
+    """The run of a session that has this label, as `a ccw 1`."""
+    return next(one for one in whole.runs if one.run.label == name)
+
+
+def spoilt(one: Seen, spoiler: Callable[..., Recording], *sizes: object) -> Seen:
+    """A run with its recording spoilt."""
+    return seen(replace(one.run, recording=spoiler(one.run.recording, one.run.circle, *sizes)))
+
+
+def judged(before: Sequence[Seen], one: Seen) -> Judgement:
+    """What is found of a run behind others."""
+    return SessionRuns([*before, one]).judge(one)
 
 
 def sound(

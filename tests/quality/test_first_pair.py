@@ -9,10 +9,9 @@ import pytest
 
 from dbbstation.plan.circle import Direction
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, stricter, undecided
-from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import seen
 from dbbstation.sources.registry import known_sources
-from tests.quality.sessions import calibrated, drifting_session, finding_of, sound
+from tests.quality.sessions import calibrated, drifting_session, finding_of, judged, run, sound, spoilt
 from tests.quality.spoilers import begun_elsewhere, drifting, elsewhere, larger, mirrored
 
 
@@ -20,18 +19,6 @@ from tests.quality.spoilers import begun_elsewhere, drifting, elsewhere, larger,
 def whole(tmp_path_factory):
     """Four tests of a machine without a model; the first one is repeated at the end."""
     return sound(tmp_path_factory.mktemp("first") / "session", 5, "abdh")
-
-
-def run(whole, name):
-    return next(one for one in whole.runs if one.run.label == name)
-
-
-def spoilt(one, spoiler, *sizes):
-    return seen(replace(one.run, recording=spoiler(one.run.recording, one.run.circle, *sizes)))
-
-
-def judged(before, one):
-    return SessionRuns([*before, one]).judge(one)
 
 
 def numbered(one, repeat):

@@ -10,13 +10,12 @@ import pytest
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
-from dbbstation.quality.knowledge import seen
 from dbbstation.quality.repeated import repeated
 from dbbstation.trace.circle import RawCircle
 from dbbstation.trace.cut import edges_of
 from dbbstation.trace.feeding import feeding_ways
 from dbbstation.trace.recording import Recording
-from tests.quality.sessions import finding_of, sound
+from tests.quality.sessions import finding_of, judged, run, sound, spoilt
 from tests.quality.spoilers import coming_twice, oval, scaled
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0.0, 45, 1.5, 0, Direction.CCW)
@@ -26,18 +25,6 @@ CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0.0, 45, 1.5, 0, Dir
 def whole(tmp_path_factory):
     """Six tests of a machine without a model."""
     return sound(tmp_path_factory.mktemp("gauge") / "session", 5, "abdfhk")
-
-
-def run(whole, name):
-    return next(one for one in whole.runs if one.run.label == name)
-
-
-def spoilt(one, spoiler, *sizes):
-    return seen(replace(one.run, recording=spoiler(one.run.recording, one.run.circle, *sizes)))
-
-
-def judged(before, one):
-    return SessionRuns([*before, one]).judge(one)
 
 
 def trace(dwell_s: float, seed: int, noise_um: float = 0.3, rate_hz: float = 50.0) -> Recording:

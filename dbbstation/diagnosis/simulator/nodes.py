@@ -261,7 +261,8 @@ class Nodes:
 
         A refit may end in a wrong minimum: with more terms, or others in their place, a better place to begin from is found.
         """
-        names, place = frozenset(one.name for one in inside), (node.names, frozenset(one.name for one in inside))
+        names = frozenset(one.name for one in inside)
+        place = node.names, names
         known = self.known.get(names)
         if place in self.begun:
             return known

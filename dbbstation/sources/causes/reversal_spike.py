@@ -51,8 +51,8 @@ class ReversalSpike(ErrorSource):
     the fading, c|a| near l, much of a spike is cut off.
 
     Before the first turning point of a run there is no spike. Where a path is straight from row to row, as a program's is, a
-    strut turns at the outermost row; along a smooth one between the rows (`laws.turning`). What is left of a spike where
-    the strut turns again is wound off over c|a| as well, so that the error goes on from its place; and a strut that has not come back by
+    strut turns at the outermost row; along a smooth one between the rows (`laws.turning`). The rest of a spike where
+    the strut turns again fades over c|a| as well, so that the error goes on from its place; and a strut that has not come back by
     a micrometre when it goes on as before has not turned.
     """
 
@@ -202,7 +202,7 @@ def _smooth(
 def _behind(
     way: float, sign: float, height: float, length: float, left: NDArray[np.float64]
 ) -> tuple[float, float, float]:
-    """The spike and what is left of the one before, shape (3,), wound off over c|a|."""
+    """The spike and the rest of the one before, shape (3,), which fades over c|a|."""
     spike, by_height, by_length = _spike(way, sign, height, length)
     if left[0] == 0.0 or height == 0.0:
         return spike, by_height, by_length

@@ -46,7 +46,7 @@ def oscillation(numbers, fine, step, *, held):
 
 
 def fitted(t, u, y, way):
-    """Root mean square of what is left [V], and the numbers."""
+    """Root mean square of the residual [V], and the numbers."""
     fine, step = quarters(u, way).tolist(), float(t[-1] - t[0]) / (len(t) - 1)
 
     def left(numbers):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.nc.merging import queued
 from dbbstation.nc.planned_time import OF_AN_ARC, STANDS, arc_radius_mm, seconds_of, segments_of
 from dbbstation.nc.splitting import moves_of
 from dbbstation.nc.toolpath import RowKind
@@ -112,8 +113,11 @@ class Planner:
         """Time of each row, shape (n,) [s]: dwells as written, rapids without, moves at feed with their ramps.
 
         `planned_time` says how they are reckoned. Moves in which A, B or C move by themselves, or nearly so, take their time.
-        `in_chords` says that arcs are written as their chords, as in compensated programs.
+        Moves that the control makes one share its time by their length. `in_chords` says that arcs are written as their chords, as in compensated programs.
         """
+        one = queued(toolpath)
+        if one is not None:
+            return np.asarray(one.share * self.seconds(one.path, in_chords=in_chords)[one.of], dtype=np.float64)
         rows = np.flatnonzero(cuts(toolpath))
         seconds = np.where(toolpath.kind == RowKind.RAPID, 0.0, toolpath.duration_s)
         if len(rows) == 0:

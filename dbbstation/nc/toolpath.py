@@ -101,6 +101,8 @@ class Toolpath:
         units_said: whether the program says in which unit its lengths are.
         numbers: line numbers of the first and the last line that have one; a compensated program carries its checksum
             there.
+        merges_mm: distance from one straight line within which the control makes short moves one before it plans them, shape
+            (n,) [mm]; 0 where it makes none.
         arc: of rows that are chords of an arc: X and Y of its centre [mm] and the angle that the chord spans [rad],
             counter-clockwise positive, shape (n, 3); the angle is 0 in straight rows. None: there are no arcs.
     """
@@ -113,6 +115,7 @@ class Toolpath:
     dwell_s: NDArray[np.float64]
     line: NDArray[np.int64]
     corners_mm: NDArray[np.float64]
+    merges_mm: NDArray[np.float64]
     system: NDArray[np.int8]
     frame: NDArray[np.int8]
     text: Mapping[int, str] = field(default_factory=dict)
@@ -135,7 +138,7 @@ class Toolpath:
     def divided(self, row: NDArray[np.int64], poses: NDArray[np.float64]) -> Toolpath:
         """The toolpath with some rows in several pieces.
 
-        A text goes with the last piece of its row, and so does an exact stop.
+        A text goes with the last piece of its row, and so does an exact stop. Pieces are not merged.
 
         Args:
             row: that each piece ends in, rising, shape (k,); rows that a piece goes through to the end of a later one are
@@ -154,6 +157,7 @@ class Toolpath:
             dwell_s=self.dwell_s[row],
             line=self.line[row],
             corners_mm=np.where((corners == 0.0) & ~last, PIECE_CORNER_MM, corners),
+            merges_mm=np.zeros(len(row)),
             system=self.system[row],
             frame=self.frame[row],
             text=MappingProxyType({place[old]: text for old, text in self.text.items()}),
@@ -163,7 +167,10 @@ class Toolpath:
     def part(self, rows: slice) -> Toolpath:
         """Rows that follow each other as a toolpath of their own, without texts."""
         begins = rows.indices(len(self))[0]
-        start = self.start if begins == 0 else self.before[begins]
+        return replace(self.only(rows), start=self.start if begins == 0 else self.before[begins])
+
+    def only(self, rows: slice | NDArray[np.int64]) -> Toolpath:
+        """Some rows as a toolpath, without texts; each move begins where the one before it ends."""
         return replace(
             self,
             kind=self.kind[rows],
@@ -173,10 +180,10 @@ class Toolpath:
             dwell_s=self.dwell_s[rows],
             line=self.line[rows],
             corners_mm=self.corners_mm[rows],
+            merges_mm=self.merges_mm[rows],
             system=self.system[rows],
             frame=self.frame[rows],
             text=MappingProxyType({}),
-            start=start,
             arc=None if self.arc is None else self.arc[rows],
         )
 
@@ -278,6 +285,7 @@ class _Rows(NamedTuple):
     dwell_s: float
     line: int
     corner_mm: float
+    merge_mm: float
     system: int
     frame: NDArray[np.int8]
     arc: tuple[float, float, float]
@@ -292,6 +300,7 @@ class ToolpathBuilder:
 
     Attributes:
         corner_mm: how far the control may round the corners of the moves that follow [mm]; None: not said.
+        merge_mm: distance from one straight line within which the control makes those moves one [mm].
         system: in which the numbers of the moves that follow count, as `Toolpath.system`.
         increments: whether they are increments, which name no place.
         guard: as `Toolpath.guard`.
@@ -302,6 +311,7 @@ class ToolpathBuilder:
     def __init__(self, name: str, start: NDArray[np.float64] | None = None) -> None:
         self.name = name
         self.corner_mm: float | None = None
+        self.merge_mm = 0.0
         self.system = ACTIVE_SYSTEM
         self.increments = False
         self.guard: tuple[str, ...] | None = None
@@ -402,6 +412,7 @@ class ToolpathBuilder:
             dwell_s=each([rows.dwell_s for rows in self._rows], np.float64),
             line=each([rows.line for rows in self._rows], np.int64),
             corners_mm=self._corners_mm(count),
+            merges_mm=each([rows.merge_mm for rows in self._rows], np.float64),
             system=each([rows.system for rows in self._rows], np.int8),
             frame=each([rows.frame for rows in self._rows], np.int8).reshape(-1, 6),
             text=MappingProxyType(dict(self._text)),
@@ -443,7 +454,7 @@ class ToolpathBuilder:
         corner_mm = np.nan if self.corner_mm is None else self.corner_mm
         poses = np.array(poses, dtype=np.float64)
         counted = self.system if system is None else system
-        self._rows.append(_Rows(kind, poses, feed, dwell_s, line, corner_mm, counted, self._frame, arc))
+        self._rows.append(_Rows(kind, poses, feed, dwell_s, line, corner_mm, self.merge_mm, counted, self._frame, arc))
         self._count += len(poses)
         self._pose = poses[-1]
 

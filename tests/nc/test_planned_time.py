@@ -96,6 +96,13 @@ def test_a_corner_is_an_arc_within_its_bound(linuxcnc):
     assert took.sum() == pytest.approx(2 * one + arc)
 
 
+def test_a_move_takes_one_and_a_half_servo_cycles_at_least(linuxcnc):
+    """0.06 mm at F6000 would be 0.6 cycles of 1 ms."""
+    lines = "\n".join(f"G1 X{0.06 * (1 + k):.2f}" for k in range(1000))
+    took = seconds(linuxcnc, f"G64 P0.0001 Q0\nG0 X0 Y0 Z-1000 A0 B0 C0\nF6000\n{lines}")
+    np.testing.assert_allclose(took[400:600], 0.0015)
+
+
 def test_an_arc_is_as_fast_as_its_radius_allows(linuxcnc):
     """R 3 mm at F6000: v² = 0.866·a·R, with a tangential acceleration of half; it was reckoned as 137 chords with a ramp in each."""
     v = (OF_AN_ARC * A * 3.0) ** 0.5
@@ -124,7 +131,7 @@ def test_a_short_move_is_one_with_the_arc_in_its_corner(linuxcnc):
     length, angle = 0.1, np.radians(3.0)
     radius = length / 2.0 / np.tan(angle / 2.0)
     on = f"X{length + 20 * np.cos(angle):.9f} Y{20 * np.sin(angle):.9f}"
-    took = seconds(linuxcnc, f"G64 P0.01\n{START}\nG1 X{length}\nG1 {on}\nG0 Z-900")
+    took = seconds(linuxcnc, f"G64 P0.01 Q0\n{START}\nG1 X{length}\nG1 {on}\nG0 Z-900")
     way = length / 2.0 + radius * angle
     v = (A * way) ** 0.5  # half of the acceleration
     on_mm = 20.0 - length / 2.0
@@ -137,7 +144,7 @@ def test_a_move_that_ends_within_ten_milliseconds_changes_speed_evenly(linuxcnc,
     """From 10 to 50 mm/s at 5 m/s²: 8 ms with all of the acceleration. 2L/(v1 + v2) is 9.3 and 10.7 ms; LinuxCNC took 9.3 ms for the one and 8 for the other."""
     planner = Planner(5000.0, LookAhead(0.5))
     lines = f"G1 X5 F600\nG1 X{5 + length} F3000\nG1 X20"
-    path = linuxcnc.read(f"G21 G90 G94\nG64 P0.01\nG0 X0 Y0 Z-1000 A0 B0 C0\n{lines}\nM2\n", "even.ngc")
+    path = linuxcnc.read(f"G21 G90 G94\nG64 P0.01 Q0\nG0 X0 Y0 Z-1000 A0 B0 C0\n{lines}\nM2\n", "even.ngc")
     took = planner.seconds(path)[path.kind == RowKind.FEED][1]
     ramp_s = 40.0 / 5000.0
     assert took == pytest.approx(2 * length / 60.0 if evenly else ramp_s + (length - 30.0 * ramp_s) / 50.0, rel=1e-3)

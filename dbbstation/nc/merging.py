@@ -1,0 +1,133 @@
+"""Short moves that a control makes one before it plans them, as LinuxCNC's naive CAM detector does under `G64 P Q`.
+
+Lines that follow each other become one straight move while each of their points lies within Q of it; without Q, P counts. An
+arc in X and Y that leaves its chord by less than Q becomes two lines first, to its middle and to its end. A move in which A, B or C
+turn stays by itself [LinuxCNC 2.9, `linkable`, `see_segment` and `ARC_FEED` in `src/emc/task/emccanon.cc`].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.compiled import compiled
+from dbbstation.nc.splitting import moves_of
+from dbbstation.nc.toolpath import RowKind
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.toolpath import Toolpath
+
+MOST_POINTS = 101
+"""Points of lines that become one at most: a line is taken in while there are no more than a hundred (`linkable`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Queued:
+    """A toolpath as a control queues it, k rows.
+
+    Attributes:
+        path: with one row for moves that are one, and without comments.
+        of: row of it that each of the n rows of the program is part of, shape (n,).
+        share: of the time of that row, shape (n,).
+    """
+
+    path: Toolpath
+    of: NDArray[np.int64]
+    share: NDArray[np.float64]
+
+
+def queued(toolpath: Toolpath) -> Queued | None:
+    """Return the moves as a control queues them; None where no move is merged with another."""
+    within_mm = toolpath.merges_mm
+    if not (within_mm > 0.0).any():
+        return None
+    feed, turns = toolpath.kind == RowKind.FEED, toolpath.turn_deg > 0.0
+    arc = np.zeros((len(toolpath), 3)) if toolpath.arc is None else toolpath.arc
+    straightened, points = _short_arcs(toolpath, arc, within_mm)
+    straight = feed & ~turns & ((arc[:, 2] == 0.0) | straightened)
+    # A work system that is in force already changes nothing.
+    same = toolpath.system[1:] == toolpath.system[:-1]
+    says = (toolpath.kind == RowKind.COMMENT) | ((toolpath.kind == RowKind.SYSTEM) & np.append(False, same))
+    ends = ~says & ~straight
+    at = np.flatnonzero(straight & (~straightened | points))
+    if len(at) == 0:
+        return None
+    # What stands between two moves sends the first one on its way.
+    between = np.cumsum(~says & ~straight)[at]
+    new = np.append(True, (np.diff(between) > 0) | (np.diff(toolpath.feed_mm_min[at]) != 0.0))
+    new[1:] |= within_mm[at[1:]] != within_mm[at[:-1]]
+    ends[at[_chain_ends(toolpath.poses[at, :3], toolpath.before[_begins(at, straight), :3], within_mm[at], new)]] = True
+    if ends[straight].all():
+        return None
+    kept = np.flatnonzero(ends)
+    path = replace(toolpath, arc=np.where(straightened[:, None], 0.0, arc), merges_mm=np.zeros(len(toolpath))).only(
+        kept
+    )
+    of = np.searchsorted(kept, np.arange(len(toolpath)))
+    weight = np.where(ends | straight, toolpath.tip_mm, 0.0)
+    whole = np.bincount(of, weights=weight, minlength=len(kept) + 1)[of]
+    share = np.divide(weight, whole, out=ends.astype(np.float64), where=whole > 0.0)
+    return Queued(path, np.minimum(of, len(kept) - 1), share)
+
+
+def _begins(at: NDArray[np.int64], straight: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Row in which the line to each of these points begins, shape (k,): behind the point before, for the second half of an arc."""
+    begins = np.append(0, at[:-1] + 1)
+    # The first row after that which is a line: what lies between may be anything.
+    lines = np.flatnonzero(straight)
+    return np.asarray(lines[np.searchsorted(lines, begins)], dtype=np.int64)
+
+
+def _short_arcs(
+    toolpath: Toolpath, arc: NDArray[np.float64], within_mm: NDArray[np.float64]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Chords of arcs that become two lines, and which of them end where one of these does, shapes (n,)."""
+    number = moves_of(toolpath)
+    angle = np.bincount(number, weights=np.abs(arc[:, 2]))
+    first = np.searchsorted(number, np.arange(len(angle)))
+    chords = np.bincount(number)
+    radius_mm = np.linalg.norm(toolpath.before[first, :2] - arc[first, :2], axis=1)
+    off_mm = radius_mm * (1.0 - np.cos(np.minimum(angle, 2.0 * np.pi) / 2.0))
+    turns = np.bincount(number, weights=toolpath.turn_deg) > 0.0
+    short = (angle > 0.0) & ~turns & (off_mm < within_mm[first])
+    place = np.arange(len(toolpath)) - first[number]
+    points = (place == chords[number] - 1) | (place == chords[number] // 2 - 1)
+    return short[number], points & short[number]
+
+
+@compiled
+def _chain_ends(
+    points: NDArray[np.float64], begins: NDArray[np.float64], within_mm: NDArray[np.float64], new: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Whether the line to each point is the last of those that become one, shape (k,).
+
+    Args:
+        points: X, Y, Z at the end of each line, shape (k, 3) [mm].
+        begins: at its begin.
+        within_mm: distance from the one line that its points have at most, shape (k,).
+        new: whether something stands before the line, shape (k,).
+    """
+    count = len(points)
+    ends = np.zeros(count, dtype=np.bool_)
+    ends[count - 1] = True
+    first = 0
+    for k in range(1, count):
+        begin = begins[first]
+        along = points[k] - begin
+        square = np.sum(along * along)
+        links = not new[k] and within_mm[k] > 0.0 and square > 0.0 and k - first < MOST_POINTS
+        if links:
+            for inner in range(first, k):
+                to = points[inner] - begin
+                off = to - min(max(np.sum(along * to) / square, 0.0), 1.0) * along
+                if np.sum(off * off) > within_mm[k] * within_mm[k]:
+                    links = False
+                    break
+        if not links:
+            ends[k - 1] = True
+            first = k
+    return ends

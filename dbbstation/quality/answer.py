@@ -67,6 +67,7 @@ def cause_of(finding: Finding) -> str:
 
 EXPLAINS = (
     (Name.HELD, Name.LOST),
+    (Name.COPIED,),
     (Name.REPEATED,),
     (Name.FEED,),
     (Name.CIRCLE,),
@@ -113,6 +114,7 @@ DO = {
     Name.BORE: "check bore, holder, how the plate sits and the zero point, press the holder home, run the circle again",
     Name.FORM: "check tilt, plane (G17) and radius in the program and how the plate sits, run the circle again",
     Name.REPEATED: "ask the gauge less often: the rate in the instrument's file, or what the display renews; run the circle again",
+    Name.COPIED: "this is no circle of its own: look at what was imported or played back, and measure it",
     Name.SCALE: "check the gauge at a gauge block and its counts per millimetre, then the feed-in of plan and program; run the circle again",
     Name.CLOSURE: "tighten holder and ball, let bar and machine warm through, run the circle again",
     Name.DRIFT: "tighten holder and ball, let bar and machine warm through, run the circle again",

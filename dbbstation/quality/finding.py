@@ -19,6 +19,7 @@ class Name(StrEnum):
     SPIKE = "spike"
     HELD = "held length"
     REPEATED = "repeated readings"
+    COPIED = "readings of another run"
     SCALE = "gauge scale"
     DIRECTION = "direction"
     TEST = "test"

@@ -46,9 +46,30 @@ def chance_equal(squares_mm2: float, count: int, step_mm: float) -> float:
     if not count or not 0.0 < step_mm < inf:
         return 1.0
     known = max(1.0 - quantile(inf) / sqrt(2.0 * INDEPENDENT_SHARE * count), 0.0)
-    variance = known**2 * squares_mm2 / count / SECOND_DIFFERENCE - ROUNDED * step_mm**2
-    finer = sqrt(max(variance, 0.0) * 2.0 * pi) / step_mm
+    return chance_of(known**2 * squares_mm2 / count / SECOND_DIFFERENCE, step_mm)
+
+
+def chance_of(variance_mm2: float, step_mm: float) -> float:
+    """Return the same from a variance of the readings, rounding included [mm²]."""
+    finer = sqrt(max(variance_mm2 - ROUNDED * step_mm**2, 0.0) * 2.0 * pi) / step_mm
     return 1.0 / finer if finer > 1.0 else 1.0
+
+
+def moving_noise(raw: RawCircle) -> tuple[float, int, float]:
+    """Return what `chance_equal` is worked out of, from the readings of a turn that do not stand still.
+
+    Args:
+        raw: a turn of which not all readings are the same.
+
+    Returns:
+        Sum of the squares of second differences [mm²], how many they are, smallest difference of two readings [mm].
+    """
+    differs = np.abs(np.diff(raw.length_mm))
+    ends = np.flatnonzero(differs)
+    first, last = np.append(0, ends + 1), np.append(ends, len(raw) - 1)
+    moving = np.repeat(raw.t_s[last] - raw.t_s[first] < SHORTEST_S, last - first + 1)[1:-1]
+    squares = np.diff(raw.length_mm, 2)[moving] ** 2
+    return float(squares.sum()), len(squares), float(np.min(differs[ends]))
 
 
 def equal_limit(squares_mm2: float, count: int, step_mm: float, readings: float) -> float:
@@ -135,10 +156,7 @@ def held(raw: RawCircle) -> Finding:
     first, last = np.append(0, ends + 1), np.append(ends, len(raw) - 1)
     durations = raw.t_s[last] - raw.t_s[first]
     longest = int(np.argmax(durations))
-    moving = np.repeat(durations < SHORTEST_S, last - first + 1)[1:-1]
-    squares = np.diff(raw.length_mm, 2)[moving] ** 2
-    step_mm = float(np.min(np.abs(np.diff(raw.length_mm))[ends]))
-    most = equal_limit(float(squares.sum()), len(squares), step_mm, len(raw))
+    most = equal_limit(*moving_noise(raw), len(raw))
     value, place = float(durations[longest]), f"{raw.theta_deg[first[longest]]:.0f} degrees"
     if most == inf:
         return undecided(

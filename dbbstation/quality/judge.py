@@ -10,6 +10,7 @@ import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.quality.between import direction, other_direction, repeat
+from dbbstation.quality.copied import copied
 from dbbstation.quality.finding import Finding, Name, stricter
 from dbbstation.quality.knowledge import Others, Run, Seen, across, apart_um, seen
 from dbbstation.quality.local import local_difference, locally_apart_um
@@ -89,8 +90,10 @@ class SessionRuns:
 
         Where there is a model, a run must agree with it, and with what other runs show of a machine whose errors have usual sizes.
         """
-        findings = list(by_itself(one, self._others(one)))
+        others = self._others(one)
+        findings = list(by_itself(one, others))
         if one.analysis is not None:
+            findings.append(copied(one, others.every))
             known = self._beside(one, one.analysis)
             if one.run.usual is not None:
                 without = self._without_model._beside(one.without_model, one.analysis)  # noqa: SLF001 - the same class

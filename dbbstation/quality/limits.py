@@ -16,8 +16,9 @@ FALSE_ALARMS_PER_RUN = 1e-3
 """Probability that a sound run has any finding: one in a thousand runs, which is one in thirty-three sessions of thirty. A
 false alarm costs a repeated circle, two minutes; one that is missed may cost the calibration."""
 
-TESTED = len(Name) - 2
-"""Findings that share it: all but a recording without a circle and lost samples, which are counted and not estimated."""
+TESTED = len(Name) - 3
+"""Findings that share it: all but a recording without a circle and lost samples, which are counted and not estimated, and readings of
+another run, which have a probability of their own."""
 
 SHARE = FALSE_ALARMS_PER_RUN / TESTED
 """Probability of each [Bonferroni]: they may depend on one another."""

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import bdtrik
 
 from dbbstation.quality.finding import Finding, Name, found, undecided
-from dbbstation.quality.held import SHORTEST_S, chance_equal
+from dbbstation.quality.held import SHORTEST_S, chance_equal, moving_noise
 from dbbstation.quality.limits import SHARE
 
 if TYPE_CHECKING:
@@ -25,18 +25,15 @@ HARMLESS = 0.19
 
 def repeated(raw: RawCircle) -> Finding:
     """Return how many readings of the turn are the same as the one before, of those that do not stand still for long."""
-    differs = np.diff(raw.length_mm)
-    ends = np.flatnonzero(differs != 0.0)
+    ends = np.flatnonzero(np.diff(raw.length_mm) != 0.0)
     if not len(ends):
         return undecided(
             Name.REPEATED, "all readings of the turn are the same: the step is not finer than the noise", "%"
         )
     first, last = np.append(0, ends + 1), np.append(ends, len(raw) - 1)
     short = raw.t_s[last] - raw.t_s[first] < SHORTEST_S
-    moving = np.repeat(short, last - first + 1)[1:-1]
-    squares = np.diff(raw.length_mm, 2)[moving] ** 2
-    chance = chance_equal(float(squares.sum()), len(squares), float(np.min(np.abs(differs[ends]))))
-    count = int(np.count_nonzero(moving))
+    squares_mm2, count, step_mm = moving_noise(raw)
+    chance = chance_equal(squares_mm2, count, step_mm)
     share = float(np.sum((last - first)[short])) / max(count, 1)
     if chance >= 1.0:
         why = f"{100.0 * share:.0f} % of the readings are the same as the one before; their step is not finer than their noise"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InstrumentError
-from dbbstation.files.formats.bar import BarFile
+from dbbstation.files.formats.bar import AFTER_MISREAD, BarFile
 from dbbstation.plan.bar import USUAL_READINGS
 from dbbstation.trace.reachable import Reachable
 from dbbstation.trace.steady import steady
@@ -70,6 +70,7 @@ def bar_file(
 
     Raises:
         pydantic.ValidationError: a value that no such file may have.
+        InstrumentError: the readings are none of this calibrator.
     """
     readings = {
         "instrument": instrument,
@@ -80,7 +81,7 @@ def bar_file(
         "resolution_um": 1e3 * found.resolution_mm,
     }
     calibrated = now.replace(microsecond=0).isoformat().replace("+00:00", "Z")
-    return BarFile.model_validate(
+    file = BarFile.model_validate(
         {
             "format": "dbb-bar/1",
             **of_bar,
@@ -89,3 +90,6 @@ def bar_file(
             "readings": readings,
         }
     )
+    if file.misread:
+        raise InstrumentError(file.misread, where=instrument, remedy=AFTER_MISREAD)
+    return file

@@ -61,7 +61,7 @@ def doubt_of(name: str, text: str, today: date | None = None) -> str:
     years = ((today or datetime.now().astimezone().date()) - date.fromisoformat(text)).days / _DAYS_PER_YEAR
     if years <= USUAL_INTERVAL_YEARS:
         return ""
-    return f"the certificate of {text} is {years:.0f} years old: is that the date on it, and does it still hold?"
+    return f"the certificate of {text} is {int(years)} years old: is that the date on it, and does it still hold?"
 
 
 def _fault_of_day(text: str, today: date) -> str:

@@ -10,6 +10,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
+from dbbstation.tui.cursor import mark_chosen
 from dbbstation.tui.texts import TYPED
 
 if TYPE_CHECKING:
@@ -32,19 +33,24 @@ class ChooseQuestion(ModalScreen[int | None]):
 
     def __init__(self, title: str, labels: Sequence[str], at: int = 0) -> None:
         super().__init__()
-        self._title, self._labels, self._at = title, labels, at
+        self._title, self._rows, self._at = title, [Content(label) for label in labels], at
 
     def compose(self) -> ComposeResult:
         """Ask."""
         with Vertical():
             yield Static(self._title, markup=False)
-            yield OptionList(*(Option(Content(label)) for label in self._labels))
+            yield OptionList(*(Option(row) for row in self._rows))
 
     def on_mount(self) -> None:
         """Offer what was chosen before."""
         options = self.query_one(OptionList)
-        options.highlighted = min(max(self._at, 0), len(self._labels) - 1) if self._labels else None
+        options.highlighted = min(max(self._at, 0), len(self._rows) - 1) if self._rows else None
+        mark_chosen(options, self._rows)
         options.focus()
+
+    def on_option_list_option_highlighted(self) -> None:
+        """Move the mark."""
+        mark_chosen(self.query_one(OptionList), self._rows)
 
     def on_option_list_option_selected(self, chosen: OptionList.OptionSelected) -> None:
         """Close with the place of what was chosen."""

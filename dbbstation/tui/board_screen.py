@@ -87,7 +87,7 @@ class RunScreen(BoardScreen):
     BINDINGS: ClassVar[list[BindingType]] = [
         ("enter", "tell('start')", "Start"),
         ("enter", "next", "Next"),
-        ("m", "tell('touched')", "New mounting"),
+        ("m", "tell('touched')", "Mounting"),
         ("a", "accept", "Accept"),
         ("r", "tell('repeat')", "Repeat"),
         ("x", "tell('reject')", "Reject"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, ClassVar
 
+from textual.binding import Binding
 from textual.content import Content
 from textual.widgets import Footer
 
@@ -85,7 +86,10 @@ class LargeScreen(RunScreen):
 
     help_name = "large"
 
-    BINDINGS: ClassVar[list[BindingType]] = [("escape", "app.large", "Back")]
+    BINDINGS: ClassVar[list[BindingType]] = [
+        # The key that came here goes back as well, and stands in the footer, which has room for one of both at 80 columns.
+        Binding("escape", "app.large", "Back", show=False)
+    ]
 
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""

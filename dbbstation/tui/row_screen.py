@@ -9,6 +9,7 @@ from textual.content import Content
 from textual.widgets import Footer, OptionList, Static
 from textual.widgets.option_list import Option
 
+from dbbstation.tui.cursor import mark_chosen
 from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.help_texts import HELP
 from dbbstation.tui.texts import VIRTUAL_BANNER
@@ -17,10 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from textual.app import ComposeResult
-
-
-CURSOR = "▸ "
-"""Before the chosen row."""
 
 
 class RowScreen(ExplainedScreen):
@@ -87,7 +84,7 @@ class RowScreen(ExplainedScreen):
         options.focus()
 
     def on_option_list_option_highlighted(self) -> None:
-        """Move the mark: a terminal without colours shows which row is chosen by it alone."""
+        """Move the mark."""
         self._mark()
         self.chosen_another()
 
@@ -95,7 +92,4 @@ class RowScreen(ExplainedScreen):
         """Tell of the row that the cursor is on."""
 
     def _mark(self) -> None:
-        options = self.query_one("#rows", OptionList)
-        for place, row in enumerate(self._put[: options.option_count]):
-            mark = CURSOR if place == options.highlighted else " " * len(CURSOR)
-            options.replace_option_prompt_at_index(place, Content(mark) + row)
+        mark_chosen(self.query_one("#rows", OptionList), self._put)

@@ -2,7 +2,7 @@
 
 `python -m tests.quality.sabotage` prints the table of docs/circles.md: how often each finding is made of runs that are spoilt by
 half its limit, by its limit and by twice its limit, and how often of runs that are sound. `--equipment 3` prints the table of what goes
-wrong with balls, programs and gauges, and `--drifting 1000` how often good circles on drifting days have a finding, with `--model` of
+wrong with balls, programs and gauges, `--strange` that of faults of other kinds, and `--drifting 1000` how often good circles on drifting days have a finding, with `--model` of
 machines with a model.
 """
 
@@ -21,6 +21,7 @@ from tests.quality.equipment import Row, equipment, print_equipment
 from tests.quality.sessions import calibrated, drifting_session, sound
 from tests.quality.shares import spoil
 from tests.quality.spoilers import SPOILERS
+from tests.quality.strange import print_strange
 
 
 def false_alarms(folder: Path, seed: int, wanted: int, *, with_model: bool) -> None:
@@ -54,25 +55,32 @@ def main() -> None:
     parser.add_argument("--drifting", type=int, default=0, help="good circles on drifting days, in place of all else")
     parser.add_argument("--model", action="store_true", help="each good session has its own calibration as a model")
     parser.add_argument("--equipment", type=int, default=0, help="sessions whose equipment fails, in place of all else")
+    parser.add_argument("--strange", action="store_true", help="faults of other kinds, in place of all else")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         if given.drifting:
             false_alarms(Path(folder), given.seed, given.drifting, with_model=given.model)
+        if given.strange:
+            print_strange(Path(folder), 1000 + given.seed)
         counted: Row = collections.Counter()
         for seed in range(given.seed, given.seed + given.equipment):
             counted.update(equipment(Path(folder) / str(seed), 1000 + seed))
         if given.equipment:
             print_equipment(counted)
-    if given.drifting or given.equipment:
-        return
+    if not (given.drifting or given.equipment or given.strange):
+        findings(given.seed, given.clean)
+
+
+def findings(first_seed: int, clean: int) -> None:
+    """Findings of sound circles, and of one run that is spoilt by shares of each limit."""
     wrong: collections.Counter[str] = collections.Counter()
     untold: collections.Counter[str] = collections.Counter()
     seen = alarmed = 0
     with tempfile.TemporaryDirectory() as folder:
-        seed = given.seed
-        while seen < given.clean:
+        seed = first_seed
+        while seen < clean:
             whole = sound(Path(folder) / f"clean{seed}", seed)
-            for judgement in whole.judged()[: given.clean - seen]:
+            for judgement in whole.judged()[: clean - seen]:
                 seen += 1
                 alarmed += bool(judgement.wrong)
                 wrong.update(f"{f.name}" for f in judgement.wrong)
@@ -83,7 +91,7 @@ def main() -> None:
         sys.stdout.write(
             f"{seen} sound circles: {alarmed} with a finding; {dict(wrong)}; cannot tell: {dict(untold)}\n"
         )
-        whole = calibrated(Path(folder), 1000 + given.seed)
+        whole = calibrated(Path(folder), 1000 + first_seed)
         repeated = next(k for k, one in enumerate(whole.runs) if one.run.label == "h ccw 2")
         for name in SPOILERS:
             for one in spoil(whole, repeated, name):

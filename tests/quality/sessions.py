@@ -26,7 +26,7 @@ from tests.plant.mechanisms.servo import ServoLag
 from tests.plant.mechanisms.thermal import ThermalFrame, ThermalStruts
 from tests.plant.mechanisms.warming import Warming
 from tests.plant.noise import Noise
-from tests.plant.plan import subset, table_ii_plan
+from tests.plant.plan import Plan, subset, table_ii_plan
 from tests.plant.session import Reprogram, record
 from tests.quality.spoilers import longer
 
@@ -79,10 +79,11 @@ def sound(
     also: Sequence[Mechanism] = (),
     noise: Noise = NOISE,
     reprogram: Reprogram | None = None,
+    planned: Plan | None = None,
 ) -> Sound:
     """Kinematic errors, gravity, backlash and lag of a machine of its own, usual scatter of balls and bar, noise."""
     rng = np.random.default_rng([seed, 35])
-    plan = subset(table_ii_plan(seed), list(tests))
+    plan = planned or subset(table_ii_plan(seed), list(tests))
     plan = replace(plan, repeat_at_end=tuple(name for name in REPEATED if name in tests))
     mechanisms = [
         RandomKinematics(),

@@ -70,18 +70,20 @@ def quiet_deg(one: Run) -> float:
 
 def mirrored(recording: Recording, circle: Circle, share: float) -> Recording:
     """So much of the circle's form turned round: all of it where share is one."""
-    phi = progress(recording, circle)
-    on_arc = (phi > -circle.overshoot_deg) & (phi < 360.0 + circle.overshoot_deg)
-    back = np.interp(np.mod(-phi, 360.0), *_turn(recording, phi))
-    forth = np.interp(np.mod(phi, 360.0), *_turn(recording, phi))
-    return replace(recording, length_mm=recording.length_mm + np.where(on_arc, share * (back - forth), 0.0))
+    round_the_other_way = turned(recording, circle, np.negative).length_mm
+    return replace(recording, length_mm=recording.length_mm + share * (round_the_other_way - recording.length_mm))
 
 
 def begun_elsewhere(recording: Recording, circle: Circle, by_deg: float) -> Recording:
     """The turn begun at an angle that is not the plan's: its form is found turned by as much."""
+    return turned(recording, circle, lambda phi: phi + by_deg)
+
+
+def turned(recording: Recording, circle: Circle, place: Callable[[np.ndarray], np.ndarray]) -> Recording:
+    """The circle's form as it is at other places of it than where the program should be."""
     phi = progress(recording, circle)
     on_arc = (phi > -circle.overshoot_deg) & (phi < 360.0 + circle.overshoot_deg)
-    there = np.interp(np.mod(phi + by_deg, 360.0), *_turn(recording, phi))
+    there = np.interp(np.mod(place(phi), 360.0), *_turn(recording, phi))
     here = np.interp(np.mod(phi, 360.0), *_turn(recording, phi))
     return replace(recording, length_mm=recording.length_mm + np.where(on_arc, there - here, 0.0))
 

@@ -120,3 +120,22 @@ def test_before_a_run_the_reading_says_whether_the_bar_is_seated(length_mm: floa
     board = Happening().board()
     board.take(events.ReadingsSeen((events.Sample(0.0, length_mm),)))
     assert says in ReadingPanel(clock=lambda: 0.0).text(board).plain.splitlines()[0]
+
+
+def test_a_reading_that_is_none_of_the_calibrator_is_not_written(protocol: Protocol, tmp_path: Path) -> None:
+    """Typed before the bar was put on, when nothing could be held against it: a calibrator of 100 mm, a bar of 150 mm."""
+    path = tmp_path / "bar.yaml"
+    rng = np.random.default_rng(9)
+    with (
+        VirtualInstrument(protocol, lambda _t_s: CALIBRATOR_MM + rng.normal(0.0, 2e-4)) as wire,
+        closing(HeldLine(protocol, wire.port)) as line,
+    ):
+        calibration = BarCalibration(line, count=COUNT)
+        try:
+            calibration.begin(replace(STATED, calibrator_mm=100.0003), path)
+            until(lambda: calibration.found is not None or calibration.failure is not None)
+        finally:
+            calibration.close()
+    assert calibration.found is None
+    assert "on a calibrator of 100 mm" in str(calibration.failure)
+    assert not path.exists()

@@ -60,6 +60,12 @@ def rows(app: StationApp) -> list[str]:
     return [str(options.get_option_at_index(place).prompt) for place in range(options.option_count)]
 
 
+def offered(app: StationApp) -> list[str]:
+    """What a question offers."""
+    options = app.screen.query_one(OptionList)
+    return [str(options.get_option_at_index(place).prompt) for place in range(options.option_count)]
+
+
 def below(app: StationApp) -> str:
     """The text below the rows."""
     return " ".join(str(app.screen.query_one("#row-text", Static).visual).split())
@@ -100,12 +106,13 @@ async def choose(pilot: Pilot[None], app: StationApp, part: SetUpPart, wanted: s
         await press(app, "down" if (options.highlighted or 0) < ROWS.index(part) else "up")
     await press(app, "enter")
     await until(pilot, on(app, ChooseQuestion))
-    labels = app.screen._labels
-    place = next(place for place, label in enumerate(labels) if wanted in label)
-    offered = app.screen.query_one(OptionList)
-    await until(pilot, lambda: offered.highlighted is not None)
-    while offered.highlighted != place:
-        await press(app, "down" if (offered.highlighted or 0) < place else "up")
+    options = app.screen.query_one(OptionList)
+    place = next(place for place, label in enumerate(offered(app)) if wanted in label)
+    await until(pilot, lambda: options.highlighted is not None)
+    while options.highlighted != place:
+        await press(app, "down" if (options.highlighted or 0) < place else "up")
+    # Without colours the mark alone says which one is chosen.
+    await until(pilot, lambda: offered(app)[place].startswith("▸ "))
     await press(app, "enter")
     await until(pilot, on(app, NewScreen))
 
@@ -401,7 +408,7 @@ def test_compensated_programs_are_written_and_command_the_session(front: Front) 
         assert "plain circles" in below(app)
         await press(app, "w")
         await until(pilot, on(app, ChooseQuestion))
-        assert [label.split()[0] for label in app.screen._labels] == ["nominal:", "compensated"]
+        assert [label.strip("▸ ").split()[0] for label in offered(app)] == ["nominal:", "compensated"]
         await press(app, "escape")
         await until(pilot, on(app, PrepareScreen))
         await press(app, "w")

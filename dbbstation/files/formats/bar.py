@@ -84,6 +84,13 @@ class BarFile(Schema):
         """Standard uncertainty of what the bar reads less the true distance: calibrator and mean reading [mm]."""
         return 1e-3 * math.hypot(self.calibrator.uncertainty_um, self.readings.uncertainty_um)
 
+    @property
+    def misread(self) -> str:
+        """What is wrong with the reading, as a sentence without a remedy; empty where it can be one of this calibrator."""
+        if 1e3 * abs(self.readings.mean_mm - self.length_mm) <= LARGEST_OFF_UM:
+            return ""
+        return f"the bar read {self.readings.mean_mm:g} mm on a calibrator of {self.length_mm:g} mm"
+
     def to_bar(self, stroke_mm: float | None) -> Bar:
         """Return the bar as a session notes it.
 
@@ -110,11 +117,8 @@ def parse_bar(path: Path, faults: list[Problem]) -> BarFile | None:
     bar = None if document is None else validate(document, BarFile, faults)
     if document is None or bar is None:
         return None
-    off_um = 1e3 * (bar.readings.mean_mm - bar.length_mm)
-    if abs(off_um) > LARGEST_OFF_UM:
-        what = f"the bar read {bar.readings.mean_mm:g} mm on a calibrator of {bar.length_mm:g} mm"
-        remedy = "preset the display to the calibrator's length, or check which calibrator and bar it was"
-        faults.append(document.problem(("readings", "mean_mm"), what, remedy))
+    if bar.misread:
+        faults.append(document.problem(("readings", "mean_mm"), bar.misread, AFTER_MISREAD))
         return None
     return bar
 
@@ -145,3 +149,6 @@ def write_bar(path: Path, bar: BarFile, *, force: bool = False) -> None:
 LARGEST_OFF_UM = 1000.0
 """A display that was preset by hand is off by some micrometres; one that is off by a millimetre was not preset, or the calibrator is
 another one [µm]."""
+
+AFTER_MISREAD = "preset the display to the calibrator's length, or check which calibrator and bar it was"
+"""What to do about such a display."""

@@ -1,0 +1,111 @@
+"""Readings that stand in two runs: a file that came in twice, a player that repeats itself, one direction's file under the name of the other.
+
+Such a run is as sound as the one it comes from. It brings nothing new: a repeat that agrees to the last digit shows no scatter, and two
+directions of one file no reversal. Two runs of one circle have the same form, and noise of their own. Whatever the other run reads, the
+next reading is the same with the probability of `quality.held` at the most; k in a row, somewhere in one run and somewhere in the other,
+less often than that to the power k, times the number of both places.
+"""
+
+from __future__ import annotations
+
+from math import ceil, log
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.quality.finding import Finding, Name, found, undecided
+from dbbstation.quality.held import chance_equal, chance_of, moving_noise
+from dbbstation.quality.limits import quantile
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.circles.analysis import CircleAnalysis
+    from dbbstation.quality.knowledge import Seen
+
+PROBABILITY = 1e-9
+"""Probability that a sound run has any stretch of another by chance: too small to count among what all findings share. A copy has hundreds
+of equal readings where some tens are enough."""
+
+ROUGHLY = 0.1
+"""Quantile of the differences of neighbours that counts as the step in which readings come. Where the step is a fifth of the noise or more it
+is that step, where it is finer it is an eighth of the noise, which makes a row of equal readings longer, never too short; single odd readings
+do not matter."""
+
+BASE = 0x9E3779B97F4A7C15
+"""Odd factor by which a stretch of readings is made one number, modulo 2^64: the golden ratio, whose powers repeat late [Knuth 6.4]."""
+
+
+def copied(one: Seen, others: Sequence[Seen]) -> Finding:
+    """Return how many readings of the turn stand, in the same order, in another run of the session.
+
+    Args:
+        one: the run.
+        others: all other runs.
+    """
+    assert one.analysis is not None  # noqa: S101 - asked before
+    raw = one.analysis.raw
+    chance = _chance(one.analysis)
+    if chance >= 1.0:
+        return undecided(Name.COPIED, "the step of the readings is not finer than their noise", "%")
+    them = [(other, other.analysis.raw.length_mm) for other in others if other.analysis is not None]
+    places = len(raw) * max(sum(len(length) for _, length in them), 1)
+    row = 1 + ceil(log(places / PROBABILITY) / -log(chance))
+    share, label = 0.0, ""
+    for other, length_mm in them:
+        there = _shared(raw.length_mm, length_mm, row) / len(raw)
+        if there > share:
+            share, label = there, other.run.label
+    stated = f"{100.0 * share:.0f} % of the readings are those of run {label}, in their order"
+    return found(
+        Name.COPIED,
+        100.0 * share,
+        100.0 * (row - 1) / len(raw),
+        "%",
+        "no stretch of readings stands in another run",
+        f"{stated}: one file came in twice, or a player repeats itself; measure the circle, and do not use both",
+        f"the readings are those of run {label}",
+    )
+
+
+def _chance(analysis: CircleAnalysis) -> float:
+    """Return how probable it is at the most that a sound reading is any given number; one where no bound is known."""
+    noise = analysis.noise
+    if not noise.known or not np.ptp(analysis.raw.length_mm):
+        return 1.0
+    squares_mm2, count, _ = moving_noise(analysis.raw)
+    differs = np.abs(np.diff(analysis.raw.length_mm))
+    step_mm = float(np.quantile(differs[differs > 0.0], ROUGHLY))
+    # Few samples on a large form have second differences of their form.
+    known = max(1.0 - quantile(np.inf) / float(np.sqrt(2.0 * noise.reading_freedom)), 0.0)
+    by_turn = chance_equal(squares_mm2, count, step_mm)
+    return max(by_turn, chance_of((1e-3 * known * noise.reading_um) ** 2, step_mm))
+
+
+def _shared(own_mm: NDArray[np.float64], other_mm: NDArray[np.float64], row: int) -> int:
+    """Return how many of a run's readings stand in stretches that another run has too.
+
+    Stretches are looked up in blocks of half the length that chance allows: a common stretch of that length holds a whole one.
+
+    Args:
+        own_mm: readings of the run, shape (n,) [mm].
+        other_mm: of the other, shape (m,) [mm].
+        row: equal readings in a row that chance does not make.
+    """
+    block = (row + 1) // 2
+    if min(len(own_mm), len(other_mm)) < row:
+        return 0
+    hashed = _stretches(other_mm, block)
+    at = np.isin(_stretches(own_mm, block)[::block], hashed)
+    # Two blocks in a row are a stretch of `row` readings.
+    both = at[1:] & at[:-1]
+    counted = np.append(both, False) | np.insert(both, 0, False)
+    return block * int(np.count_nonzero(counted))
+
+
+def _stretches(length_mm: NDArray[np.float64], block: int) -> NDArray[np.uint64]:
+    """One number for each stretch of so many readings, shape (n - block + 1,)."""
+    weights = np.array([pow(BASE, k, 2**64) for k in range(block)], dtype=np.uint64)
+    return np.convolve(np.ascontiguousarray(length_mm).view(np.uint64), weights, mode="valid")

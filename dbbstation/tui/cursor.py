@@ -1,0 +1,27 @@
+"""The mark before the chosen row: a terminal without colours shows which row is chosen by it alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from textual.widgets import OptionList
+
+CURSOR = "▸ "
+"""Before the chosen row."""
+
+
+def mark_chosen(options: OptionList, rows: Sequence[Content]) -> None:
+    """Show rows with the mark before the chosen one.
+
+    Args:
+        options: the list.
+        rows: as they are without a mark; as many as the list has, or more.
+    """
+    for place, row in enumerate(rows[: options.option_count]):
+        mark = CURSOR if place == options.highlighted else " " * len(CURSOR)
+        options.replace_option_prompt_at_index(place, Content(mark) + row)

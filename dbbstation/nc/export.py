@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -14,9 +15,10 @@ from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import CHORD_MM, Prefer, Slow, compensate_toolpath
-from dbbstation.nc.kept import TooSlowError, check_chord, check_feed, cost, slower_rapids
+from dbbstation.nc.kept import TooSlowError, check_chord, check_feed, cost, merged_moves, slower_rapids
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.mark import marked
+from dbbstation.nc.merging import queued
 from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
 from dbbstation.nc.planner import Planner
 from dbbstation.nc.reach import STEP_DEG as REACH_DEG
@@ -85,6 +87,8 @@ class Program:
         nominal_rapid_s: of the program that it was made from [s].
         cost: what a preference cost, in words; empty without one.
         slower_rapids: what rapids lose, in words; empty where that is next to nothing.
+        merged_um: distance of points that were left out from the lines in their place, where short moves had to be made one [µm].
+        merged: the same in words; empty where none were.
     """
 
     name: str
@@ -103,6 +107,8 @@ class Program:
     nominal_rapid_s: float | None = None
     cost: str = ""
     slower_rapids: str = ""
+    merged_um: float | None = None
+    merged: str = ""
 
 
 def circle_programs(
@@ -233,7 +239,17 @@ def compensated_program(
     def slower(mm_min: float) -> Toolpath:
         return replace(path, feed_mm_min=np.minimum(path.feed_mm_min, mm_min))
 
-    return _or_the_feed_that_is_kept(written, path, slower, inverse)
+    one = queued(path)
+    if one is None:
+        return _or_the_feed_that_is_kept(written, path, slower, inverse)
+    with suppress(TooSlowError):
+        return written(path)
+    # The control is faster through the nominal program, whose short moves it makes one: so are they here.
+    path, merged_um = one.path, 1e3 * one.off_mm
+    told = merged_moves(merged_um)
+    header.append(told)
+    done = _or_the_feed_that_is_kept(written, path, slower, inverse)
+    return replace(done, merged_um=merged_um, merged=told)
 
 
 MOST_FEEDS, LESS = 12, 0.97

@@ -110,9 +110,9 @@ def cost(done: Compensation, asked_um: float, prefer: Prefer) -> str:
 
 
 def slower_rapids(done: Compensation) -> str:
-    """Return what rapids lose, in words; empty where the whole program takes no more than `KEPT` of its time."""
+    """Return what rapids lose, in words; empty where they, or the whole program, take no more than `KEPT` of their time."""
     takes, took = done.rapid_seconds, done.nominal_rapid_seconds
-    if takes + done.seconds <= KEPT * (took + done.nominal_seconds):
+    if takes <= KEPT * took or takes + done.seconds <= KEPT * (took + done.nominal_seconds):
         return ""
     told = f"rapids are reckoned to take {takes:.1f} s in place of {took:.1f} s, since A, B and C are corrected in them"
     path = done.toolpath
@@ -120,6 +120,14 @@ def slower_rapids(done: Compensation) -> str:
         return told
     return (
         f"{told}: where the program says how far corners may be rounded, as with G64 P0.05, they lose next to nothing"
+    )
+
+
+def merged_moves(merged_um: float) -> str:
+    """Return what making short moves one costs, in words [µm]."""
+    return (
+        f"short moves are made one within {up(merged_um)} µm, as the control makes those of the nominal program under G64 P Q "
+        "(P without Q); Q0 would keep each of them"
     )
 
 

@@ -8,6 +8,7 @@ turn stays by itself [LinuxCNC 2.9, `linkable`, `see_segment` and `ARC_FEED` in 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,14 +31,16 @@ class Queued:
     """A toolpath as a control queues it, k rows.
 
     Attributes:
-        path: with one row for moves that are one, and without comments.
+        path: with one row for moves that are one. What is said between them stands before it.
         of: row of it that each of the n rows of the program is part of, shape (n,).
         share: of the time of that row, shape (n,).
+        off_mm: greatest distance of a point that is left out from the line in its place [mm].
     """
 
     path: Toolpath
     of: NDArray[np.int64]
     share: NDArray[np.float64]
+    off_mm: float
 
 
 def queued(toolpath: Toolpath) -> Queued | None:
@@ -63,15 +66,35 @@ def queued(toolpath: Toolpath) -> Queued | None:
     ends[at[_chain_ends(toolpath.poses[at, :3], toolpath.before[_begins(at, straight), :3], within_mm[at], new)]] = True
     if ends[straight].all():
         return None
-    kept = np.flatnonzero(ends)
-    path = replace(toolpath, arc=np.where(straightened[:, None], 0.0, arc), merges_mm=np.zeros(len(toolpath))).only(
-        kept
-    )
-    of = np.searchsorted(kept, np.arange(len(toolpath)))
+    kept, last = ends | says, np.flatnonzero(ends)
+    rows = np.arange(len(toolpath))
+    # What is said on the way is said where the line begins.
+    place = np.searchsorted(last, rows, side="right") - 1
+    poses = np.where((says & (place >= 0))[:, None], toolpath.poses[last[np.maximum(place, 0)]], toolpath.poses)
+    made = replace(
+        toolpath,
+        poses=poses,
+        arc=np.where(straightened[:, None], 0.0, arc),
+        merges_mm=np.zeros(len(toolpath)),
+    ).only(np.flatnonzero(kept))
+    number = np.cumsum(kept) - 1
+    path = replace(made, text=MappingProxyType({int(number[row]): text for row, text in toolpath.text.items()}))
+    of = number[last[np.minimum(np.searchsorted(last, rows), len(last) - 1)]]
     weight = np.where(ends | straight, toolpath.tip_mm, 0.0)
-    whole = np.bincount(of, weights=weight, minlength=len(kept) + 1)[of]
+    whole = np.bincount(of, weights=weight, minlength=len(path))[of]
     share = np.divide(weight, whole, out=ends.astype(np.float64), where=whole > 0.0)
-    return Queued(path, np.minimum(of, len(kept) - 1), share)
+    left_out = straight & ~ends
+    off_mm = _off_mm(toolpath.poses[left_out], path.before[of[left_out]], path.poses[of[left_out]])
+    return Queued(path, of, share, off_mm)
+
+
+def _off_mm(points: NDArray[np.float64], begins: NDArray[np.float64], ends: NDArray[np.float64]) -> float:
+    """Greatest distance of poses from straight moves between others, shapes (k, 6) [mm]."""
+    along, to = (each[:, :3] - begins[:, :3] for each in (ends, points))
+    square = np.einsum("ij,ij->i", along, along)
+    share = np.divide(np.einsum("ij,ij->i", along, to), square, out=np.zeros(len(square)), where=square > 0.0)
+    off = to - np.clip(share, 0.0, 1.0)[:, None] * along
+    return float(np.linalg.norm(off, axis=1).max(initial=0.0))
 
 
 def _begins(at: NDArray[np.int64], straight: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -36,9 +36,11 @@ class WrittenProgram:
         nominal_feed_s: of the program that it was made from [s].
         rapid_s: time of all rapids, as the control plans them at the machine's greatest feed [s].
         nominal_rapid_s: of the program that it was made from [s].
+        merged_um: distance of points that were left out from the lines in their place; None where short moves were not made one [µm].
         text: the program.
         cost: what a preference cost, in words; empty without one.
         slower_rapids: what rapids lose, in words; empty where that is next to nothing.
+        merged: what making short moves one costs, in words; empty where none were.
     """
 
     file: str
@@ -55,9 +57,11 @@ class WrittenProgram:
     nominal_feed_s: float | None
     rapid_s: float | None
     nominal_rapid_s: float | None
+    merged_um: float | None
     text: Annotated[str, Kept] = field(repr=False)
     cost: Annotated[str, Kept] = ""
     slower_rapids: Annotated[str, Kept] = ""
+    merged: Annotated[str, Kept] = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +151,9 @@ def _written(file: str, each: Program) -> WrittenProgram:
         nominal_feed_s=each.nominal_feed_s,
         rapid_s=each.rapid_s,
         nominal_rapid_s=each.nominal_rapid_s,
+        merged_um=each.merged_um,
         text=each.text,
         cost=each.cost,
         slower_rapids=each.slower_rapids,
+        merged=each.merged,
     )

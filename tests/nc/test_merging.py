@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.nc.compensate import Prefer
+from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.merging import MOST_POINTS, queued
 from dbbstation.nc.planner import LookAhead, Planner
 from dbbstation.nc.rs274.reader import read_program
@@ -113,6 +119,53 @@ def test_moves_that_are_one_take_its_time_by_their_lengths():
     expected_s = Planner(5000.0, LookAhead(0.5)).seconds(one)[one.poses[:, 2] == -1000.0].sum()
     assert took[rows].sum() == pytest.approx(expected_s)
     np.testing.assert_allclose(took[rows] / took[rows].sum(), np.arange(1, 11) / 55.0)
+
+
+def test_what_is_said_on_the_way_is_said_before_the_line():
+    lines = zigzag(0.04).splitlines()
+    path = path_of(
+        "G64 P0.05", "\n".join([*lines[:3], "(first)", *lines[3:5], "(second)", *lines[5:], "M8", "(third)"])
+    )
+    one = queued(path)
+    assert one is not None
+    words = [one.path.text.get(row, "") for row in range(len(one.path))]
+    line = next(row for row in range(len(words)) if one.path.poses[row, 0] == 8.0)
+    assert [word.strip() for word in words[line - 2 : line + 3]] == ["first", "second", "", "M8", "third"]
+    np.testing.assert_array_equal(one.path.before[line, :2], [0.0, 0.0])
+
+
+HILLS = "\n".join(f"G1 X{0.1 * k:.1f} Z{-1000.0 + 0.2 * np.sin(0.2 * np.pi * k):.4f}" for k in range(1, 401))
+
+
+@pytest.mark.parametrize(("control", "merges"), [("G64 P0.25", True), ("G64 P0.25 Q0", False)])
+def test_lines_are_merged_where_the_control_would_be_faster_otherwise(control, merges, linuxcnc, crooked):
+    """Hills of 0.2 mm, 2 mm apart, are 10 % longer than the line across them that the control runs within P."""
+    path = path_of(control, HILLS)
+    slow = replace(crooked.machine, acceleration_mm_s2=1000.0)
+    done = compensated_program(
+        path, linuxcnc, Inverse(MachineModel(slow, crooked.sources), prefer=Prefer.POSITION_ONLY)
+    )
+    assert ("made one within" in done.text) == merges
+    if merges:
+        assert done.feed_s <= 1.01 * done.nominal_feed_s
+        assert done.merged_um == pytest.approx(farthest_um(path))
+    else:
+        assert done.merged_um is None
+        assert done.points >= 400
+
+
+def farthest_um(path) -> float:
+    """Distance of the points that are left out from the lines that are queued, point by point [µm]."""
+    ends = [line for line in queued_lines("G64 P0.25", HILLS) if line <= 400]
+    points = path.poses[(path.kind == RowKind.FEED) & (path.poses[:, 2] > -1000.9)][:, [0, 2]]
+    points = np.vstack([[0.0, -1000.0], points])
+    worst_mm = 0.0
+    for first, last in pairwise([0, *ends]):
+        line = points[last] - points[first]
+        for inner in range(first + 1, last):
+            share = np.clip((points[inner] - points[first]) @ line / (line @ line), 0.0, 1.0)
+            worst_mm = max(worst_mm, float(np.linalg.norm(points[inner] - points[first] - share * line)))
+    return 1e3 * worst_mm
 
 
 def test_compensated_pieces_are_not_merged(linuxcnc):

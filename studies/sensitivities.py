@@ -64,8 +64,15 @@ ENGINE = (
 )
 """Of whatever compares sets of causes. Of a cosine, what it lacks of one is halved and doubled."""
 
+SAID = (
+    Constant("inference.cancelling", "MOST_CANCELS", (0.35, 0.7)),
+    Constant("inference.pushes", "MOST_PUSHES"),
+)
+"""Of what is said of what was found in tables and drives. Of a root, its square is halved and doubled."""
+
 DRIVE = (
     *ENGINE,
+    *SAID,
     Constant("diagnosis.drive.channel", "METHOD_SHARE"),
     Constant("diagnosis.drive.channel", "PERIODS_IN_TRAVEL"),
     Constant("diagnosis.drive.channel", "WAVE_STEP"),
@@ -97,6 +104,8 @@ TABLE = (
     Constant("diagnosis.table.data", "REFITTED"),
     Constant("diagnosis.table.mismatch", "FAR_STATED"),
     Constant("inference.memory", "LATE"),
+    Constant("inference.memory", "AT_ONCE", (0.25, 0.75)),
+    *SAID,
     Constant("inference.bank", "HARDLY_TAKEN", (0.9, 0.975)),
 )
 """Of `mismatch`. Of a share near one, what it lacks of one is halved and doubled."""
@@ -247,7 +256,7 @@ def _drive_answer(variation: Variation) -> Answer:
     recording = read_drive(variation.paths[0]).recording(variation.force_per_ampere)
     summary = plain(drive_result(identify([recording], list(known_drive_sources().values()))))
     base = {name: one for name, one in summary["parameters"].items() if one["identifiable"]}
-    return _answer(summary["sources"], _values(base))
+    return _and_whether_cancelling(_answer(summary["sources"], _values(base)), summary)
 
 
 def _pair_answer(a: Path, b: Path) -> Answer:
@@ -266,6 +275,11 @@ def _table_answer(path: Path, measured: str, simulated: str) -> Answer:
     answer = _answer(summary["findings"], _values({one["name"]: one["after"] for one in summary["parameters"]}))
     for one in summary["parameters"]:
         answer.verdicts[f"{one['name']}, as far as is known of it"] = "beyond" if one["far"] else "within"
+    return _and_whether_cancelling(answer, summary)
+
+
+def _and_whether_cancelling(answer: Answer, summary: dict[str, Any]) -> Answer:
+    answer.verdicts["effects"] = "cancel each other" if summary["cancelling"] else "do not cancel"
     return answer
 
 

@@ -6,6 +6,7 @@ best values: exact columns, tangents, and what its formula may be off by.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -99,6 +100,14 @@ class Bank:
         self._of_patterns: dict[str, Cause] = {}
         self._of_laws = {law.name: Cause(law.name, self._on_a_grid(law), law.log_odds) for law in channel.laws}
 
+    def copy(self) -> Bank:
+        """One that goes its own way from here: columns, laws and patterns that are there already are shared."""
+        other: Bank = copy(self)
+        other.patterns, other._of_patterns = dict(self.patterns), dict(self._of_patterns)
+        other._of_laws, other._everywhere = dict(self._of_laws), list(self._everywhere)
+        other._columns = self._columns.copy()
+        return other
+
     @property
     def causes(self) -> tuple[Cause, ...]:
         """All of them, laws first."""
@@ -167,14 +176,9 @@ class Bank:
         fresh = [p for p in {p.name: p for p in more}.values() if p.name not in self.patterns]
         if not fresh:
             return []
-        numbers = self._add(np.hstack([p.samples for p in fresh]))
         self.patterns |= {p.name: p for p in fresh}
-        first = 0
         for pattern in fresh:
-            width = pattern.samples.shape[1]
-            own = numbers[first : first + width]
-            first += width
-            self._of_patterns[pattern.name] = self._cause(pattern, own, self.channel.size)
+            self._of_patterns[pattern.name] = self._cause(pattern, self._add(pattern.samples), self.channel.size)
         for name, cause in self._of_patterns.items():
             pattern = self.patterns[name]
             self._of_patterns[name] = replace(cause, log_prior_odds=self._odds(pattern))
@@ -452,7 +456,8 @@ class Bank:
 
 
 def _whitened(kept: NDArray[np.bool_], whitening: csr_array | None, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    return rows[kept] if whitening is None else np.asarray(whitening @ rows[kept])
+    own = rows if kept.all() else rows[kept]  # to pick all rows would copy all columns
+    return own if whitening is None else np.asarray(whitening @ own)
 
 
 def _forms(

@@ -55,7 +55,11 @@ WIDER = 1.2
 """Ratio of the widths of neighbouring bands."""
 
 SHORTEST = 64
-"""Rows of a stretch that a spectrum is taken of."""
+"""Rows of a stretch that a spectrum is taken of, at the least, where there is one."""
+
+SHORTEST_OF_ALL = 16
+"""The same where all stretches are shorter, as of many short runs: half of the longest one, and so many at the least. A low-pass of seven
+rows shows in seven frequencies; without a spectrum noise would be taken for white."""
 
 LOG_MEAN = 0.5772156649
 """By how much the mean of log power lies below the log of its mean, for noise [Euler's constant]."""
@@ -243,9 +247,11 @@ def bands_of(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Bands | N
     Logs are averaged, so that a few lines, which are waves that nobody has found yet, hardly raise a band.
     """
     frequency, power = [], []
+    longest = max((stretch.stop - stretch.start for stretch in stretches), default=0)
+    least = SHORTEST if longest >= SHORTEST else max(longest // 2, SHORTEST_OF_ALL)
     for stretch in stretches:
         own = rows[stretch]
-        if len(own) >= SHORTEST:
+        if len(own) >= least:
             power.append(np.abs(np.fft.rfft(own)[1 : (len(own) + 1) // 2]) ** 2 / len(own))
             frequency.append(np.arange(1, len(power[-1]) + 1) / len(own))
     if not power:

@@ -114,7 +114,7 @@ def _nearest(sums: Sums, frequency: float, step: float, lowest: float, size: flo
     """Sum of squares that a wave near a frequency explains at the most, and its frequency."""
     near = np.asarray(frequency + np.arange(-15, 16) * step, dtype=np.float64)
     near = near[near > lowest]
-    by_near = sums.explained(_cosines(sums.at, near), size)
+    by_near = sums.explained(_cosines(sums.at, float(near[0]), step, len(near)), size)
     k = int(by_near.argmax())
     return float(by_near[k]), float(near[k])
 
@@ -245,7 +245,10 @@ def _steps(variable: Variable) -> list[Form]:
     return [StepForm(float(at), wide / 4.0) for at in places]
 
 
-def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cosine and sine of each frequency, shape (b, m, 2)."""
-    phase = 2.0 * np.pi * np.outer(at, frequencies)
-    return np.stack([np.cos(phase), np.sin(phase)], axis=2)
+def _cosines(at: NDArray[np.float64], lowest: float, step: float, count: int) -> NDArray[np.float64]:
+    """Cosine and sine of so many frequencies a step apart, shape (b, m, 2): one is the one before it, turned."""
+    turned = np.empty((len(at), count), dtype=np.complex128)
+    turned[:, 0] = np.exp(2j * np.pi * lowest * at)
+    turned[:, 1:] = np.exp(2j * np.pi * step * at)[:, None]
+    np.cumprod(turned, axis=1, out=turned)
+    return np.stack([turned.real, turned.imag], axis=2)

@@ -7,6 +7,7 @@ number of the base.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,7 +64,7 @@ class CauseColumns:
         self._whitened = whitened
         self._buffer = np.empty((len(base), room), order="F")
         self._waiting: list[NDArray[np.float64]] = []
-        self._ready = 0
+        self._ready, self._shared = 0, False
         self._products = np.zeros((0, 0))
         self._along = np.zeros((self.axes.shape[1], 0))
         self.count = 0
@@ -71,12 +72,22 @@ class CauseColumns:
     @property
     def samples(self) -> NDArray[np.float64]:
         """All columns, shape (n, p)."""
+        if self._waiting:
+            self._make_room(self.count)
         while self._waiting:
             part = self._waiting.pop(0)  # held twice no longer than need be
             first, last = self._ready, self._ready + part.shape[1]
             self._buffer[:, first:last] = part if self._whitened is None else self._whitened(part)
             self._ready = last
         return self._buffer[:, : self.count]
+
+    def copy(self) -> CauseColumns:
+        """One that more columns may be added to by itself; those that are there are shared."""
+        other: CauseColumns = copy(self)
+        other._waiting = list(self._waiting)
+        # Either writes columns behind those that are there, and needs a buffer of its own for that.
+        self._shared = other._shared = True
+        return other
 
     def of(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
         """Some columns, shape (n, q): without making the others where these are few."""
@@ -117,19 +128,25 @@ class CauseColumns:
     def add(self, columns: NDArray[np.float64]) -> NDArray[np.int64]:
         """Take in columns, shape (m, q), and return their numbers."""
         first, last = self.count, self.count + columns.shape[1]
-        if last > self._buffer.shape[1]:
-            wider = np.empty((len(self._buffer), 2 * last), order="F")
-            wider[:, : self._ready] = self._buffer[:, : self._ready]
-            self._buffer = wider
-        if (
-            self._whitened is None
-        ):  # nothing is to be worked out later, and a copy of what waits would take as much memory again
+        if self._whitened is None:
+            # Nothing is to be worked out later, and a copy of what waits would take as much memory again.
+            self._make_room(last)
             self._buffer[:, first:last] = columns
             self._ready = last
         else:
             self._waiting.append(columns)
         self.count = last
         return np.arange(first, last)
+
+    def _make_room(self, last: int) -> None:
+        """Have a buffer of one's own with room for so many columns."""
+        if last <= self._buffer.shape[1] and not self._shared:
+            return
+        wider = np.empty(
+            (len(self._buffer), self._buffer.shape[1] if last <= self._buffer.shape[1] else 2 * last), order="F"
+        )
+        wider[:, : self._ready] = self._buffer[:, : self._ready]
+        self._buffer, self._shared = wider, False
 
     def but_for(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> CauseColumns:
         """The same causes as all other rows show them, the columns themselves shared; targets must be zero in these rows.

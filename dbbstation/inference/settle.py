@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -94,14 +93,14 @@ def settle(
         if one in LONG_TAILS and found and not _may_have_long_tails(laid_out, found):
             continue
         if one in BESIDE_NOTHING:
-            found.append(_from(deepcopy(laid_out), (), {}, one, options, progress, found))
+            found.append(_from(laid_out.copy(), (), {}, one, options, progress, found))
             continue
         if begun is None:
             # What stands beside everything is worked out once, and gone on with under each kind of noise.
-            bank = deepcopy(laid_out)
+            bank = laid_out.copy()
             begun = bank, _settled(bank, options, progress)
-        bank, beside_all = deepcopy((begun[0], begun[1].best.members))
-        found.append(_from(bank, beside_all, begun[1].refused, one, options, progress, found))
+        beside_all = begun[1].best.members
+        found.append(_from(begun[0].copy(), beside_all, begun[1].refused, one, options, progress, found))
     found.sort(key=lambda one: -one.log_probability)
     return replace(found[0], others=tuple(found[1:]))
 
@@ -110,7 +109,7 @@ def _may_have_long_tails(laid_out: Bank, found: Sequence[Settled]) -> bool:
     """Whether what is new in a row has long tails beside what was found, or beside nothing: what was found may be such rows."""
     if any(one.bank.may_have_long_tails(one.best.members) for one in found):
         return True
-    bank = deepcopy(laid_out)
+    bank = laid_out.copy()
     bank.measures_beside_members = True
     bank.measure(())
     return bank.may_have_long_tails(())

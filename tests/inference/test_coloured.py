@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import norm, t
 
-from dbbstation.inference.coloured import Coloured, autoregressive, with_put_back
+from dbbstation.inference.coloured import Coloured, autoregressive, bands_of, first_order, with_put_back
 from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance
 
 RADIUS, TURN = 0.9, 2.0 * np.pi / 12.0
@@ -91,3 +91,20 @@ def test_a_variance_that_grows_is_found_with_its_size(rng):
     # Parts that grow are tried in steps of two.
     ratio = (0.25 + speed.max() ** 2) / (0.25 + speed.min() ** 2)
     assert 0.5 * ratio < variance.max() / variance.min() < 2.0 * ratio
+
+
+def test_short_runs_have_a_spectrum_too():
+    """Forty runs of 50 rows of a first-order process of 0.8, which counts as one row in (1 + 0.8) / (1 - 0.8) = 9."""
+    rng = np.random.default_rng(7)
+    runs = []
+    for _ in range(40):
+        values = [rng.standard_normal()]
+        for new in rng.standard_normal(49):
+            values.append(0.8 * values[-1] + 0.6 * new)
+        runs.append(values)
+    rows, stretches = np.concatenate(runs), [slice(50 * k, 50 * k + 50) for k in range(40)]
+    bands = bands_of(rows, stretches)
+    assert bands is not None
+    # Correlations are tried in steps of a tenth: 0.7 counts as one in 5.7, 0.9 as one in 19.
+    assert first_order(bands).correlation_samples == pytest.approx(9.0, rel=1.0 / 3.0)
+    assert bands_of(rows[:150], [slice(15 * k, 15 * k + 15) for k in range(10)]) is None

@@ -7,7 +7,6 @@ colour competes with these alone, beside the laws that were found.
 
 from __future__ import annotations
 
-from copy import deepcopy
 from typing import TYPE_CHECKING
 
 from scipy.special import expit
@@ -33,7 +32,7 @@ def probability_beside_noise(settled: Settled) -> float:
         return 1.0
     found = []
     for members in (settled.best.members, others):
-        bank = deepcopy(settled.bank)
+        bank = settled.bank.copy()
         bank.measures_beside_members = True
         bank.measure(members)
         found.append(log_probability(bank, members))

@@ -347,17 +347,22 @@ class _Search:
 
     def _as_close_as_it_is(self, members: list[Member]) -> tuple[list[Member], float]:
         """Members with the share of their slack that suits each best, and what averaging over the shares adds."""
-        more = 0.0
+        more, known = 0.0, self._comparison.log_evidence(members)
         for k, member in enumerate(members):
             if not len(member.variant.slack):
                 continue
             tried = [
-                replace(member, slack_share=share, slack_scale=member.slack_scale * share / member.slack_share)
+                member
+                if share == member.slack_share
+                else replace(member, slack_share=share, slack_scale=member.slack_scale * share / member.slack_share)
                 for share in SLACK_SHARES.tolist()
             ]
-            evidence = [self._comparison.log_evidence([*members[:k], one, *members[k + 1 :]]) for one in tried]
+            evidence = [
+                known if one is member else self._comparison.log_evidence([*members[:k], one, *members[k + 1 :]])
+                for one in tried
+            ]
             best = int(np.argmax(evidence))
-            members[k] = tried[best]
+            members[k], known = tried[best], evidence[best]
             more += float(logsumexp(evidence)) - evidence[best] - float(np.log(len(tried)))
         return members, more
 
@@ -365,7 +370,7 @@ class _Search:
         """Members whose slack belongs to the amplitudes that they have together."""
         if not any(len(member.variant.slack) for member in members):
             return members
-        values = self._comparison.estimates(members).values
+        values = self._comparison.values(members)
         found = []
         for member in members:
             own = len(member.variant.columns)

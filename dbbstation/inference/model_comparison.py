@@ -48,6 +48,9 @@ MOST_SLACK = 1.5
 _Eliminated: TypeAlias = "tuple[NDArray[np.float64], NDArray[np.float64], float]"
 """Cholesky factor, what it makes of the target, log evidence."""
 
+_Group: TypeAlias = "tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]"
+"""Forms of one number of amplitudes: their numbers, columns, plausible sizes, and products of the columns."""
+
 
 @dataclass(frozen=True, eq=False)
 class Variant:
@@ -155,12 +158,42 @@ class Estimates:
     covariance: NDArray[np.float64]
 
 
+class _OfCause:
+    """Forms of one cause, those of one number of amplitudes together.
+
+    Args:
+        cause: any.
+        gram: products of all columns, shape (n, n).
+
+    Attributes:
+        cause: the same.
+        groups: by number of amplitudes p: numbers of forms that have it, shape (m,); their columns and plausible sizes, shape (m, p) each;
+            products of these columns, shape (m, p, p).
+        weights: log probability of each form.
+        slim: which forms have fewer than `FLEXIBLE` amplitudes.
+    """
+
+    def __init__(self, cause: Cause, gram: NDArray[np.float64]) -> None:
+        by_size: dict[int, list[int]] = {}
+        for number, variant in enumerate(cause.variants):
+            by_size.setdefault(len(variant.columns), []).append(number)
+        self.cause = cause
+        self.groups: dict[int, _Group] = {}
+        for size, numbers in by_size.items():
+            columns: NDArray[np.int64] = np.array([cause.variants[number].columns for number in numbers])
+            plausible = np.array([cause.variants[number].plausible for number in numbers])
+            blocks = gram[columns[:, :, None], columns[:, None, :]]
+            self.groups[size] = np.array(numbers), columns, plausible, blocks
+        self.weights = np.array([variant.log_weight for variant in cause.variants])
+        self.slim = [i for i, v in enumerate(cause.variants) if len(v.columns) < FLEXIBLE]
+
+
 class _Forms:
     """Forms of causes, those of one number of amplitudes together.
 
     Args:
-        causes: any.
-        gram: products of all columns, shape (n, n).
+        each: of every cause.
+        count: of all columns, n.
 
     Attributes:
         causes: the same.
@@ -172,24 +205,25 @@ class _Forms:
         slim: which forms of each cause have fewer than `FLEXIBLE` amplitudes.
     """
 
-    def __init__(self, causes: tuple[Cause, ...], gram: NDArray[np.float64]) -> None:
-        variants = [variant for cause in causes for variant in cause.variants]
-        self.causes = causes
-        self.needed = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(v.columns for v in variants)]))
-        place = np.zeros(len(gram), dtype=np.int64)
+    def __init__(self, each: Sequence[_OfCause], count: int) -> None:
+        self.causes = tuple(one.cause for one in each)
+        self.ends = np.cumsum([0, *(len(one.weights) for one in each)])
+        self.weights = np.concatenate([np.zeros(0), *(one.weights for one in each)])
+        self.slim = [one.slim for one in each]
+        of_sizes: dict[int, list[_Group]] = {}
+        wanted = np.zeros(count, dtype=bool)
+        for one, first in zip(each, self.ends[:-1], strict=True):
+            for size, (numbers, columns, plausible, blocks) in one.groups.items():
+                of_sizes.setdefault(size, []).append((numbers + first, columns, plausible, blocks))
+                wanted[columns] = True
+        self.needed: NDArray[np.int64] = np.flatnonzero(wanted)
+        place = np.zeros(count, dtype=np.int64)
         place[self.needed] = np.arange(len(self.needed))
-        by_size: dict[int, list[int]] = {}
-        for number, variant in enumerate(variants):
-            by_size.setdefault(len(variant.columns), []).append(number)
-        self.groups = []
-        for numbers in by_size.values():
-            columns = np.array([variants[number].columns for number in numbers])
-            plausible = np.array([variants[number].plausible for number in numbers])
-            blocks = gram[columns[:, :, None], columns[:, None, :]]
+        self.groups: list[_Group] = []
+        for parts in of_sizes.values():
+            numbers, columns = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+            plausible, blocks = (np.concatenate([part[k] for part in parts]) for k in (2, 3))
             self.groups.append((numbers, place[columns], plausible, blocks))
-        self.weights = np.array([variant.log_weight for variant in variants])
-        self.ends = np.cumsum([0, *(len(cause.variants) for cause in causes)])
-        self.slim = [[i for i, v in enumerate(cause.variants) if len(v.columns) < FLEXIBLE] for cause in causes]
 
 
 class ModelComparison:
@@ -203,6 +237,7 @@ class ModelComparison:
     def __init__(self, gram: NDArray[np.float64], towards: NDArray[np.float64]) -> None:
         self._gram, self._towards = gram, towards
         self._last: tuple[tuple[Member, ...], _Eliminated] | None = None
+        self._of_causes: dict[str, _OfCause] = {}
         self._forms: dict[str, _Forms] = {}
 
     def log_evidence(self, members: Sequence[Member]) -> float:
@@ -213,6 +248,12 @@ class ModelComparison:
         """Reduction of chi-square by members, less what their sizes cost."""
         _, z, _ = self._eliminated(members)
         return float(z @ z)
+
+    def values(self, members: Sequence[Member]) -> NDArray[np.float64]:
+        """Posterior means of the amplitudes and the slack of members, in the order of their columns, shape (p,)."""
+        lower, z, _ = self._eliminated(members)
+        _, sd = _stacked(members)
+        return np.asarray(sd * solve_triangular(lower, z, lower=True, trans=1, check_finite=False), dtype=np.float64)
 
     def estimates(self, members: Sequence[Member]) -> Estimates:
         """Posterior means and covariance of the amplitudes and the slack of members."""
@@ -275,8 +316,8 @@ class ModelComparison:
         """
         forms = self._forms_of(tuple(causes))
         causes, needed = forms.causes, forms.needed
-        towards = self._towards[needed]
-        across = np.zeros((0, len(needed)))
+        towards: NDArray[np.float64] = self._towards[needed]
+        across: NDArray[np.float64] = np.zeros((0, len(needed)))
         if members:
             lower, z, _ = self._eliminated(members)
             taken, sd = _stacked(members)
@@ -299,16 +340,16 @@ class ModelComparison:
         narrow: list[Member | None] = []
         ends = forms.ends
         for k, cause in enumerate(causes):
-            own = weighted[ends[k] : ends[k + 1]]
-            form, scale = divmod(int(own.argmax()), len(SCALES))
-            top = own[form, scale]
-            log_factor[k] = top + np.log(np.exp(own - top).sum())
+            each = weighted[ends[k] : ends[k + 1]]
+            form, scale = divmod(int(each.argmax()), len(SCALES))
+            top = each[form, scale]
+            log_factor[k] = top + np.log(np.exp(each - top).sum())
             best.append(Member(cause, cause.variants[form], float(SCALES[scale])))
             log_best[k] = factors[ends[k] + form, scale]
             narrow.append(None)
             slim = forms.slim[k]
             if slim and form not in slim:
-                slot, size = divmod(int(own[slim].argmax()), len(SCALES))
+                slot, size = divmod(int(each[slim].argmax()), len(SCALES))
                 narrow[-1] = Member(cause, cause.variants[slim[slot]], float(SCALES[size]))
         return Scan(causes, log_factor, tuple(best), log_best, tuple(narrow))
 
@@ -351,13 +392,20 @@ class ModelComparison:
         return information
 
     def _forms_of(self, causes: tuple[Cause, ...]) -> _Forms:
-        """Forms of causes as `scan` takes them; kept where it is one cause, which a search scans again and again."""
-        if len(causes) != 1:
-            return _Forms(causes, self._gram)
-        known = self._forms.get(causes[0].name)
-        if known is None or known.causes[0] is not causes[0]:
-            known = self._forms[causes[0].name] = _Forms(causes, self._gram)
-        return known
+        """Forms of causes as `scan` takes them; those of each cause are kept, which a search scans again and again."""
+        each = []
+        for cause in causes:
+            one = self._of_causes.get(cause.name)
+            if one is None or one.cause is not cause:
+                one = self._of_causes[cause.name] = _OfCause(cause, self._gram)
+                self._forms.pop(cause.name, None)
+            each.append(one)
+        if len(each) != 1:
+            return _Forms(each, len(self._gram))
+        name = causes[0].name
+        if name not in self._forms:
+            self._forms[name] = _Forms(each, len(self._gram))
+        return self._forms[name]
 
     def _eliminated(self, members: Sequence[Member]) -> _Eliminated:
         """Cholesky factor of the members' information, what it makes of the target, and their log evidence."""

@@ -101,6 +101,8 @@ def _predicted(one: Seen) -> Iterator[_Explained]:
     if own is None:
         return
     noise = unseen_um2(one, one) * np.eye(len(own.form_um))
+    # A model knows nothing of this day's drift, which may have gone on since the session began as it does on this turn.
+    noise[0, 0] += (one.drift_um_s * (one.run.started_s or 0.0)) ** 2
     as_own = read_um(one) - expected_um(one.run)
     likelihood = log_likelihood(as_own, _whole(own, one.run.circle) + noise)
     for planned in one.run.planned:

@@ -2,7 +2,7 @@
 
 `python -m tests.quality.sabotage` prints the table of docs/circles.md: how often each finding is made of runs that are spoilt by
 half its limit, by its limit and by twice its limit, and how often of runs that are sound. `--equipment 3` prints the table of what goes
-wrong with balls, programs and gauges, `--strange` that of faults of other kinds, and `--drifting 1000` how often good circles on drifting days have a finding, with `--model` of
+wrong with balls, programs and gauges, `--strange` that of faults of other kinds, `--limits 5` the limits of sound runs, and `--drifting 1000` how often good circles on drifting days have a finding, with `--model` of
 machines with a model.
 """
 
@@ -18,7 +18,7 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.quality.finding import FindingVerdict
 from dbbstation.quality.judge import SessionRuns
 from tests.quality.equipment import Row, equipment, print_equipment
-from tests.quality.sessions import calibrated, drifting_session, sound
+from tests.quality.sessions import TESTS, calibrated, drifting_session, sound
 from tests.quality.shares import spoil
 from tests.quality.spoilers import SPOILERS
 from tests.quality.strange import print_strange
@@ -47,6 +47,27 @@ def false_alarms(folder: Path, seed: int, wanted: int, *, with_model: bool) -> N
         sys.stdout.write(f"{wanted} good circles on drifting days, {name}: {dict(counted)}\n")
 
 
+def limits(folder: Path, seeds: range, *, with_model: bool) -> None:
+    """From what to what the limits of sound runs go, of the first direction of a test and of the second, beside nothing else."""
+    found: dict[tuple[str, str], list[float]] = collections.defaultdict(list)
+    for seed in seeds:
+        at = folder / f"{seed}{with_model}"
+        whole = calibrated(at, seed) if with_model else sound(at, seed, TESTS)
+        first = [one for one in whole.runs if one.run.repeat == 1]
+        for k, one in enumerate(first):
+            pair = first[k - 1 : k + 1] if k % 2 else [one]
+            for each in SessionRuns(pair).judge(one).findings:
+                if each.limit is not None:
+                    found[each.name, "second" if k % 2 else "first"].append(each.limit)
+    for (name, direction), sizes in found.items():
+        sizes.sort()
+        middle = sizes[len(sizes) // 2]
+        by = "with a model" if with_model else "without a model"
+        sys.stdout.write(
+            f"{name}, {direction} direction, {by}: {sizes[0]:.2f} to {sizes[-1]:.2f}, median {middle:.2f}, of {len(sizes)}\n"
+        )
+
+
 @with_one_thread
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
@@ -56,10 +77,13 @@ def main() -> None:
     parser.add_argument("--model", action="store_true", help="each good session has its own calibration as a model")
     parser.add_argument("--equipment", type=int, default=0, help="sessions whose equipment fails, in place of all else")
     parser.add_argument("--strange", action="store_true", help="faults of other kinds, in place of all else")
+    parser.add_argument("--limits", type=int, default=0, help="sessions whose limits are listed, in place of all else")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         if given.drifting:
             false_alarms(Path(folder), given.seed, given.drifting, with_model=given.model)
+        for with_model in (False, True) if given.limits else ():
+            limits(Path(folder), range(1000 + given.seed, 1000 + given.seed + given.limits), with_model=with_model)
         if given.strange:
             print_strange(Path(folder), 1000 + given.seed)
         counted: Row = collections.Counter()
@@ -67,7 +91,7 @@ def main() -> None:
             counted.update(equipment(Path(folder) / str(seed), 1000 + seed))
         if given.equipment:
             print_equipment(counted)
-    if not (given.drifting or given.equipment or given.strange):
+    if not (given.drifting or given.equipment or given.strange or given.limits):
         findings(given.seed, given.clean)
 
 

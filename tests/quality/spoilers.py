@@ -80,12 +80,12 @@ def begun_elsewhere(recording: Recording, circle: Circle, by_deg: float) -> Reco
 
 
 def turned(recording: Recording, circle: Circle, place: Callable[[np.ndarray], np.ndarray]) -> Recording:
-    """The circle's form as it is at other places of it than where the program should be."""
+    """The circle's form as it is at other places of it than where the program should be; outside, as at the corner beside it."""
     phi = progress(recording, circle)
-    on_arc = (phi > -circle.overshoot_deg) & (phi < 360.0 + circle.overshoot_deg)
-    there = np.interp(np.mod(place(phi), 360.0), *_turn(recording, phi))
-    here = np.interp(np.mod(phi, 360.0), *_turn(recording, phi))
-    return replace(recording, length_mm=recording.length_mm + np.where(on_arc, there - here, 0.0))
+    on_path = np.clip(phi, -circle.overshoot_deg, 360.0 + circle.overshoot_deg)
+    there = np.interp(np.mod(place(on_path), 360.0), *_turn(recording, phi))
+    here = np.interp(np.mod(on_path, 360.0), *_turn(recording, phi))
+    return replace(recording, length_mm=recording.length_mm + there - here)
 
 
 def _turn(recording: Recording, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

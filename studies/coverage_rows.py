@@ -31,7 +31,7 @@ class Row:
         draws: machines or recordings that were drawn.
         values: stated values, of all draws.
         stated: share of the values for which an uncertainty is stated.
-        inside: share of those within 1.96 u of the truth; None where none is stated.
+        inside: share of those within 1.96 u of the truth, or within U = 2 u; None where none is stated.
         error: its standard error, values of one draw taken for one; None likewise.
         u: median stated standard uncertainty; None likewise.
         unit: of it.
@@ -77,7 +77,13 @@ class Row:
 
 
 def row_of(
-    case: str, figure: str, off: NDArray[np.float64], u: NDArray[np.float64], unit: str, reason: str = ""
+    case: str,
+    figure: str,
+    off: NDArray[np.float64],
+    u: NDArray[np.float64],
+    unit: str,
+    reason: str = "",
+    within: float = WITHIN,
 ) -> Row:
     """Return the row of one figure.
 
@@ -88,9 +94,11 @@ def row_of(
         u: stated standard uncertainty, NaN where none is, of the same shape.
         unit: of both.
         reason: why more than 97 % may be inside.
+        within: standard uncertainties to each side of the interval: 2 of a printed U. An interval that reaches to zero has 1.96
+            to that side, and less would cut it off.
     """
     known = np.isfinite(u)
-    inside = np.abs(off) < WITHIN * np.where(known, u, 0.0)
+    inside = np.abs(off) < within * np.where(known, u, 0.0)
     draws, of_draw = len(off), known.sum(axis=1)
     stated = float(known.mean())
     if not known.any():

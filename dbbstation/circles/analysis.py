@@ -13,7 +13,7 @@ from dbbstation.circles.reversals import AXES_DEG, closure_of, harmonics_of, ste
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.trace.analysis import figures
-from dbbstation.trace.cut import edges_of, overlap_feed
+from dbbstation.trace.cut import edges_of, overlap_feed_under
 from dbbstation.trace.loss import lost_samples
 from dbbstation.trace.passes import passes_of
 
@@ -124,7 +124,7 @@ def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter =
         harmonics=harmonics_of(plain),
         closure=closure_of(raw, residual_um, sigma),
         passes=None if recording is None else passes_of(recording, raw.circle),
-        feed_mm_min=None if recording is None else feed_shown(recording, raw.circle),
+        feed_mm_min=None if recording is None else feed_shown(recording, raw.circle, 1e-3 * sigma),
         noise=noise,
         lost=0 if recording is None else lost_samples(recording.t_s),
         residual_um=residual_um,
@@ -161,15 +161,20 @@ def _extremes(deviation_um: NDArray[np.float64]) -> Deviations:
     return Deviations(float(deviation_um.max()), float(deviation_um.min()))
 
 
-def feed_shown(recording: Recording, circle: Circle) -> tuple[float, float] | None:
+def feed_shown(recording: Recording, circle: Circle, noise_mm: float = 0.0) -> tuple[float, float] | None:
     """Return the feed that the overlap shows and its standard uncertainty [mm/min]; None where it shows none.
+
+    Args:
+        recording: with its overlap.
+        circle: as commanded.
+        noise_mm: of a sample, as slow figures see it [mm].
 
     Raises:
         TraceError: feed-in or feed-out is missing.
     """
     if recording.theta_deg is not None:
         return None
-    return overlap_feed(recording, circle, edges_of(recording, circle))
+    return overlap_feed_under(recording, circle, edges_of(recording, circle), noise_mm)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,13 +13,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.harmonics import continuations
+from dbbstation.inference.harmonics import continuations, first_order
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 CORNERS = np.geomspace(1.0, 240.0, 33)
 """Corners of the spectrum that are tried, in undulations, from a memory of a sixth of a turn to none that shows."""
+
+EXPONENTS = np.array([0.5, 0.75, 1.0, 1.25, 1.5])
+"""Exponents of power laws that are tried, 1/f noise among them. Drifts have larger ones, do not close, and are a term of their own."""
+
+SLOWEST = 1e-2
+"""Cycles per turn down to which power laws go on: a session has about a hundred turns, and the bar is on its calibrator before or after.
+The radius under 1/f noise has u by 0.6 of this where they end at a tenth of a cycle, by 1.3 where at a thousandth."""
 
 NOISE_ALONE = 0.5
 """Chance beforehand that a line below 30 undulations is noise alone. A wrong choice is as bad in both directions, hence one half."""
@@ -79,7 +86,7 @@ def continued_noise(below: NDArray[np.float64], above: NDArray[np.float64], free
         freedom: degrees of freedom of each line.
     """
     low = len(below) - 1
-    found = continuations(freedom * above, low, freedom, CORNERS)
+    found = continuations(freedom * above, low, freedom, _processes)
     if found is None:
         white = np.full((1, low + 1), max(float(above.mean()), NOTHING_UM2))
         return ContinuedNoise(white, np.ones(1), np.array([freedom * len(above)]))
@@ -87,7 +94,35 @@ def continued_noise(below: NDArray[np.float64], above: NDArray[np.float64], free
     ratio = np.maximum(below[FIRST_FORM:], NOTHING_UM2) / powers[:, FIRST_FORM:]
     alone = NOISE_ALONE * ratio * np.exp(-np.minimum(ratio, 700.0))  # both as densities of the logarithm of the power
     with_form = (1.0 - NOISE_ALONE) * -np.expm1(-ratio) / (FORM_DECADES * np.log(10.0))
-    likely = found.likely + np.log(alone + with_form + np.finfo(float).tiny).sum(axis=1)
+    likely = found.likely - _ALIKE + np.log(alone + with_form + np.finfo(float).tiny).sum(axis=1)
     weights = np.exp(likely - likely.max())
     least = 2.0 / (freedom * len(above))
     return ContinuedNoise(powers, weights / weights.sum(), 2.0 / np.clip(found.variances, least, 1.0))
+
+
+def _processes(harmonic: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Power of memories and of power laws, shape (corners + exponents, h).
+
+    At lines 0 and 1, which make radius and centre, a power law has what the window of one turn sees of it, its slower part included.
+    """
+    laws = np.maximum(harmonic, 1.0) ** -EXPONENTS[:, None]
+    for line, power in enumerate(_THROUGH_A_TURN):
+        laws[:, harmonic == line] = power[:, None]
+    return np.vstack([first_order(harmonic, CORNERS), laws])
+
+
+def _through_a_turn(line: int) -> NDArray[np.float64]:
+    """Power that laws f^-a from `SLOWEST` on have at a line, shape (exponents,).
+
+    It is the mean of both senses of rotation, each through sinc², the window of one turn [Priestley, Spectral Analysis and Time
+    Series, 1981, sec. 6.2].
+    """
+    cycles = np.concatenate([np.geomspace(SLOWEST, 0.3, 2001)[:-1], np.linspace(0.3, 30.0, 30001)])
+    window = np.sinc(cycles - line) ** 2 + np.sinc(cycles + line) ** 2
+    return np.asarray(np.trapezoid(cycles ** -EXPONENTS[:, None] * window, cycles, axis=1))
+
+
+_THROUGH_A_TURN = (_through_a_turn(0), _through_a_turn(1))
+
+_ALIKE = np.log(np.repeat([len(CORNERS), len(EXPONENTS)], [len(CORNERS), len(EXPONENTS)]))
+"""Both kinds of noise are as likely beforehand, each shared out evenly."""

@@ -51,12 +51,12 @@ def estimate_of(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate | Non
 
 
 _FOUND: WeakKeyDictionary[CircleAnalysis, dict[BudgetQuantity, Estimate]] = WeakKeyDictionary()
-_DRAWN: WeakKeyDictionary[CircleAnalysis, tuple[NDArray[np.float64], DrawnPath]] = WeakKeyDictionary()
+_DRAWN: WeakKeyDictionary[CircleAnalysis, dict[int, tuple[NDArray[np.float64], DrawnPath]]] = WeakKeyDictionary()
 """Worked out once: tables, budgets and tolerances ask for them."""
 
 
 def _estimate(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate:
-    _, drawn = _drawn(one)
+    _, drawn = _drawn(one, OF_A_CIRCLE)
     radius_um, deviation_um = one.radius_error_um, 1e3 * one.path.least_squares.deviation_mm
     match quantity:
         case BudgetQuantity.G:
@@ -103,15 +103,26 @@ def _taken_apart(one: CircleAnalysis) -> FormAndNoise:
     return replace(apart, form_um=apart.form_um + ramp_um)
 
 
-def _drawn(one: CircleAnalysis) -> tuple[NDArray[np.float64], DrawnPath]:
-    """Form by samples, shape (n,) [µm], and drawn noise of a circle: each direction has draws of its own, as both stand beside each other in a pair."""
-    if one not in _DRAWN:
+OF_A_CIRCLE = 2
+"""Lines of the spectrum that the least-squares circle takes: radius and centre, whose noise the deviations from it do not have."""
+
+
+def _drawn(one: CircleAnalysis, taken: int) -> tuple[NDArray[np.float64], DrawnPath]:
+    """Form by samples, shape (n,) [µm], and drawn noise of a circle: each direction has draws of its own, as both stand beside each other in a pair.
+
+    Args:
+        one: the circle.
+        taken: lines of the noise, from 0, that were taken out of the deviations.
+    """
+    known = _DRAWN.setdefault(one, {})
+    if taken not in known:
         apart = _apart(one)
         form_um = _filtered(apart.form_um, one.chosen)
         passed = one.chosen.passed(np.arange(len(form_um) // 2 + 1.0))
+        passed[:taken] = 0.0
         seed = int(one.raw.circle.direction.sign > 0)
-        _DRAWN[one] = form_um, drawn_path(replace(apart, form_um=form_um), one.path.theta_deg, passed, seed)
-    return _DRAWN[one]
+        known[taken] = form_um, drawn_path(replace(apart, form_um=form_um), one.path.theta_deg, passed, seed)
+    return known[taken]
 
 
 def pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate | None:
@@ -138,7 +149,7 @@ def _pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate:
     paths = []
     split = np.split(1e3 * pair.together.least_squares.deviation_mm, [len(pair.one.raw)])
     for one, deviation_um in zip((pair.one, pair.other), split, strict=True):
-        form_um, drawn = _drawn(one)
+        form_um, drawn = _drawn(one, 0)
         # Seen from the circle of both, radius and centre of each are form.
         beside_um = deviation_um - 1e3 * one.path.least_squares.deviation_mm
         paths.append(drawn.with_form(form_um + beside_um))

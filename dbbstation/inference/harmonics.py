@@ -10,13 +10,14 @@ samples resemble each other and the low harmonics then hold more noise than the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import fdtrc
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -307,7 +308,7 @@ def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Sp
         low: highest harmonic that is not among them.
         freedom: degrees of freedom of each sum.
     """
-    found = continuations(squares, low, freedom, CORNERS)
+    found = continuations(squares, low, freedom, partial(first_order, corners=CORNERS))
     if found is None:
         white = float((squares / freedom).mean())
         return Spectrum(np.full(low + 1, white), freedom * len(squares))
@@ -322,12 +323,12 @@ def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Sp
 
 @dataclass(frozen=True, eq=False)
 class Continuations:
-    """Noise in the low harmonics as each corner lets expect it.
+    """Noise in the low harmonics as each process lets expect it.
 
     Attributes:
-        powers: of one orthonormal coefficient at harmonics 0, 1, ... low, shape (corners, low + 1).
-        likely: log likelihood of the harmonics above, less a constant, shape (corners,).
-        variances: of the logarithm of the mean of the powers, shape (corners,).
+        powers: of one orthonormal coefficient at harmonics 0, 1, ... low, shape (processes, low + 1).
+        likely: log likelihood of the harmonics above, less a constant, shape (processes,).
+        variances: of the logarithm of the mean of the powers, shape (processes,).
     """
 
     powers: NDArray[np.float64]
@@ -336,22 +337,25 @@ class Continuations:
 
 
 def continuations(
-    squares: NDArray[np.float64], low: int, freedom: float, corners: NDArray[np.float64]
+    squares: NDArray[np.float64],
+    low: int,
+    freedom: float,
+    processes: Callable[[NDArray[np.float64]], NDArray[np.float64]],
 ) -> Continuations | None:
-    """Continue the spectrum of noise below `low` with each corner; None where it counts as white.
+    """Continue the spectrum of noise below `low` with a floor and each of some processes; None where it counts as white.
 
     Args:
         squares: sums of squares of the coefficients at harmonics low + 1, low + 2, ..., shape (h,).
         low: highest harmonic that is not among them.
         freedom: degrees of freedom of each sum.
-        corners: that are tried, shape (corners,).
+        processes: their power at harmonics of shape (h,), each of a size of its own, shape (processes, h).
     """
     harmonic = np.arange(low + 1.0, low + 1.0 + len(squares))
     mean = squares / freedom
     white = float(mean.mean())
     if not white > 0.0:
         return None
-    seen, below = _shape(harmonic, corners), _shape(np.arange(low + 1.0), corners)
+    seen, below = _on_a_floor(processes(harmonic)), _on_a_floor(processes(np.arange(low + 1.0)))
     heights = _fitted(mean, seen)
     powers, likely, variances = [], [], []
     for height, above, under in zip(heights, seen, below, strict=True):
@@ -367,14 +371,18 @@ def continuations(
     return Continuations(np.array(powers), np.array(likely), np.array(variances))
 
 
-def _shape(harmonic: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Floor and first-order process of unit height, of each corner, shape (corners, 2, h)."""
-    process = 1.0 / (1.0 + (harmonic / corners[:, None]) ** 2)
-    return np.stack([np.ones_like(process), process], axis=1)
+def first_order(harmonic: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Power of first-order processes of unit height, one for each corner, shape (processes, h)."""
+    return np.asarray(1.0 / (1.0 + (harmonic / corners[:, None]) ** 2))
+
+
+def _on_a_floor(power: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A floor and each of the processes, shape (processes, 2, h)."""
+    return np.stack([np.ones_like(power), power], axis=1)
 
 
 def _fitted(mean: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Floor and height, not negative, of greatest likelihood, by reweighted least squares, shape (corners, 2)."""
+    """Floor and height, not negative, of greatest likelihood, by reweighted least squares, shape (processes, 2)."""
     power = np.full((len(shapes), len(mean)), mean.mean())
     for _ in range(_ROUNDS):
         found = _not_negative(shapes / power[:, None, :], mean / power)
@@ -383,13 +391,13 @@ def _fitted(mean: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[n
 
 
 def _not_negative(rows: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Least squares by two columns at a time, none negative, shape (corners, 2).
+    """Least squares by two columns at a time, none negative, shape (processes, 2).
 
     Where the solution has a negative part, the best one lies on an edge: one column alone.
 
     Args:
-        rows: the two columns of each problem, shape (corners, 2, h).
-        values: what they are to sum up to, shape (corners, h).
+        rows: the two columns of each problem, shape (processes, 2, h).
+        values: what they are to sum up to, shape (processes, h).
     """
     normal = np.einsum("cih,cjh->cij", rows, rows)
     right = np.einsum("cih,ch->ci", rows, values)

@@ -293,6 +293,37 @@ def overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float
     Returns:
         None where the overlap cannot tell: too few samples, or a trace too round to show a shift.
     """
+    found = _found_feed(recording, circle, edges)
+    return None if found is None else (found[0], found[1])
+
+
+def overlap_feed_under(
+    recording: Recording, circle: Circle, edges: tuple[float, float], noise_mm: float
+) -> tuple[float, float] | None:
+    """Feed that the overlap shows and its standard uncertainty [mm/min], where the noise of the turn is known.
+
+    What the pieces scatter by says little of noise that remembers the piece before, and the pieces that scatter least by chance would be
+    believed. Noise that was read off the whole turn counts where it makes more.
+
+    Args:
+        recording: with its overlap.
+        circle: as commanded.
+        edges: of the arc, as of `edges_of`.
+        noise_mm: standard deviation of white noise, per sample, that would give slow figures the same uncertainty [mm].
+
+    Returns:
+        None where the overlap cannot tell, as of `overlap_feed`.
+    """
+    found = _found_feed(recording, circle, edges)
+    if found is None:
+        return None
+    feed, u, of_noise = found
+    u = max(u, of_noise * noise_mm)
+    return (feed, u) if u <= TELLING * feed else None
+
+
+def _found_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float, float] | None:
+    """Feed, its standard deviation [mm/min], and what it would be for each millimetre of white noise [1/min]; worked out once."""
     found = _FEEDS.setdefault(recording, {})
     key = (circle, edges)
     if key not in found:
@@ -300,13 +331,15 @@ def overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float
     return found[key]
 
 
-_FEEDS: WeakKeyDictionary[Recording, dict[tuple[Circle, tuple[float, float]], tuple[float, float] | None]] = (
+_FEEDS: WeakKeyDictionary[Recording, dict[tuple[Circle, tuple[float, float]], tuple[float, float, float] | None]] = (
     WeakKeyDictionary()
 )
 """Feeds that overlaps show, which cutting, figures and findings all ask for."""
 
 
-def _overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float] | None:
+def _overlap_feed(
+    recording: Recording, circle: Circle, edges: tuple[float, float]
+) -> tuple[float, float, float] | None:
     turn_s = FULL_TURN_DEG / circle.turning_deg_s
     by_duration_s = (edges[1] - edges[0]) * FULL_TURN_DEG / circle.swept_deg
     middle = (edges[0] + edges[1]) / 2.0
@@ -315,18 +348,24 @@ def _overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, floa
     ]
     if not matches:
         return None
-    turn, sigma_s, _ = min(matches, key=lambda match: match[2])
+    turn, sigma_s, _, of_noise = min(matches, key=lambda match: match[2])
     if sigma_s > TELLING * turn:
         return None
     feed = circle.feed_mm_min * turn_s / turn
-    return feed, feed * sigma_s / turn
+    return feed, feed * sigma_s / turn, feed * of_noise / turn
 
 
-def _match(recording: Recording, circle: Circle, middle: float, start_s: float) -> tuple[float, float, float] | None:
-    """Duration of a turn near `start_s` at which both passes agree, its standard deviation [s] and what is left [mm].
+def _match(
+    recording: Recording, circle: Circle, middle: float, start_s: float
+) -> tuple[float, float, float, float] | None:
+    """Duration of a turn near `start_s` at which both passes agree, and what it is known by.
 
     Where the second pass comes a time T after the first, their difference is offset + slope (T - turn): a regression
     on the slope of the common shape gives what T is off by, and its uncertainty; a few rounds settle it.
+
+    Returns:
+        The duration, its standard deviation [s], what is left [mm], and the standard deviation for each millimetre of white noise
+        [s/mm].
     """
     half_s = circle.overshoot_deg / FULL_TURN_DEG * start_s
     t, length = recording.good.t_s - middle, recording.good.length_mm
@@ -352,7 +391,11 @@ def _match(recording: Recording, circle: Circle, middle: float, start_s: float) 
     left = difference - columns @ np.array([offset, late])
     spread = float(np.sum((slope - slope.mean()) ** 2))
     remaining = float(np.sqrt(left @ left / (PIECES - 2)))
-    return turn, (remaining / np.sqrt(spread) if spread > 0.0 else np.inf), remaining
+    if not spread > 0.0:
+        return turn, np.inf, remaining, np.inf
+    # A piece is a mean of so many differences of two samples.
+    of_noise = float(np.sqrt(2.0 * PIECES / len(when) / spread))
+    return turn, remaining / float(np.sqrt(spread)), remaining, of_noise
 
 
 def _slopes(t_s: NDArray[np.float64], piece: NDArray[np.int64]) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:

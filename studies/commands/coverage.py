@@ -24,14 +24,14 @@ PLANS = {"elevated": "table2-elevated", "level": "table2"}
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
 @click.option(
     "--part",
-    type=click.Choice(["machines", "calibration", "bars", "circles"]),
-    help="Random machines per plan, rows of calibration and prediction, of these with bars that nobody knows or that are warm, or rows "
-    "of circles, only.",
+    type=click.Choice(["machines", "calibration", "bars", "circles", "feed", "noises"]),
+    help="Random machines per plan, rows of calibration and prediction, of these with bars that nobody knows or that are warm, rows "
+    "of circles, of the feed that they show, or of circles under noises of another generator, only.",
 )
 @click.option(
     "--draws",
     type=click.IntRange(min=3),
-    help=f"Draws for each row of a table; {SESSIONS} sessions of calibration, {CIRCLES} circles of each of six noises if not given.",
+    help=f"Draws for each row of a table; {SESSIONS} sessions of calibration, {CIRCLES} circles of each of six noises, or recordings, if not given.",
 )
 @click.option(
     "--keep",
@@ -77,9 +77,9 @@ def coverage(
         found[name] = covered.numbers()
         if not as_json:
             _print(name, found[name])
-    for which in ("calibration", "bars"):
+    for which in ("calibration", "bars", "feed", "noises"):
         if plan is None and part in {None, which}:
-            rows = _calibration(draws or SESSIONS, seed, _file(keep, which), which)
+            rows = _rows(which, draws, seed, _file(keep, which))
             found[which] = [row.plain() for row in rows]
             found["faults"] = [*found.get("faults", []), *(row.fault for row in rows if row.fault)]
             if not as_json:
@@ -104,13 +104,24 @@ def _plans(plan: str | None, part: str | None) -> list[str]:
     return sorted(PLANS) if plan is None else [plan]
 
 
-def _calibration(draws: int, seed: int, keep: Path | None, which: str) -> list[Row]:
+def _rows(which: str, draws: int | None, seed: int, keep: Path | None) -> list[Row]:
+    """Rows of a part that draws sessions, recordings or circles one by one."""
     from dbbstation.cli.progress import progress_bar
     from studies.coverage_calibration import CASES, OF_BARS, coverage_of_calibration
+    from studies.coverage_feed import coverage_of_feed
+    from studies.coverage_noises import coverage_of_noises
+    from tests.plant.other_noise import KINDS
 
-    cases = OF_BARS if which == "bars" else CASES
-    with progress_bar("sessions", draws * len(cases)) as advance:
-        return coverage_of_calibration(cases, range(seed, seed + draws), advance, keep)
+    if which in {"calibration", "bars"}:
+        cases, of = OF_BARS if which == "bars" else CASES, draws or SESSIONS
+        with progress_bar("sessions", of * len(cases)) as advance:
+            return coverage_of_calibration(cases, range(seed, seed + of), advance, keep)
+    of = draws or CIRCLES
+    if which == "feed":
+        with progress_bar("recordings", of) as advance:
+            return coverage_of_feed(of, seed, advance, keep)
+    with progress_bar("circles", of * len(KINDS)) as advance:
+        return coverage_of_noises(of, seed, advance, keep=keep)
 
 
 def _print_rows(rows: list[Row]) -> None:

@@ -81,7 +81,7 @@ def predict(
     known = [f"{axis.upper()} {u:.1f}" for axis, u in by_axis.items() if u is not None]
     unknown = [axis.upper() for axis, u in by_axis.items() if u is None]
     say(
-        f"greatest uncertainty u {', '.join(known) + ' µm; ' if known else ''}"
+        f"{'greatest uncertainty u ' + ', '.join(known) + ' µm; ' if known else ''}"
         f"u of {', '.join(unknown)} is not known: {result.uncertainty_not_known_because}"
     )
     if identified.null_space is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,6 +82,8 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
         for run in repeats_in_order(read.runs)
     ]
     print_table(["run", "started", "mounting", "state", "samples", "why"], rows)
+    for circle, count in _repeated(read):
+        echo(f"{circle} has {count} accepted runs: all of them count")
     echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")
 
 
@@ -309,6 +312,14 @@ def _tell(name: str, run: RunEntry, *, as_json: bool) -> None:
         print_json({"run": name, "state": run.state.value, "reason": run.reason or None})
     else:
         echo(f"{name}: {run.state.value}" + (f" ({run.reason})" if run.reason else ""))
+
+
+def _repeated(read: SessionFolder) -> list[tuple[str, int]]:
+    """Circles with more than one accepted run, and how many."""
+    from dbbstation.files.recordings.entries import RunState
+
+    counted = Counter(f"{run.test} {run.direction}" for run in read.in_state(RunState.ACCEPTED))
+    return [(circle, runs) for circle, runs in counted.items() if runs > 1]
 
 
 def _missing(read: SessionFolder) -> list[tuple[str, str]]:

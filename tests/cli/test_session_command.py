@@ -17,6 +17,7 @@ from dbbstation.files.recordings.entries import RunState, run_entry
 from dbbstation.files.recordings.seal import chained
 from dbbstation.files.recordings.sealing import seal_session, sealing
 from dbbstation.files.recordings.session import read_session
+from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml.schema import validate
 from dbbstation.files.yaml.text import parse_yaml
 from tests.plant.session import record
@@ -55,6 +56,18 @@ def test_a_rejected_run_is_kept_with_its_reason_and_can_be_taken_back(capsys, fo
     assert listed.rstrip().endswith(f"no accepted run: {before.runs[1].test} {before.runs[1].direction}")
     assert run(capsys, "accept", folder, name)[0] == 0
     assert read_session(folder).runs == before.runs
+
+
+def test_a_circle_with_one_accepted_run_is_not_talked_of(capsys):
+    """One of both runs of `a cw` was rejected."""
+    small = shipped_folder("fixtures") / "sessions" / "small"
+    assert "accepted runs" not in run(capsys, "list", small)[1]
+
+
+def test_two_accepted_runs_of_a_circle_are_said(capsys, tmp_path):
+    folder = Path(shutil.copytree(shipped_folder("fixtures") / "sessions" / "small", tmp_path / "small"))
+    assert run(capsys, "accept", folder, "a-cw-1")[0] == 0
+    assert "a cw has 2 accepted runs: all of them count" in run(capsys, "list", folder)[1]
 
 
 def test_the_list_as_json_has_every_run(capsys, folder):

@@ -15,7 +15,15 @@ from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import CHORD_MM, Prefer, Slow, compensate_toolpath
-from dbbstation.nc.kept import TooSlowError, check_chord, check_feed, cost, merged_moves, slower_rapids
+from dbbstation.nc.kept import (
+    MergedMovesError,
+    TooSlowError,
+    check_chord,
+    check_feed,
+    cost,
+    merged_moves,
+    slower_rapids,
+)
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.mark import marked
 from dbbstation.nc.merging import queued
@@ -227,6 +235,7 @@ def compensated_program(
         MachineError: a feed that the machine does not reach.
         StationError: the program is compensated already or for another machine, its corrections are too large, or chord
             and feed cannot both be kept.
+        MergedMovesError: they are, but for short moves that the control makes one in the nominal program.
     """
     machine = inverse.model.machine
     check_nominal(path)
@@ -240,12 +249,19 @@ def compensated_program(
         return replace(path, feed_mm_min=np.minimum(path.feed_mm_min, mm_min))
 
     one = queued(path)
-    if one is None:
+    if one is None or inverse.prefer is Prefer.ACCURACY:
         return _or_the_feed_that_is_kept(written, path, slower, inverse)
-    with suppress(TooSlowError):
+    try:
         return written(path)
-    # The control is faster through the nominal program, whose short moves it makes one: so are they here.
+    except TooSlowError as refused:
+        each_move = refused
+    # The control is faster through the nominal program, whose short moves it makes one.
     path, merged_um = one.path, 1e3 * one.off_mm
+    if inverse.prefer is None:
+        with suppress(TooSlowError):
+            written(path)
+            raise MergedMovesError(each_move, merged_um)
+        raise each_move
     told = merged_moves(merged_um)
     header.append(told)
     done = _or_the_feed_that_is_kept(written, path, slower, inverse)
@@ -285,6 +301,8 @@ def _or_the_feed_that_is_kept(
             raise
         first, reached = refused, math.floor(refused.reached_mm_min)
     for _ in range(MOST_FEEDS):
+        if reached < 1:
+            break
         try:
             written(slower(reached))
         except TooSlowError as refused:

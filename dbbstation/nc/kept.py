@@ -37,13 +37,14 @@ class TooSlowError(StationError):
         self._about = name, slow, asked_um, machine, prefer
         self.reached_mm_min = slow.reached_mm_min
         within = f" within {asked_um:g} µm" if prefer is None else f" with --prefer {prefer.value} either"
-        ways = [f"give F{math.floor(slow.reached_mm_min)} or less"]
+        reached = math.floor(slow.reached_mm_min)
+        ways = [f"give F{reached} or less"] if reached >= 1 else []
         if prefer is None and not math.isnan(slow.chord_um) and slow.chord_um > asked_um:
             ways.append(f"--chord-um {up(slow.chord_um / 0.95)}")
         ways.append(CHOICES if prefer is None else f"--prefer {Prefer.ACCURACY.value}")
         super().__init__(
-            f"F{slow.asked_mm_min:g} cannot be kept{within}: the control reaches F{math.floor(slow.reached_mm_min)} here, with "
-            f"{said_acceleration(machine)}",
+            f"F{slow.asked_mm_min:g} cannot be kept{within}: the control reaches {f'F{reached}' if reached >= 1 else 'no F'} here, "
+            f"with {said_acceleration(machine)}",
             where=where(name, slow.line),
             remedy=", or ".join(ways),
         )
@@ -52,6 +53,24 @@ class TooSlowError(StationError):
         """The same with another feed that is reached [mm/min]."""
         name, slow, asked_um, machine, prefer = self._about
         return TooSlowError(name, replace(slow, reached_mm_min=mm_min), asked_um, machine, prefer)
+
+
+class MergedMovesError(StationError):
+    """The feed is kept in each move, and the control is faster through the nominal program, whose short moves it makes one.
+
+    Args:
+        refused: without making them one.
+        merged_um: distance of points that are left out from the lines in their place [µm].
+    """
+
+    def __init__(self, refused: TooSlowError, merged_um: float) -> None:
+        super().__init__(
+            f"the control makes short moves of this program one, within {up(merged_um)} µm (G64 P Q; P without Q), and is slower "
+            "through each of them",
+            where=refused.where,
+            remedy=f"write Q0 behind P to have each of them, --prefer {Prefer.ACCURACY.value} has each and takes longer, "
+            f"--prefer {Prefer.FEED.value} and {Prefer.POSITION_ONLY.value} make them one as well",
+        )
 
 
 def check_chord(

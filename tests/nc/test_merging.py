@@ -11,6 +11,7 @@ import pytest
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse, compensated_program
+from dbbstation.nc.kept import MergedMovesError
 from dbbstation.nc.merging import MOST_POINTS, queued
 from dbbstation.nc.planner import LookAhead, Planner
 from dbbstation.nc.rs274.reader import read_program
@@ -152,6 +153,17 @@ def test_lines_are_merged_where_the_control_would_be_faster_otherwise(control, m
     else:
         assert done.merged_um is None
         assert done.points >= 400
+
+
+def test_by_itself_no_point_of_a_program_is_left_out(linuxcnc, crooked):
+    """It is refused with what to do, and --prefer accuracy goes through all 400 points."""
+    model = MachineModel(replace(crooked.machine, acceleration_mm_s2=1000.0), crooked.sources)
+    path = path_of("F300\nG64 P0.25", HILLS)
+    with pytest.raises(MergedMovesError, match=r"write Q0 behind P .* --prefer accuracy"):
+        compensated_program(path, linuxcnc, Inverse(model))
+    each = compensated_program(path, linuxcnc, Inverse(model, prefer=Prefer.ACCURACY))
+    assert each.points >= 400
+    assert each.merged_um is None
 
 
 def farthest_um(path) -> float:

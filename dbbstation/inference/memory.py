@@ -37,9 +37,9 @@ LONGEST_DELAY_SHARE = 0.1
 MOST_STARTS = 5
 """Runs that have a start each. Of more, all are taken to begin alike: a law has no more columns than it has use for."""
 
-LATE, WAYS_TO_BE_LATE = 0.15, 3
-"""Probability that an effect that follows a variable does so late enough to be seen, and the ways in which it may, as probable as each
-other: a lag, a dead time, a wide play. A linear effect over what changes slowly is as late as one likes, and is called linear."""
+LATE = 0.1
+"""Probability that an effect that follows a variable does so late enough to be seen, by either of both ways: a linear effect over what
+changes slowly is as late as one likes, and is called linear."""
 
 AT_ONCE = 0.5
 """Probability that the simulation has the effect, but at once: then the memory shows as what comes late less what comes at once."""
@@ -78,7 +78,7 @@ def memory_laws(
     for family, parameter, columns, grid in kinds:
         for variable in usable if grid else ():
             gain = size / variable.half_range
-            starts = starts_of(blocks) if family is Family.MEMORY else 0
+            starts = _starts(blocks) if family is Family.MEMORY else 0
             found.append(
                 Law(
                     name=f"{family} of {variable.name}",
@@ -91,7 +91,7 @@ def memory_laws(
                         time_unit,
                     ),
                     grids=(grid,),
-                    log_odds=late_odds(len(usable)),
+                    log_odds=log_odds(len(usable)) + float(np.log(LATE / len(kinds))),
                     choices=_choices(2 + starts),
                     reach=size,
                     family=family,
@@ -99,11 +99,6 @@ def memory_laws(
                 )
             )
     return found
-
-
-def late_odds(members: int) -> float:
-    """Log prior odds of one late effect among so many of its family."""
-    return log_odds(members) + float(np.log(LATE / WAYS_TO_BE_LATE))
 
 
 def _choices(width: int) -> tuple[tuple[tuple[int, ...], float, str], ...]:
@@ -123,23 +118,18 @@ def _lag(
     variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], point: tuple[float, ...]
 ) -> NDArray[np.float64]:
     """Late value, late less present value, and what fades from the start of each block, shape (n, 2 + starts)."""
-    found = np.zeros((len(time), 2 + starts_of(blocks)))
+    starts = _starts(blocks)
+    found = np.zeros((len(time), 2 + starts))
     for k, rows in enumerate(blocks):
         values, at = variable.travel(rows), time[rows]
         found[rows, 1] = lagging(values, at, point[0])
         found[rows, 0] = values - _middle(variable) + found[rows, 1]
-        found[rows, 2 + start_of(k, blocks)] = np.exp(-(at - at[0]) / point[0])
+        found[rows, 2 + (k if starts > 1 else 0)] = np.exp(-(at - at[0]) / point[0])
     return found
 
 
-def starts_of(blocks: Sequence[slice]) -> int:
-    """How many starts a law of these runs has."""
+def _starts(blocks: Sequence[slice]) -> int:
     return len(blocks) if len(blocks) <= MOST_STARTS else 1
-
-
-def start_of(block: int, blocks: Sequence[slice]) -> int:
-    """Number of the start that a run has."""
-    return block if starts_of(blocks) > 1 else 0
 
 
 def _delay(

@@ -46,7 +46,6 @@ class Family(StrEnum):
     ONCE = "once per turn"
     TWICE = "twice per turn"
     HYSTERESIS = "hysteresis"
-    PLAY = "play"
     SPEED = "speed"
     LAG = "lag"
     MEMORY = "memory"

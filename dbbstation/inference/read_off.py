@@ -33,9 +33,6 @@ if TYPE_CHECKING:
 LATE = (Family.MEMORY, Family.DEAD_TIME)
 """Families of what follows a variable late."""
 
-SLOWER = {Family.LINEAR: LATE, Family.HYSTERESIS: (Family.PLAY,)}
-"""Families of which one is the other, late."""
-
 HALF = 0.5
 """Share of its largest value from which on an effect counts as being there, for the spans over which it is."""
 
@@ -268,8 +265,8 @@ class _Judge:
     def _pooled(self, name: str) -> tuple[str, ...]:
         """A cause and its class, and what would be the same to its user.
 
-        Of stretches of time that are other choices of stretches, which begin or end elsewhere; of what is in proportion to a variable, or
-        turns with it, the same so late that these rows do not tell it.
+        Of stretches of time that are other choices of stretches, which begin or end elsewhere; of what is in proportion to a variable,
+        the same with a delay too short to be seen.
         """
         equal = self._classes.get(name, (name,))
         kind = self._kinds.get(name)
@@ -277,8 +274,8 @@ class _Judge:
             return equal
         if kind[0] in IN_TIME:
             same = [n for n, other in self._kinds.items() if other[0] is kind[0]]
-        elif kind[0] in SLOWER:
-            same = [n for n, other in self._kinds.items() if other[0] in SLOWER[kind[0]] and other[1] == kind[1]]
+        elif kind[0] is Family.LINEAR:
+            same = [n for n, other in self._kinds.items() if other[0] in LATE and other[1] == kind[1]]
         else:
             return equal
         return (*equal, *(n for n in same if n not in equal and n not in self._members))

@@ -9,7 +9,6 @@ import numpy as np
 
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.memory import memory_laws
-from dbbstation.inference.play import play_laws
 from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
@@ -104,7 +103,6 @@ class Table:
         laws = [self._law(source) for source in sources]
         if time is not None and (size := float(np.std(residual))) > 0.0:
             laws += memory_laws(follows, time, time_unit, self.blocks, size, self.unit)
-            laws += play_laws(follows, self.blocks, size, self.unit)
         return Channel(
             residual=residual,
             unit=self.unit,

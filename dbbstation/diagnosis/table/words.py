@@ -18,7 +18,6 @@ MEANINGS: dict[Family, str] = {
     Family.ONCE: "It closes once per turn: something is off centre, or an axis is tilted.",
     Family.TWICE: "It closes twice per turn: something is oval, or an axis wobbles.",
     Family.HYSTERESIS: "It turns its sign with the direction of travel: play or friction.",
-    Family.PLAY: "It crosses a gap after each reversal: play, or friction behind something elastic.",
     Family.SPEED: "It grows with the speed: viscous friction, or a delay of this variable.",
     Family.LAG: "The measured value runs after the simulated one (negative: ahead of it).",
     Family.MEMORY: "It follows this variable late: a body warms up, a material creeps, a sensor or a filter lags.",

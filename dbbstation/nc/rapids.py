@@ -32,7 +32,8 @@ SAME_WAY = 1e-6
 
 
 def go_on(toolpath: Toolpath) -> NDArray[np.bool_]:
-    """Rapids that the next row goes on with in the same direction and coordinate system, without a word between them, shape (n,).
+    """Rapids that the next row goes on with in the same direction, coordinate system and path control, without a word between them,
+    shape (n,).
 
     LinuxCNC runs such rapids as one, and would stop between them where A, B and C are corrected.
     """
@@ -41,6 +42,8 @@ def go_on(toolpath: Toolpath) -> NDArray[np.bool_]:
     unit = way / np.where(plain, toolpath.tip_mm, 1.0)[:, None]
     same = np.linalg.norm(unit[1:] - unit[:-1], axis=1) <= SAME_WAY
     same &= (toolpath.system[1:] == toolpath.system[:-1]) & (toolpath.frame[1:] == toolpath.frame[:-1]).all(axis=1)
+    corner = np.where(np.isnan(toolpath.corners_mm), -1.0, toolpath.corners_mm)  # NaN is no other than NaN
+    same &= corner[1:] == corner[:-1]
     goes_on = np.append(plain[1:] & plain[:-1] & same, False)[: len(plain)]
     goes_on[list(toolpath.text)] = False
     return goes_on

@@ -171,7 +171,7 @@ MERGED = {
 
 @pytest.mark.parametrize("name", MERGED)
 def test_short_moves_are_merged_as_reckoned(name, linuxcnc):
-    """The lines that LinuxCNC runs are those that are reckoned to be queued, and take that time within ten servo cycles.
+    """The lines that LinuxCNC runs are those that are reckoned to be queued, and take that time within fifteen servo cycles, on a busy computer too.
 
     Not merged they would take 8 to 28 ms longer, but for the zigzag at that.
     """
@@ -183,7 +183,7 @@ def test_short_moves_are_merged_as_reckoned(name, linuxcnc):
     moves = np.append(np.any(np.diff(ran.poses, axis=0) != 0.0, axis=1), False)
     assert set(ran.line[moves]) - {0} == set(one.path.line[one.path.kind == RowKind.FEED])
     reckoned_s = Planner(1000.0, linuxcnc.look_ahead).seconds(path).sum()
-    assert abs(feed_s(ran, path) - reckoned_s) < 10 * PERIOD_NS / 1e9
+    assert abs(feed_s(ran, path) - reckoned_s) < 15 * PERIOD_NS / 1e9
 
 
 @pytest.mark.slow

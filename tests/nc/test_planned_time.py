@@ -250,13 +250,13 @@ def test_rapids_go_on_as_they_did(control, linuxcnc, crooked):
 
 
 def test_rapids_in_one_direction_are_one(linuxcnc, crooked):
-    """Up, up again and over: the middle of the way up has no line. One with a word between them stays two."""
+    """Up, up again and over: the middle of the way up has no line. One with a word or another path control between them stays two."""
     up = "G21 G90 G94\nG64 P0.05\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X5 F600\nG0 Z-990\n{between}G0 Z-960\nG0 Z-960 X30\nM2\n"
     counts = []
-    for between in ("", "M8\n"):
+    for between in ("", "M8\n", "G64\n"):
         done = compensated_program(linuxcnc.read(up.format(between=between), "up.ngc"), linuxcnc, Inverse(crooked)).text
         counts.append(sum(line.startswith("G0 ") for line in done.splitlines()))
-    assert counts == [3, 4]
+    assert counts == [3, 4, 4]
 
 
 @pytest.mark.parametrize(("control", "said"), [("G64 P0.05", False), ("G64", True)])

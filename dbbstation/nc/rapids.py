@@ -32,8 +32,7 @@ SAME_WAY = 1e-6
 
 
 def go_on(toolpath: Toolpath) -> NDArray[np.bool_]:
-    """Rapids that the next row goes on with in the same direction, coordinate system and path control, without a word between them,
-    shape (n,).
+    """Rapids that the next row goes on with, in the same direction, work system and path control, no word between, shape (n,).
 
     LinuxCNC runs such rapids as one, and would stop between them where A, B and C are corrected.
     """

@@ -228,18 +228,15 @@ TRANSITS = (0.003, 0.01, 0.03, 0.1)
 """Ways after a reversal over which hysteresis turns to its other side, in shares of the range."""
 
 
-def play(
-    values: NDArray[np.float64], blocks: Sequence[slice], width: float, begins: float = 0.0
-) -> NDArray[np.float64]:
+def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> NDArray[np.float64]:
     """Where a thing is within a play, from -1 to 1, as it is pushed to and fro, shape (n,).
 
     [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]
 
     Args:
         values: where it is pushed to.
-        blocks: rows of each.
+        blocks: rows of each; each begins in the middle.
         width: of the play, in the unit of the values.
-        begins: where it is in the first row of each block, from -1 to 1.
     """
     found = np.empty(len(values))
     for rows in blocks:
@@ -247,7 +244,7 @@ def play(
         rises = np.diff(own) >= 0.0
         turns = np.concatenate([[0], np.flatnonzero(rises[1:] != rises[:-1]) + 1])
         # From one turn to the next it goes one way, and where it began tells where it is.
-        there, last = [begins], begins
+        there, last = [0.0], 0.0
         for change in np.diff(own[turns]).tolist():
             last = min(max(last + 2.0 * change / width, -1.0), 1.0)
             there.append(last)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -258,10 +257,11 @@ def compensated_program(
     # The control is faster through the nominal program, whose short moves it makes one.
     path, merged_um = one.path, 1e3 * one.off_mm
     if inverse.prefer is None:
-        with suppress(TooSlowError):
+        try:
             written(path)
-            raise MergedMovesError(each_move, merged_um)
-        raise each_move
+        except TooSlowError:
+            raise each_move from None
+        raise MergedMovesError(each_move, merged_um)
     told = merged_moves(merged_um)
     header.append(told)
     done = _or_the_feed_that_is_kept(written, path, slower, inverse)

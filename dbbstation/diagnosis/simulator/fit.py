@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from dbbstation.diagnosis.simulator.terms import IN_PLACE
-from dbbstation.diagnosis.simulator.work import FittedState, PerturbedParameter
+from dbbstation.diagnosis.simulator.work import AGREE, FittedState, PerturbedParameter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -150,10 +150,23 @@ def _from(
         state = start.with_numbers(numbers)
         return _weighed(work, state, residual(numbers), weigh, sigma)
 
+    # Answers are asked for anew only where those that are there do not say what the last steps did.
+    about: list[
+        tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+    ] = []  # numbers, rows and columns there
+
     def columns(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows = weighed(numbers)
+        if about:
+            before, rows_before, there = about[-1]
+            said = there @ (numbers - before)
+            if _norm(rows - rows_before - said) < AGREE * _norm(said):
+                return there
         state = start.with_numbers(numbers)
         found = work.answers(state, directions_of(work, state), _rms(residual(numbers)))
-        return np.vstack([-weigh(found.columns) / sigma, _known(work.model.parameters, len(numbers))[0]])
+        there = np.vstack([-weigh(found.columns) / sigma, _known(work.model.parameters, len(numbers))[0]])
+        about[:] = [(numbers.copy(), rows, there)]
+        return there
 
     inside = np.clip(start.numbers, low, high)
     ended = least_squares(
@@ -285,6 +298,10 @@ def not_told_apart(names: Sequence[str], columns: NDArray[np.float64]) -> list[t
                     (name, tuple(names[others[j]] for j in np.argsort(-doing) if doing[j] > 0.1 * doing.max()))
                 )
     return found
+
+
+def _norm(values: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(values))
 
 
 def _rms(values: NDArray[np.float64]) -> float:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from bisect import bisect_left
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import cos, exp, expm1, pi, sin, sqrt
-from typing import TYPE_CHECKING
+from math import cos, expm1, pi, sin, sqrt
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -122,23 +122,43 @@ def _momentary(term: Term) -> Evaluate:
     if term.form is TermForm.PERIODIC:
         b, turns = term.amplitudes[1], 2.0 * pi * term.fixed[1] / term.fixed[0]
         return lambda _t, signals: a * cos(turns * signals[x]) + b * sin(turns * signals[x])
-    of = _plain(term)
-    return lambda _t, signals: a * of(signals[x])
+    return _of_one_signal(term.form, x, a, term.shape[0] if term.shape else 0.0)
 
 
-def _plain(term: Term) -> Callable[[float], float]:
-    """Function of one signal that the amplitude is a factor of."""
-    place = term.shape[0] if term.shape else 0.0
+def _of_one_signal(form: TermForm, x: str, a: float, place: float) -> Evaluate:
+    """Evaluate a times a function of one signal; each is one call, since a simulation asks some ten times per row."""
     rounding = place * place
-    return {
-        TermForm.LINEAR: lambda x: x,
-        TermForm.SQUARE: lambda x: x * x,
-        TermForm.DRAG: lambda x: x * abs(x),
-        TermForm.CUBIC: lambda x: x * x * x,
-        TermForm.SIGN: lambda x: x / sqrt(x * x + rounding),
-        TermForm.HINGE: lambda x: max(x - place, 0.0),
-        TermForm.LIMIT: lambda x: min(max(x, -place), place),
-    }[term.form]
+
+    def square(_t: float, signals: Mapping[str, float]) -> float:
+        value = signals[x]
+        return a * (value * value)
+
+    def drag(_t: float, signals: Mapping[str, float]) -> float:
+        value = signals[x]
+        return a * (value * abs(value))
+
+    def cubic(_t: float, signals: Mapping[str, float]) -> float:
+        value = signals[x]
+        return a * (value * value * value)
+
+    def sign(_t: float, signals: Mapping[str, float]) -> float:
+        value = signals[x]
+        return a * (value / sqrt(value * value + rounding))
+
+    def limited(_t: float, signals: Mapping[str, float]) -> float:
+        value = signals[x]
+        return a * (place if value > place else max(value, -place))
+
+    of: dict[TermForm, Evaluate] = {
+        TermForm.LINEAR: lambda _t, signals: a * signals[x],
+        TermForm.SQUARE: square,
+        TermForm.DRAG: drag,
+        TermForm.CUBIC: cubic,
+        TermForm.SIGN: sign,
+        TermForm.HINGE: lambda _t, signals: a * max(signals[x] - place, 0.0),
+        TermForm.LIMIT: limited,
+    }
+    return of[form]
 
 
 def _own(term: Term) -> Evaluate:
@@ -156,11 +176,15 @@ def _curve(term: Term) -> Evaluate:
     values = BSpline(knots, bends(term.fixed) @ np.array(term.amplitudes), DEGREE)(places).tolist()
     low, per = float(knots[0]), (TABLE - 1) / float(knots[-1] - knots[0])
 
+    last = float(TABLE - 1)
+
     def value(_t: float, signals: Mapping[str, float]) -> float:
         at = (signals[x] - low) * per
-        k = min(max(int(at), 0), TABLE - 2)
-        share = min(max(at - k, 0.0), 1.0)
-        return float(values[k] + share * (values[k + 1] - values[k]))
+        if 0.0 <= at < last:
+            k = int(at)
+            here: float = values[k]
+            return here + (at - k) * (values[k + 1] - here)
+        return values[0] if at < 0.0 else values[-1]
 
     return value
 
@@ -184,70 +208,79 @@ def bends(knots: Sequence[float]) -> NDArray[np.float64]:
 
 
 def _remembering(term: Term) -> Evaluate:
-    """Evaluate a term with a memory: times and states so far, those at or behind the time asked for dropped first."""
+    """Evaluate a term with a memory: what was at or behind the time asked for is dropped first, since solvers take steps back."""
     x, a = term.signals[0], term.amplitudes[0]
-    step, out = _delayed(a) if term.form is TermForm.DELAY else _STEPS[term.form](a, term.shape)
+    if term.form is TermForm.DELAY:
+        return _delayed(x, a)
+    step, gain, of_signal = _STEPS[term.form](a, term.shape)
+    past: list[tuple[float, float, float]] = []  # time, signal and state
+
+    def value(t: float, signals: Mapping[str, float]) -> float:
+        while past and past[-1][0] >= t:
+            past.pop()
+        now = signals[x]
+        state = step(past[-1], t, now) if past else 0.0
+        past.append((t, now, state))
+        return gain * state + of_signal * now
+
+    return value
+
+
+Step: TypeAlias = "Callable[[tuple[float, float, float], float, float], float]"
+"""State from time, signal and state of the call before, a time and the signal there."""
+
+
+def _lagging(constant: float) -> Step:
+    """How far a first-order lag is behind [triangle-hold equivalent, as `inference.memory.lagging`]; it begins settled."""
+    if constant <= 0.0:
+        return lambda _past, _t, _now: 0.0
+
+    def step(past: tuple[float, float, float], t: float, now: float) -> float:
+        before_t, before, behind = past
+        rate = (t - before_t) / constant
+        grown = expm1(-rate)
+        return behind * (1.0 + grown) + (now - before) * grown / rate
+
+    return step
+
+
+def _playing(half: float) -> Step:
+    """Output of a play less its input; it begins in the middle."""
+
+    def step(past: tuple[float, float, float], _t: float, now: float) -> float:
+        apart = past[2] + past[1] - now
+        return half if apart > half else max(apart, -half)
+
+    return step
+
+
+def _delayed(x: str, dead: float) -> Evaluate:
+    """Signal a while ago, less what it is."""
     times: list[float] = []
-    past: list[tuple[float, float]] = []  # signal and state
+    past: list[float] = []
 
     def value(t: float, signals: Mapping[str, float]) -> float:
         while times and times[-1] >= t:
             times.pop()
             past.pop()
-        now = float(signals[x])
-        state = step(times, past, t, now)
+        now, ago = float(signals[x]), t - dead
+        late = now if not times or dead <= 0.0 else past[0]
+        if times and dead > 0.0 and ago > times[0]:
+            k = bisect_left(times, ago)
+            t1, x1 = (t, now) if k == len(times) else (times[k], past[k])
+            t0, x0 = times[k - 1], past[k - 1]
+            late = x0 + (x1 - x0) * (ago - t0) / (t1 - t0)
         times.append(t)
-        past.append((now, state))
-        return out(now, state)
+        past.append(now)
+        return late - now
 
     return value
 
 
-def _lagging(constant: float) -> Callable[[list[float], list[tuple[float, float]], float, float], float]:
-    """How far a first-order lag is behind [triangle-hold equivalent, as `inference.memory.lagging`]; it begins settled."""
-
-    def step(times: list[float], past: list[tuple[float, float]], t: float, now: float) -> float:
-        if not times or constant <= 0.0:
-            return 0.0
-        before, behind = past[-1]
-        rate = (t - times[-1]) / constant
-        return behind * exp(-rate) + (now - before) * expm1(-rate) / rate
-
-    return step
-
-
-def _playing(half: float) -> Callable[[list[float], list[tuple[float, float]], float, float], float]:
-    """Output of a play less its input; it begins in the middle."""
-
-    def step(times: list[float], past: list[tuple[float, float]], _t: float, now: float) -> float:
-        if not times:
-            return 0.0
-        before, apart = past[-1]
-        return min(max(apart + before - now, -half), half)
-
-    return step
-
-
-def _delayed(dead: float) -> tuple[Callable[..., float], Callable[[float, float], float]]:
-    def step(times: list[float], past: list[tuple[float, float]], t: float, now: float) -> float:
-        ago = t - dead
-        if not times or dead <= 0.0:
-            return now
-        if ago <= times[0]:
-            return past[0][0]
-        k = bisect_left(times, ago)
-        t1, x1 = (t, now) if k == len(times) else (times[k], past[k][0])
-        t0, x0 = times[k - 1], past[k - 1][0]
-        return x0 + (x1 - x0) * (ago - t0) / (t1 - t0)
-
-    return step, lambda now, late: late - now
-
-
-_STEPS: Mapping[
-    TermForm, Callable[[float, tuple[float, ...]], tuple[Callable[..., float], Callable[[float, float], float]]]
-] = {
-    TermForm.MEMORY: lambda a, shape: (_lagging(shape[0]), lambda now, behind: a * (now + behind)),
-    TermForm.LAG: lambda a, _: (_lagging(a), lambda _now, behind: behind),
-    TermForm.PLAY: lambda a, _: (_playing(a), lambda _now, apart: apart),
-    TermForm.SLIP: lambda a, shape: (_playing(shape[0]), lambda _now, apart: -a * apart / shape[0]),
+_STEPS: Mapping[TermForm, Callable[[float, tuple[float, ...]], tuple[Step, float, float]]] = {
+    TermForm.MEMORY: lambda a, shape: (_lagging(shape[0]), a, a),
+    TermForm.LAG: lambda a, _: (_lagging(a), 1.0, 0.0),
+    TermForm.PLAY: lambda a, _: (_playing(a), 1.0, 0.0),
+    TermForm.SLIP: lambda a, shape: (_playing(shape[0]), -a / shape[0], 0.0),
 }
+"""What goes on from call to call, the factor of its state, and that of the signal, by form."""

@@ -1,6 +1,7 @@
-"""An FMU as a simulator: one that the test compiles, with a concealed effect, end to end."""
+"""An FMU as a simulator, of FMI 2 and of FMI 3: the test compiles both; with a concealed effect, end to end."""
 
 import json
+import re
 import shutil
 import subprocess
 import zipfile
@@ -23,7 +24,7 @@ if shutil.which("gcc") is None:
     pytest.skip("no gcc to compile an FMU", allow_module_level=True)
 
 HERE = Path(__file__).parent
-DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+DESCRIPTION_2 = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="tank" guid="{tank}">
   <CoSimulation modelIdentifier="tank" canHandleVariableCommunicationStepSize="true"/>
   <ModelVariables>
@@ -35,21 +36,46 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
   <ModelStructure><Outputs><Unknown index="4"/></Outputs></ModelStructure>
 </fmiModelDescription>
 """
+DESCRIPTION_3 = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="tank" instantiationToken="{tank}">
+  <CoSimulation modelIdentifier="tank" canHandleVariableCommunicationStepSize="true"/>
+  <ModelVariables>
+    <Float64 name="time" valueReference="9" causality="independent" variability="continuous"/>
+    <Float64 name="rate" valueReference="0" causality="parameter" variability="tunable" start="0.4"/>
+    <Float64 name="inflow" valueReference="1" causality="input" start="0"/>
+    <Float64 name="flow" valueReference="2" causality="input" start="0"/>
+    <Float64 name="level" valueReference="3" causality="output"/>
+  </ModelVariables>
+  <ModelStructure><Output valueReference="3"/></ModelStructure>
+</fmiModelDescription>
+"""
+# Of each version of FMI: description, source, and where the standard has its library.
+VERSIONS = {
+    "FMI 2": (DESCRIPTION_2, "tank.c", "binaries/linux64/tank.so"),
+    "FMI 3": (DESCRIPTION_3, "tank3.c", "binaries/x86_64-linux/tank.so"),
+}
 T = 0.25 * np.arange(160)
 
 
-@pytest.fixture(scope="module")
-def fmu(tmp_path_factory):
+@pytest.fixture(scope="module", params=VERSIONS)
+def fmu(request, tmp_path_factory):
+    description, source, place = VERSIONS[request.param]
     folder = tmp_path_factory.mktemp("fmu")
     library = folder / "tank.so"
     headers = Path(fmpy.__file__).parent / "c-code"
+    # FMPy asks for every function of FMI 3, also for those that no tank needs.
+    named = set(re.findall(r"\bfmi3\w+", (HERE / source).read_text()))
+    every = re.findall(r"FMI3_Export fmi3\w+TYPE +(fmi3\w+);", (headers / "fmi3Functions.h").read_text())
+    (folder / "others.c").write_text(
+        "".join(f"int {name}(void) {{ return 3; }}\n" for name in every if name not in named)
+    )
     subprocess.run(
-        ["gcc", "-shared", "-fPIC", "-O1", f"-I{headers}", HERE / "tank.c", "-o", library, "-lm"],  # noqa: S607 - the compiler on the PATH
+        ["gcc", "-shared", "-fPIC", "-O1", f"-I{headers}", HERE / source, folder / "others.c", "-o", library, "-lm"],  # noqa: S607 - the compiler on the PATH
         check=True,
     )
     with zipfile.ZipFile(folder / "tank.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", DESCRIPTION)
-        archive.write(library, "binaries/linux64/tank.so")
+        archive.writestr("modelDescription.xml", description)
+        archive.write(library, place)
     return folder / "tank.fmu"
 
 

@@ -132,11 +132,12 @@ def _at(port: SimulatorPort, signals: Mapping[str, NDArray[np.float64]], span: t
                 found.append(_candidate(port, form, (name,), ("coefficient",), (_per(port.unit, unit, power),)))
         places, longest = np.quantile(values, np.linspace(0.0, 1.0, LENGTHS + 2)[1:-1]), span[1] / 3.0
         found.append(_candidate(port, TermForm.CURVE, (name,), *_curve(port, values)))
-        found.append(
-            _candidate(
-                port, TermForm.HINGE, (name,), ("slope", "place"), (_per(port.unit, unit), unit), grid=tuple(places)
-            )
+        hinge = _candidate(
+            port, TermForm.HINGE, (name,), ("slope", "place"), (_per(port.unit, unit), unit), grid=tuple(places)
         )
+        # Beyond what the signal reached a hinge does nothing, and its numbers could be anything.
+        reached = (float(values.min()), float(values.max()))
+        found.append(replace(hinge, term=replace(hinge.term, bounds=(reached,))))
         constants = tuple(np.geomspace(2.0 * span[0], max(longest, 4.0 * span[0]), LENGTHS).tolist())
         found.append(
             _candidate(

@@ -236,6 +236,12 @@ def _check_one(file: Path, known: Mapping[str, ErrorSource]) -> Checked:
 
     document = load_yaml(file, []) if file.suffix in {".yaml", ".yml"} else None
     given = str(document.data.get("format", "")) if document is not None and isinstance(document.data, dict) else ""
+    if given.startswith("dbb-job/"):
+        from dbbstation.service.operated import instrument_faults
+
+        checked = check(file, known)
+        checked.problems += [] if checked.problems else instrument_faults(file)
+        return checked
     if not given.startswith("dbb-instrument/"):
         return check(file, known)
     from dbbstation.instrument.library import load_variants

@@ -24,6 +24,7 @@ from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import SessionOptions, require_bar, session_options
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
+from dbbstation.files.formats.virtual_port import FASTEST, SLOWEST, virtual_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,7 +54,7 @@ _DEMO_SEED = 3
 @click.option("--virtual", is_flag=True, help="Use a virtual machine and instrument.")
 @click.option(
     "--time-scale",
-    type=Finite(0.01, 50.0),
+    type=Finite(SLOWEST, FASTEST),
     default=1.0,
     show_default=True,
     help="Factor by which the virtual machine runs faster than real time, with --virtual.",
@@ -156,7 +157,7 @@ def station(
             range_mm=protocol.length.range_mm,
             model=judging_model(model_file, source_files),
             instrument=ReadBy(
-                protocol.name, profile or "", _virtual_port(time_scale) if virtual else str(port), virtual
+                protocol.name, profile or "", virtual_port(time_scale) if virtual else str(port), virtual
             ),
         )
         job.check(str(plan_file))
@@ -204,12 +205,6 @@ def _check_options(
         raise click.UsageError(f"missing {', '.join(missing)}; or --virtual, to try it without hardware")
     if not virtual and time_scale != 1.0:
         raise click.UsageError("--time-scale goes with --virtual: real machines take their time")
-
-
-def _virtual_port(time_scale: float) -> str:
-    """What stands where a real session has the name of a port."""
-    usual = "virtual machine"
-    return usual if time_scale == 1.0 else f"{usual}, {time_scale:g} times faster"
 
 
 def _check_terminal() -> None:

@@ -111,7 +111,7 @@ class Front:
         plan = next(
             path for path in candidates(CandidateFormat.PLAN, self.under) if path.name == "ten-minute-check.yaml"
         )
-        line = Line(instrument=USUAL_VIRTUAL, port=list(VIRTUAL)[-1])
+        line = Line(instrument=USUAL_VIRTUAL, port=VIRTUAL[-1])
         said = {name: getattr(self.given, name) for name in ("operator", "serial_number", "job", "order", "gate")}
         return Choice(self.new_folder("virtual"), machine, plan, line, **said)
 

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dbbstation.errors import OutputError
 from dbbstation.files.atomic import write_text
+from dbbstation.files.formats.virtual_port import time_scale_of, virtual_port
 from dbbstation.files.gateway import content_of
 
 FILE = "station.json"
@@ -32,7 +33,7 @@ class Line(BaseModel):
     profile: str = ""
     """Variant of the instrument; empty: the usual one."""
     port: str = ""
-    """Name or URL of the port; one of `VIRTUAL`: a virtual machine in this program."""
+    """Name or URL of the port; or that of a virtual machine in this program."""
     baud: int | None = None
     """Baud rate where it is not the usual one."""
     zero_mm: float | None = None
@@ -41,16 +42,16 @@ class Line(BaseModel):
     @property
     def virtual(self) -> bool:
         """Whether machine and instrument are virtual."""
-        return self.port in VIRTUAL
+        return time_scale_of(self.port) is not None
 
     @property
     def time_scale(self) -> float:
         """How much faster than real time it goes."""
-        return VIRTUAL.get(self.port, 1.0)
+        return time_scale_of(self.port) or 1.0
 
 
-VIRTUAL = {"virtual machine": 1.0, "virtual machine, 10 times faster": 10.0}
-"""What stands where the name of a port stands, and how much faster than real time it then goes."""
+VIRTUAL = (virtual_port(), virtual_port(10.0))
+"""What is offered where the name of a port stands, to try everything without hardware."""
 
 _NO_LINE = Line()
 

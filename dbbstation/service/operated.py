@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError
+from dbbstation.errors import InputError, InstrumentError, Problem
 from dbbstation.files.atomic import write_text
+from dbbstation.files.formats.job import JobFile, read_job
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import format_for
+from dbbstation.files.yaml.schema import format_for, read_document, validate
+from dbbstation.instrument.library import load_instrument
 from dbbstation.quality.conformity import Conformity
 from dbbstation.results.serialise import read_plain
 from dbbstation.service.after import After
@@ -26,9 +29,7 @@ from dbbstation.service.work import BackgroundWork, WorkProgress
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
-    from dbbstation.files.formats.job import JobFile
     from dbbstation.service.answers import VerdictAnswer
     from dbbstation.service.job import SessionJob
 
@@ -53,7 +54,7 @@ class Operated:
     def choice(self) -> Choice:
         """Return what is measured now: the last session of the job where it is not complete and has the same plan, else a new one."""
         job = self.job
-        line = Line(instrument=job.instrument, profile=job.profile, port=job.port, baud=job.baud)
+        line = Line(instrument=instrument_of(self.path, job), profile=job.profile, port=job.port, baud=job.baud)
         return Choice(
             folder=self._unfinished() or self._new_folder(),
             machine=self._beside(job.machine),
@@ -161,7 +162,8 @@ def answer_of(verdict: VerdictAnswer, missing: Sequence[str], report: Path | Non
     """
     kinds = {str(one): one for one in Conformity}
     word = kinds.get(verdict.kind, Conformity.UNDECIDED)
-    reasons = list(verdict.reasons) or [verdict.headline]
+    # A report speaks of the shop's tolerances; here the job's hold.
+    reasons = list(verdict.reasons) or [_WITHIN if word is Conformity.WITHIN else verdict.headline]
     to_do = list(verdict.to_do)
     if missing:
         word = word if word is Conformity.EXCEEDED else Conformity.UNDECIDED
@@ -170,16 +172,44 @@ def answer_of(verdict: VerdictAnswer, missing: Sequence[str], report: Path | Non
     return Answered(word, tuple(reasons), tuple(to_do), report)
 
 
+_WITHIN = "Every circle is within the limits of the job, with its uncertainty."
+
+
+def instrument_of(path: Path, job: JobFile) -> str:
+    """Return the name of a job's instrument, or the path of its protocol file, which lies beside the job."""
+    named = job.instrument
+    return str((path.parent / named).absolute()) if Path(named).suffix in {".yaml", ".yml"} else named
+
+
+def instrument_faults(path: Path) -> list[Problem]:
+    """Return what is wrong with the instrument that a job names: there is none of that name, or no such variant.
+
+    Args:
+        path: of a job that can be read.
+    """
+    faults: list[Problem] = []
+    document = read_document(path, JobFile, faults)
+    job = None if document is None else validate(document, JobFile, faults)
+    if document is None or job is None:
+        return []
+    try:
+        load_instrument(instrument_of(path, job), job.profile or None)
+    except InputError as error:
+        return list(error.problems)
+    except InstrumentError as error:
+        return [document.problem(("instrument",), error.what, error.remedy)]
+    return []
+
+
 def read_operated(path: Path) -> Operated:
     """Read a job.
 
     Raises:
         InputError: every fault of it and of the files that it names.
     """
-    from dbbstation.files.formats.job import read_job  # noqa: PLC0415 - who measures without a job does not read the format
-
     if not path.is_file():
-        from dbbstation.errors import Problem  # noqa: PLC0415 - the same
-
         raise InputError([Problem(str(path), 0, 0, "there is no such file", "check the path")])
-    return Operated(path.absolute(), read_job(path))
+    job = read_job(path)
+    if faults := instrument_faults(path):
+        raise InputError(faults)
+    return Operated(path.absolute(), job)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
+from dbbstation.files.formats.virtual_port import time_scale_of, virtual_port
 from dbbstation.files.recordings.session import read_session
-from dbbstation.service.memory import VIRTUAL, Line
+from dbbstation.service.memory import Line
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,7 +31,7 @@ def line_to_go_on(folder: Path, remembered: Line, given: Line) -> Line:
         noted = session.instrument
         if remembered.virtual or noted is None:
             return remembered if remembered.virtual else given
-        port = noted.port if noted.port in VIRTUAL else next(iter(VIRTUAL))
+        port = noted.port if time_scale_of(noted.port) is not None else virtual_port()
         return Line(instrument=noted.name, profile=noted.profile, port=port)
     if session.runs and given.virtual:
         return given.model_copy(update={"port": "", "baud": None})

@@ -217,7 +217,7 @@ class StationApp(App[None]):
             self.board.messages.append(Message(Weight.FAULT, str(error)))
 
         def show(answer: JobAnswer) -> None:
-            self.push_screen(AnswerScreen(answer, lambda: self.leave(sure=True)))
+            self.push_screen(AnswerScreen(answer, lambda: self.leave(sure=True), virtual=self.board.virtual))
 
         def work_out() -> None:
             self.do(lambda: JobAnswer(operated, folder, missing), show, failed)

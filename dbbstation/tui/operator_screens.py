@@ -26,7 +26,7 @@ from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.tui.row_screen import RowScreen
 from dbbstation.tui.set_up_panel import SetUpPanel
 from dbbstation.tui.steps_panel import StepsPanel
-from dbbstation.tui.title_line import TitleLine
+from dbbstation.tui.title_line import TitleLine, banner
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -202,20 +202,21 @@ class AnswerScreen(ExplainedScreen):
     Args:
         answer: works it out.
         back: called when it is left.
+        virtual: whether the machine is.
     """
 
     help_name = "answer"
 
     BINDINGS: ClassVar[list[BindingType]] = [("enter", "read", "Back"), ("escape,q", "back", "Back")]
 
-    def __init__(self, answer: JobAnswer, back: Callable[[], None]) -> None:
+    def __init__(self, answer: JobAnswer, back: Callable[[], None], *, virtual: bool = False) -> None:
         super().__init__()
-        self._answer, self._back = answer, back
+        self._answer, self._back, self._virtual = answer, back, virtual
         self._answered: Answered | None = None
 
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""
-        yield Static(Content(f" dbbstation · {texts.ANSWER_TITLE}"), id="row-title")
+        yield Static(banner(virtual=self._virtual) + Content(f" dbbstation · {texts.ANSWER_TITLE}"), id="row-title")
         yield Static(Content(texts.ANSWER_WAITS), id="answer-word")
         with VerticalScroll(id="answer-why", can_focus=False):
             yield Static("", id="answer-text", markup=False)

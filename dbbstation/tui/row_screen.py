@@ -12,7 +12,7 @@ from textual.widgets.option_list import Option
 from dbbstation.tui.cursor import mark_chosen
 from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.help_texts import HELP
-from dbbstation.tui.texts import VIRTUAL_BANNER
+from dbbstation.tui.title_line import banner
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,9 +47,8 @@ class RowScreen(ExplainedScreen):
     def banner(self, *, virtual: bool) -> None:
         """Show the title, with a banner where the machine is virtual."""
         if self.stands:
-            sign = Content.styled(VIRTUAL_BANNER, "reverse bold $text-warning") if virtual else Content("")
             title = Content(f" dbbstation · {HELP[self.help_name].title}")
-            self.query_one("#row-title", Static).update(sign + title)
+            self.query_one("#row-title", Static).update(banner(virtual=virtual) + title)
 
     def about(self, text: Content) -> None:
         """Show a text below the rows."""

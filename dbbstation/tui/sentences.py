@@ -64,7 +64,7 @@ def _turning(_board: Board) -> str:
 
 
 def _leaving(_board: Board) -> str:
-    return "The circle is through, the machine feeds out: touch nothing."
+    return "The circle is through, the machine feeds out: touch nothing; the word on it follows."
 
 
 def _verdict(board: Board) -> str:

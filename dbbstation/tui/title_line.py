@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from dbbstation.service.board import Board
 
 
+def banner(*, virtual: bool) -> Content:
+    """Return what stands at the beginning of the top line where the machine is virtual."""
+    return Content.styled(VIRTUAL_BANNER, "reverse bold $text-warning") if virtual else Content("")
+
+
 class TitleLine(Panel):
     """One line over the whole width.
 
@@ -26,7 +31,7 @@ class TitleLine(Panel):
 
     def text(self, board: Board) -> Content:
         """Return the line."""
-        banner = Content.styled(VIRTUAL_BANNER, "reverse bold $text-warning") if board.virtual else Content("")
+        sign = banner(virtual=board.virtual)
         run: list[Content] = []
         if board.announced is not None and board.finished is None:
             run = [
@@ -35,12 +40,12 @@ class TitleLine(Panel):
             ]
         state = Content(str(board.state) if board.state else "opening")
         # What stands at the end is the most important; where there is no room the plan's name is shortened first.
-        room = (self.content_size.width or _NARROWEST) - len(banner) - 1
+        room = (self.content_size.width or _NARROWEST) - len(sign) - 1
         rest = Content(" · ").join([*run, state])
         plan = _shortened(self._plan, room - len(rest) - len(" · "))
         if not plan and len(rest) > room:
             rest = Content(" · ").join([*run[1:], state])
-        return banner + (Content.styled(f" {plan}", "bold") + Content(" · ") if plan else Content(" ")) + rest
+        return sign + (Content.styled(f" {plan}", "bold") + Content(" · ") if plan else Content(" ")) + rest
 
 
 _NARROWEST = 80

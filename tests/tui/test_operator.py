@@ -74,6 +74,13 @@ def test_a_job_is_checked_with_all_that_it_names(job_file: Path) -> None:
         (text.replace("ten-minute-check", "no-such-plan"), "no-such-plan.yaml"),
         (text.replace("may_change: [operator]", "may_change: [plan]"), "may_change"),
         (text + "bar: bar.yaml\n", "bar.yaml"),
+        (text.replace("10 times faster", "100 times faster"), "is no virtual machine"),
+        (text.replace("streaming-encoder", "streaming-encodr"), "streaming-encodr"),
+        (text.replace("streaming-encoder", "gauge.yaml"), str(job_file.parent / "gauge.yaml")),
+        (
+            text.replace("port: virtual machine, 10 times faster", "port: COM3").replace("bar_waiver", "#"),
+            "neither a bar",
+        ),
     ):
         job_file.write_text(broken, encoding="utf-8")
         outcome = call("check", job_file)
@@ -91,7 +98,7 @@ def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path
     answer = JobAnswer(operated, session, (), Reported).look()
     assert answer == Answered(
         Conformity.WITHIN,
-        ("Every circle is within.",),
+        ("Every circle is within the limits of the job, with its uncertainty.",),
         ("Measure again.",),
         job_file.parent / "monday-2026-11-20-results" / "report.html",
     )
@@ -147,13 +154,16 @@ def test_four_screens_and_nothing_that_is_wrong_is_accepted(job_file: Path) -> N
             await pilot.press("enter")
             assert runner.sent == [Repeat()]
             session = shutil.copytree(FIXTURES / "sessions" / "virtual", job_file.parent / "monday-1")
-            answer = AnswerScreen(JobAnswer(operated, session, (), Reported), lambda: app.leave(sure=True))
+            answer = AnswerScreen(
+                JobAnswer(operated, session, (), Reported), lambda: app.leave(sure=True), virtual=True
+            )
             app.push_screen(answer)
             await pilot.pause()
             answer.look()
             text = str(answer.query_one("#answer-word").visual)
             assert "WITHIN" in text
             assert "██" in text
+            assert "VIRTUAL MACHINE" in str(answer.query_one("#row-title").visual)
             assert "report.html" in str(answer.query_one("#answer-text").visual)
             await pilot.press("enter")
             assert runner.sent == [Repeat(), Quit()]

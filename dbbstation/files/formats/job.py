@@ -10,6 +10,7 @@ from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.settings_schema import ToleranceSettings
+from dbbstation.files.formats.virtual_port import FASTEST, SLOWEST, misspelt, time_scale_of, virtual_port
 from dbbstation.files.yaml.schema import Schema, read_document, validate
 from dbbstation.files.yaml.text import YamlDocument
 
@@ -81,6 +82,16 @@ def parse_job(path: Path, faults: list[Problem]) -> JobFile | None:
         parse_bar(path.parent / job.bar, faults)
     if job.bar and job.bar_waiver:
         faults.append(document.problem(("bar_waiver",), "a bar and why there is none", "leave one of both out"))
+    if misspelt(job.port):
+        what = f"`{job.port}` is no virtual machine"
+        names = f"write `{virtual_port()}`, or `{virtual_port(10.0)}`, with {SLOWEST:g} to {FASTEST:g} in place of 10"
+        faults.append(document.problem(("port",), what, names))
+    if not (job.bar or job.bar_waiver or time_scale_of(job.port)):
+        faults.append(
+            document.problem(
+                ("bar",), "neither a bar nor why there is none", "name its file, or say why in `bar_waiver`"
+            )
+        )
     if plan is not None:
         _check_tests(document, job, set(plan.to_domain().tests), faults)
     return job

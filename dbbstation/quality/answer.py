@@ -52,7 +52,13 @@ def answer(findings: Sequence[Finding], problem: str = "") -> RunAssessment:
         return RunAssessment(Advice.REPEAT, tuple(cause_of(one) for one in sorted(wrong, key=rank)))
     decided = {one.name for one in findings if one.verdict is not FindingVerdict.CANNOT_TELL}
     unseen = tuple(fault for fault, names in SHOWN_BY.items() if not decided & names)
+    unseen += tuple(DOUBTED[one.name] for one in findings if one.name in DOUBTED and _doubted(one))
     return RunAssessment(Advice.CANNOT_TELL, unseen=unseen) if unseen else RunAssessment(Advice.GOOD)
+
+
+def _doubted(finding: Finding) -> bool:
+    """Whether readings favour a fault, and something else may explain them too."""
+    return bool(finding.value) and finding.verdict is FindingVerdict.CANNOT_TELL
 
 
 def cause_of(finding: Finding) -> str:
@@ -73,8 +79,10 @@ EXPLAINS = (
     (Name.CIRCLE,),
     (Name.SCALE,),
     (Name.SPIKE, Name.BUMP, Name.CLOSURE, Name.DRIFT, Name.NOISE),
+    (Name.PROGRAMS,),
     (Name.TEST, Name.DIRECTION),
     (Name.LOCAL,),
+    (Name.BAR,),
     (Name.RADIUS,),
     (Name.OTHER_DIRECTION, Name.REPEAT),
     (Name.BORE,),
@@ -102,6 +110,12 @@ SHOWN_BY = {
 The finding `bore` is none of them: in the first test of a machine without a model its limit is the machine's own errors, millimetres,
 and would show neither."""
 
+DOUBTED = {
+    Name.PROGRAMS: "whether all programs ran as the plan has them",
+    Name.BAR: "whether the bar is as long as stated (put it on its calibrator) or the machine makes all circles so",
+}
+"""Faults of all runs that other faults explain too: they are asked about only where the readings favour them."""
+
 DO = {
     Name.HELD: "the plunger sticks or the stroke ends; free it, check the plug, run the circle again",
     Name.LOST: "check plug and cable, close other programs on the computer, run the circle again",
@@ -121,6 +135,9 @@ DO = {
     Name.NOISE: "clean balls and cups, look for what shakes, run the circle again",
     Name.OTHER_DIRECTION: "ball or holder moved since the other direction: press them home, run both again",
     Name.LOCAL: "clean balls and cups, look for what touches the bar there, run both again",
+    Name.PROGRAMS: "look which way the machine turns and where it begins, check G2, G3, mirroring and turned axes (G51.1, G68); mend it and "
+    "begin a new session: every circle of this one is wrong in the same way",
+    Name.BAR: "put the bar on its calibrator, check its certificate and that no extension was changed; then every circle is to be measured again",
     Name.REPEAT: "ball or holder moved since the run before: press them home, run it again",
 }
 """What to do at the machine, in the shop's words."""

@@ -30,6 +30,8 @@ class Name(StrEnum):
     OTHER_DIRECTION = "other direction"
     REPEAT = "repeat"
     LOCAL = "local difference"
+    PROGRAMS = "all programs"
+    BAR = "bar of all runs"
 
 
 class FindingVerdict(StrEnum):

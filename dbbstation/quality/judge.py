@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
+from dbbstation.quality.all_runs import bar_of_all, programs_of_all
 from dbbstation.quality.between import direction, other_direction, repeat
 from dbbstation.quality.copied import copied
 from dbbstation.quality.finding import Finding, Name, stricter
@@ -123,7 +124,17 @@ class SessionRuns:
             other_direction(one, others),
             repeat(one, others),
             local_difference(one, others),
+            *(self._of_all if one in self._runs else self._with(one)._of_all),  # noqa: SLF001 - the same class
         ]
+
+    @cached_property
+    def _of_all(self) -> tuple[Finding, Finding]:
+        """What all runs have in common."""
+        by_model = any(one.run.usual is not None for one in self._runs)
+        return programs_of_all(self._runs), bar_of_all(self._runs, by_model=by_model)
+
+    def _with(self, one: Seen) -> SessionRuns:
+        return SessionRuns([*self._runs, one])
 
     def _others(self, one: Seen) -> Others:
         analyses = [o.analysis for o in self._runs if o is not one and o.analysis is not None]

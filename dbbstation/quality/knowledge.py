@@ -137,6 +137,7 @@ class Run:
         planned: all circles of its plan, where a model says what they look like.
         started_s: when it began, on the clock of its session [s]; None where not noted.
         usual: where it should lie by the usual sizes of all causes, where `expected` is by a model; None without a model.
+        bar_stated: whether the session states a calibrated length of the bar.
     """
 
     test: str
@@ -149,6 +150,7 @@ class Run:
     planned: tuple[Planned, ...] = ()
     started_s: float | None = None
     usual: Expected | None = None
+    bar_stated: bool = True
 
     @property
     def label(self) -> str:

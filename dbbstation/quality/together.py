@@ -71,11 +71,11 @@ def together(one: Seen, others: Others) -> Together | None:
         return None
     runs = (one, *them)
     off = np.concatenate([read_um(each) - expected_um(each.run) for each in runs])
-    machine, rest = _covariances(runs)
+    machine, rest = covariances(runs)
     return Together(runs, off, machine, rest)
 
 
-def _covariances(runs: Sequence[Seen]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def covariances(runs: Sequence[Seen]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Covariance of the forms of n runs along their travel, by the machine's causes and by all else, shape (7 n, 7 n) each [µm²]."""
     n = COEFFICIENTS
     machine, rest = np.zeros((n * len(runs), n * len(runs))), np.zeros((n * len(runs), n * len(runs)))
@@ -124,15 +124,15 @@ def expected_beside(both: Together | None) -> Expected | None:
     n = COEFFICIENTS
     _, of_others = both.log_likelihoods()
     weights = np.exp(of_others - logsumexp(of_others))
-    means, covariances = [], []
+    means, conditional = [], []
     for size in SIZES:
         whole = both.covariance_um2(size)
         gain = np.linalg.solve(whole[n:, n:], whole[n:, :n]).T
         means.append(gain @ both.off_um[n:])
-        covariances.append(whole[:n, :n] - gain @ whole[n:, :n])
+        conditional.append(whole[:n, :n] - gain @ whole[n:, :n])
     mean = np.einsum("s,si->i", weights, means)
     scatter = np.array(means) - mean
-    covariance = np.einsum("s,sij->ij", weights, covariances) + np.einsum("s,si,sj->ij", weights, scatter, scatter)
+    covariance = np.einsum("s,sij->ij", weights, conditional) + np.einsum("s,si,sj->ij", weights, scatter, scatter)
     covariance *= _straying(both, float(SIZES[int(np.argmax(of_others))])) ** 2
     return _placed(own, both.runs[0].run.circle, mean, covariance)
 

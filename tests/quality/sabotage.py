@@ -2,7 +2,7 @@
 
 `python -m tests.quality.sabotage` prints the table of docs/circles.md: how often each finding is made of runs that are spoilt by
 half its limit, by its limit and by twice its limit, and how often of runs that are sound. `--equipment 3` prints the table of what goes
-wrong with balls, programs and gauges, `--strange` that of faults of other kinds, `--limits 5` the limits of sound runs, and `--drifting 1000` how often good circles on drifting days have a finding, with `--model` of
+wrong with balls, programs and gauges, `--strange` that of faults of other kinds, `--shared 4` of faults that all runs share, `--limits 5` the limits of sound runs, and `--drifting 1000` how often good circles on drifting days have a finding, with `--model` of
 machines with a model.
 """
 
@@ -12,16 +12,19 @@ import argparse
 import collections
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.quality.finding import FindingVerdict
+from dbbstation.quality.all_runs import bar_of_all, programs_of_all
+from dbbstation.quality.finding import Finding, FindingVerdict
 from dbbstation.quality.judge import SessionRuns
+from dbbstation.quality.knowledge import Seen
 from tests.quality.equipment import Row, equipment, print_equipment
-from tests.quality.sessions import TESTS, calibrated, drifting_session, sound
+from tests.quality.sessions import TESTS, calibrated, drifting_session, sound, spoilt
 from tests.quality.shares import spoil
-from tests.quality.spoilers import SPOILERS
-from tests.quality.strange import print_strange
+from tests.quality.spoilers import SPOILERS, larger, mirrored
+from tests.quality.strange import mirror_image, print_strange
 
 
 def false_alarms(folder: Path, seed: int, wanted: int, *, with_model: bool) -> None:
@@ -68,6 +71,24 @@ def limits(folder: Path, seeds: range, *, with_model: bool) -> None:
         )
 
 
+def shared(folder: Path, seeds: range) -> None:
+    """How much likelier all runs are if what all of them share is wrong, behind 2, 3, 4, 6 and 8 tests, as logarithms."""
+    for seed in seeds:
+        whole = sound(folder / f"shared{seed}", seed, TESTS, rate_hz=20.0)
+        first = [one for one in whole.runs if one.run.repeat == 1]
+        for um in (0.0, 10.0, 20.0, 30.0, 40.0, 50.0):
+            runs = [spoilt(one, larger, um) for one in first]
+            _print_shared(f"{seed} bar {um:.0f} µm", runs, lambda some: bar_of_all(some, by_model=False))
+        for name, spoiler, size in (("wrong way round", mirrored, 1.0), ("mirrored in X", mirror_image, 0.0)):
+            _print_shared(f"{seed} {name}", [spoilt(one, spoiler, size) for one in first], programs_of_all)
+
+
+def _print_shared(name: str, runs: list[Seen], ask: Callable[[list[Seen]], Finding]) -> None:
+    asked = {tests: ask(runs[: 2 * tests]) for tests in (2, 3, 4, 6, 8)}
+    told = ", ".join(f"{tests} tests {0.0 if one.value is None else one.value:.1f}" for tests, one in asked.items())
+    sys.stdout.write(f"{name}: {told}, limit {asked[8].limit}\n")
+
+
 @with_one_thread
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
@@ -77,6 +98,12 @@ def main() -> None:
     parser.add_argument("--model", action="store_true", help="each good session has its own calibration as a model")
     parser.add_argument("--equipment", type=int, default=0, help="sessions whose equipment fails, in place of all else")
     parser.add_argument("--strange", action="store_true", help="faults of other kinds, in place of all else")
+    parser.add_argument(
+        "--only", default="", help="of the faults of other kinds those that match, as `all runs|ball with`"
+    )
+    parser.add_argument(
+        "--shared", type=int, default=0, help="sessions of which all runs share a fault, in place of all else"
+    )
     parser.add_argument("--limits", type=int, default=0, help="sessions whose limits are listed, in place of all else")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -84,14 +111,16 @@ def main() -> None:
             false_alarms(Path(folder), given.seed, given.drifting, with_model=given.model)
         for with_model in (False, True) if given.limits else ():
             limits(Path(folder), range(1000 + given.seed, 1000 + given.seed + given.limits), with_model=with_model)
+        if given.shared:
+            shared(Path(folder), range(1000 + given.seed, 1000 + given.seed + given.shared))
         if given.strange:
-            print_strange(Path(folder), 1000 + given.seed)
+            print_strange(Path(folder), 1000 + given.seed, given.only)
         counted: Row = collections.Counter()
         for seed in range(given.seed, given.seed + given.equipment):
             counted.update(equipment(Path(folder) / str(seed), 1000 + seed))
         if given.equipment:
             print_equipment(counted)
-    if not (given.drifting or given.equipment or given.strange or given.limits):
+    if not (given.drifting or given.equipment or given.strange or given.shared or given.limits):
         findings(given.seed, given.clean)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -183,6 +184,61 @@ def shorter_overlap(recording: Recording, circle: Circle, degrees: float) -> Rec
     return replace(recording, t_s=step_s * np.arange(int(rows.sum())), length_mm=recording.length_mm[rows])
 
 
+def lifted_over_a_sector(recording: Recording, circle: Circle, um: float) -> Recording:
+    """Dirt in the cup lifts the bar over a quarter of the turn: a step up, and as much down."""
+    phi = progress(recording, circle)
+    return longer(recording, np.where((phi > 120.0) & (phi < 210.0), um, 0.0))
+
+
+def slipped_and_back(recording: Recording, circle: Circle, um: float) -> Recording:
+    """A cup slips in five steps, and the last one takes it back: no closure, no drift."""
+    steps = np.searchsorted([50.0, 110.0, 170.0, 230.0, 290.0], progress(recording, circle))
+    return longer(recording, um * np.array([0.0, 0.4, 0.7, 1.0, 0.6, 0.0])[steps])
+
+
+def contact(recording: Recording, _circle: Circle, um: float) -> Recording:
+    """A loose contact: one reading of a hundred jumps by so much, either way."""
+    rng = np.random.default_rng(5)
+    jumps = um * rng.choice([-1.0, 1.0], len(recording)) * (rng.random(len(recording)) < 0.01)
+    return longer(recording, jumps)
+
+
+def with_hysteresis(recording: Recording, _circle: Circle, um: float) -> Recording:
+    """A gauge with play: it stays behind by half of it, either way the plunger goes."""
+    length, half = 1e3 * recording.length_mm, 0.5 * um
+    read = np.empty_like(length)
+    read[0] = length[0]
+    for k in range(1, len(length)):
+        read[k] = min(max(read[k - 1], length[k] - half), length[k] + half)
+    return replace(recording, length_mm=1e-3 * read)
+
+
+def lobed(recording: Recording, circle: Circle, um: float) -> Recording:
+    """A ball with three lobes, where it sits the same in every run."""
+    theta = np.radians(circle.theta_deg(progress(recording, circle)))
+    return longer(recording, um * np.cos(3.0 * theta + 0.7))
+
+
+def beside_its_axis(recording: Recording, circle: Circle, um: float) -> Recording:
+    """The ball of the tool stands so far beside the axis of the spindle."""
+    theta = np.radians(circle.theta_deg(progress(recording, circle)))
+    return longer(recording, um * np.cos(theta - 1.0))
+
+
+def exchanged_times(recording: Recording, _circle: Circle, share: float) -> Recording:
+    """Of so many readings the next one came first."""
+    at = np.flatnonzero(np.random.default_rng(6).random(len(recording) - 1) < share)
+    length = recording.length_mm.copy()
+    for k in at:
+        length[[k, k + 1]] = length[[k + 1, k]]
+    return replace(recording, length_mm=length)
+
+
+def waved(recording: Recording, circle: Circle, um: float) -> Recording:
+    """A gauge whose scale has waves of 0.1 mm."""
+    return longer(recording, um * np.sin(2.0 * np.pi * (recording.length_mm - circle.bar_mm) / 0.1))
+
+
 @dataclass(frozen=True)
 class Strange:
     """A fault: what it does to a recording, in which sizes, and which runs have it."""
@@ -221,6 +277,15 @@ STRANGE = (
     Strange("display averages [s]", averaged, (0.2, 1.0), Shared.ALL),
     Strange("coarse display [µm]", coarse, (2.0, 10.0), Shared.ALL),
     Strange("shorter overlap [deg]", shorter_overlap, (10.0, 40.0)),
+    Strange("cup lifts over a quarter [µm]", lifted_over_a_sector, (3.0, 10.0)),
+    Strange("cup lifts over a quarter [µm]", lifted_over_a_sector, (10.0,), Shared.TEST),
+    Strange("slips in steps and back [µm]", slipped_and_back, (3.0, 10.0)),
+    Strange("loose contact [µm]", contact, (2.0, 5.0)),
+    Strange("gauge with play [µm]", with_hysteresis, (2.0, 5.0), Shared.ALL),
+    Strange("ball with three lobes [µm]", lobed, (2.0, 10.0), Shared.ALL),
+    Strange("ball beside the spindle's axis [µm]", beside_its_axis, (20.0, 100.0), Shared.ALL),
+    Strange("readings exchanged [share]", exchanged_times, (0.1, 0.5)),
+    Strange("gauge with waves [µm]", waved, (1.0, 5.0), Shared.ALL),
 )
 COPIED, OTHER_FILE = "file of the run before again", "file of the other direction again"
 MOVED = "program and ball at another bore and height"
@@ -243,13 +308,17 @@ def moved_plan(plan: Plan) -> Plan:
 Counted = collections.defaultdict[tuple[str, str, float, When, bool], collections.Counter[Advice]]
 
 
-def strange(folder: Path, seed: int) -> tuple[Counted, dict[tuple[str, str, float, When, bool], float]]:
-    """Judge the second direction of each test with each fault; return the words, and the greatest error of a run that is GOOD [µm rms]."""
+def strange(folder: Path, seed: int, only: str = "") -> tuple[Counted, dict[tuple[str, str, float, When, bool], float]]:
+    """Judge the second direction of each test with each fault; return the words, and the greatest error of a run that is GOOD [µm rms].
+
+    With `only` those faults whose name and runs match this expression.
+    """
     words: Counted = collections.defaultdict(collections.Counter)
     harm: dict[tuple[str, str, float, When, bool], float] = {}
     modelled = calibrated(folder, seed)
-    sound(folder / "moved", seed, TESTS, planned=moved_plan(subset(table_ii_plan(seed), list(TESTS))))
-    moved = {one.run.label: one.run.recording for one in read(folder / "moved").runs}
+    if not only:
+        sound(folder / "moved", seed, TESTS, planned=moved_plan(subset(table_ii_plan(seed), list(TESTS))))
+    moved = {} if only else {one.run.label: one.run.recording for one in read(folder / "moved").runs}
     for with_model in (False, True):
         whole = modelled if with_model else read(folder / "spoilt")
         seconds = [one for n, one in enumerate(o for o in whole.runs if o.run.repeat == 1) if n % 2 == 1]
@@ -267,11 +336,13 @@ def strange(folder: Path, seed: int) -> tuple[Counted, dict[tuple[str, str, floa
                         harm[key] = max(harm.get(key, 0.0), off)
                         sys.stderr.write(f"{key} {spoilt.run.label} {word} {off:.1f} µm\n")
 
-                for fault in STRANGE:
+                for fault in (each for each in STRANGE if re.search(only, f"{each.name}, {each.shared}")):
                     for size in fault.sizes:
                         spoilt = _spoilt(one, fault.spoiler, size)
                         beside = [_spoilt(o, fault.spoiler, size) if _has(fault, o, one) else o for o in known]
                         note(fault.name, fault.shared, size, spoilt, beside)
+                if only:
+                    continue
                 opposite = next(o for o in known if o.run.test == one.run.test)
                 again = replace(one, run=replace(one.run, repeat=2, recording=replace(one.run.recording, name="again")))
                 note(COPIED, Shared.RUN, 0.0, again, [*known, one])
@@ -294,9 +365,9 @@ def _with(one: Seen, recording: Recording) -> Seen:
     return seen(replace(one.run, recording=recording))
 
 
-def print_strange(folder: Path, seed: int) -> None:
+def print_strange(folder: Path, seed: int, only: str = "") -> None:
     """The table of docs/circles.md: GOOD, CANNOT TELL and REPEAT of each fault."""
-    words, harm = strange(folder, seed)
+    words, harm = strange(folder, seed, only)
     heads = [(when, with_model) for with_model in (False, True) for when in (When.FIRST, When.LATER)]
     titles = [f"{when}{', model' if with_model else ''}" for when, with_model in heads]
     sys.stdout.write(f"| fault | in | size | {' | '.join(titles)} | error [µm rms] |\n|{' --- |' * (len(heads) + 4)}\n")

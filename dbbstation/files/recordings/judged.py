@@ -90,6 +90,7 @@ def run_of(
         # Compensated programs are there to make all circles alike: what one looks like says nothing.
         planned=() if run.program is not None else planned,
         started_s=session.started_s(run),
+        bar_stated=session.bar is not None,
     )
 
 

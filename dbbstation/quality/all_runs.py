@@ -1,0 +1,230 @@
+"""What all runs of a session may have in common: programs that were mirrored, turned or run the wrong way round, and another bar.
+
+Such a session agrees with itself: both directions of each test do, and no run stands out. But forms of several tests, each mirrored about
+its own place, are no forms that one hexapod makes; and a machine that makes all circles larger by the same makes them odd in other ways too.
+So ways in which the whole session may have been run are compared by the likelihood of all readings together. The chance that sound runs favour
+another way by a factor of f or more is 1 / f at the most [Markov's inequality].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import logsumexp
+
+from dbbstation.quality.finding import Finding, FindingVerdict, Name, undecided
+from dbbstation.quality.knowledge import COEFFICIENTS, HIGHEST_HARMONIC
+from dbbstation.quality.limits import length_quantile
+from dbbstation.quality.together import SIZES, covariances, expected_um, log_likelihood, read_um
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.quality.knowledge import Seen
+
+PROBABILITY = 1e-6
+"""Probability that sound runs favour any other way so much: too small to count among what all findings share. Eight tests that were run
+otherwise favour it by e^70 and more, and by a bar of 50 µm more by e^60."""
+
+FEWEST_TESTS = 2
+"""Tests that must be there where no model says what the machine is like: any form of one circle, mirrored or turned, is that of some machine."""
+
+BAR_UM = 1e3
+"""Standard deviation of what another bar is longer by, a millimetre: one that is longer by the feed-in, usually 1.5 mm, shows no circle. Ten times as
+much takes 2.3 from the logarithm of the ratio."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way in which all programs may have run.
+
+    Attributes:
+        label: in the shop's words.
+        reverses: whether the machine turned the other way than its programs say.
+        begin_deg: angle from +X at which a circle began that should have begun at a given one [deg].
+    """
+
+    label: str
+    reverses: bool
+    begin_deg: Callable[[float], float]
+
+
+WAYS = (
+    Way("the wrong way round (G2 and G3 exchanged)", reverses=True, begin_deg=lambda start: start),
+    Way("mirrored in X", reverses=True, begin_deg=lambda start: 180.0 - start),
+    Way("mirrored in Y", reverses=True, begin_deg=lambda start: -start),
+    Way("with X and Y exchanged", reverses=True, begin_deg=lambda start: 90.0 - start),
+    Way("with X and -Y exchanged", reverses=True, begin_deg=lambda start: 270.0 - start),
+    Way("in axes turned by 90 degrees", reverses=False, begin_deg=lambda start: start + 90.0),
+    Way("in axes turned by 180 degrees", reverses=False, begin_deg=lambda start: start + 180.0),
+    Way("in axes turned by 270 degrees", reverses=False, begin_deg=lambda start: start + 270.0),
+)
+"""All ways to turn and mirror a plane that leave its axes along its axes, and the other sense of rotation."""
+
+
+def programs_of_all(runs: Sequence[Seen]) -> Finding:
+    """Return whether all runs together are likelier those of programs that ran in another way than the plan's.
+
+    Args:
+        runs: all that count. Those of which the other direction was measured on the same mounting are used, from two tests on.
+    """
+    pairs = [(one, other) for one in runs if (other := _other_direction(one, runs)) is not None]
+    if len({one.run.test for one, _ in pairs}) < FEWEST_TESTS:
+        return undecided(Name.PROGRAMS, f"fewer than {FEWEST_TESTS} tests were measured in both directions")
+    planned = [one for one, _ in pairs]
+    other_way = [_run_as(one, other) for one, other in pairs]
+    as_planned = _Likelihood(planned, [read_um(one) for one in planned])
+    tried = _otherwise(planned, other_way)
+    way, likeliest = max(tried, key=lambda each: each[1].logarithm)
+    # No way is likelier than another before.
+    value = float(logsumexp([each.logarithm for _, each in tried]) - np.log(len(WAYS))) - as_planned.logarithm
+    limit = -float(np.log(PROBABILITY))
+    stated = f"all {len(planned)} runs together"
+    if value <= 0.0:
+        return Finding(
+            Name.PROGRAMS,
+            0.0,
+            limit,
+            "",
+            FindingVerdict.GOOD,
+            f"{stated} are likelier as planned than mirrored or turned",
+        )
+    if value <= limit:
+        why = f"{stated} are {np.exp(value):.0f} times as likely if programs ran otherwise, best {way.label}: too little to tell"
+        return Finding(Name.PROGRAMS, value, limit, "", FindingVerdict.CANNOT_TELL, why)
+    if not likeliest.fits():
+        return undecided(Name.PROGRAMS, f"{stated} fit no way in which all programs may have run")
+    why = f"{stated} are over a million times as likely if programs ran otherwise, best {way.label}"
+    return Finding(Name.PROGRAMS, value, limit, "", FindingVerdict.WRONG, why, f"all programs ran {way.label}")
+
+
+def _otherwise(planned: Sequence[Seen], other_way: Sequence[Seen]) -> list[tuple[Way, _Likelihood]]:
+    """How likely the readings are by each other way."""
+    tried = []
+    known: dict[bool, _Likelihood] = {}
+    for way in WAYS:
+        runs = other_way if way.reverses else planned
+        read = [_begun(one, as_run, way) for one, as_run in zip(planned, runs, strict=True)]
+        known[way.reverses] = _Likelihood(runs, read, known.get(way.reverses))
+        tried.append((way, known[way.reverses]))
+    return tried
+
+
+def bar_of_all(runs: Sequence[Seen], *, by_model: bool) -> Finding:
+    """Return whether all runs together are likelier those of a bar of another length.
+
+    Without a model a machine that makes all circles larger by as much explains the same readings, an odd one: then it cannot be told.
+
+    Args:
+        runs: all that count.
+        by_model: whether a model says where circles lie.
+    """
+    known = [one for one in runs if one.run.expected is not None and one.run.bar_stated]
+    if not known:
+        return undecided(Name.BAR, "no calibrated length of the bar is stated")
+    fewest = 1 if by_model else FEWEST_TESTS
+    if len({one.run.test for one in known}) < fewest:
+        return undecided(Name.BAR, f"fewer than {fewest} tests were measured")
+    as_stated = _Likelihood(known, [read_um(one) for one in known])
+    longer_um = np.tile(np.eye(COEFFICIENTS)[0], len(known))
+    ratio, by_um = as_stated.gained(longer_um, BAR_UM)
+    limit = -float(np.log(PROBABILITY))
+    if ratio > limit and not as_stated.fits(by_um * longer_um):
+        return undecided(Name.BAR, "all runs together fit no bar of another length either")
+    stated = f"the bar reads {abs(by_um):.0f} µm too {'long' if by_um > 0.0 else 'short'} in all runs"
+    if ratio <= limit:
+        sound = "all runs together do not ask for a bar of another length"
+        return Finding(Name.BAR, max(ratio, 0.0), limit, "", FindingVerdict.GOOD, sound)
+    if by_model:
+        return Finding(Name.BAR, ratio, limit, "", FindingVerdict.WRONG, f"{stated}, by the model", stated)
+    why = f"{stated}, or the machine makes all circles {'larger' if by_um > 0.0 else 'smaller'} by as much"
+    return Finding(Name.BAR, ratio, limit, "", FindingVerdict.CANNOT_TELL, why, stated)
+
+
+def _other_direction(one: Seen, runs: Sequence[Seen]) -> Seen | None:
+    """The run of the same test and mounting in the other direction, of which it is known where it should lie."""
+    if one.run.expected is None:
+        return None
+    others = (
+        other
+        for other in runs
+        if (other.run.test, other.run.mounting) == (one.run.test, one.run.mounting)
+        and other.run.circle.direction is not one.run.circle.direction
+        and other.run.expected is not None
+    )
+    return next(others, None)
+
+
+def _run_as(one: Seen, other: Seen) -> Seen:
+    """A run as it would be judged if it were of the other direction."""
+    return replace(one, run=replace(one.run, circle=other.run.circle, expected=other.run.expected))
+
+
+def _begun(one: Seen, as_run: Seen, way: Way) -> NDArray[np.float64]:
+    """Coefficients of a run along its travel, counted from the start of the plan, if it began where a way has it, shape (7,) [µm]."""
+    circle = as_run.run.circle
+    ahead = np.radians(circle.direction.sign * (way.begin_deg(circle.start_deg) - circle.start_deg))
+    angles = ahead * np.arange(1, HIGHEST_HARMONIC + 1)
+    mean, cosines, sines = np.split(read_um(one), [1, HIGHEST_HARMONIC + 1])
+    turned = (cosines * np.cos(angles) - sines * np.sin(angles), cosines * np.sin(angles) + sines * np.cos(angles))
+    return np.concatenate([mean, *turned])
+
+
+class _Likelihood:
+    """How likely readings are, whatever the size of the machine's errors.
+
+    Args:
+        runs: n runs, each with where it should lie.
+        read: coefficients of each along its travel, shape (7,) each [µm].
+        same: of the same runs with other readings, whose covariances are the same; None: there is none.
+    """
+
+    def __init__(
+        self, runs: Sequence[Seen], read: Sequence[NDArray[np.float64]], same: _Likelihood | None = None
+    ) -> None:
+        self._off = np.concatenate([each - expected_um(one.run) for one, each in zip(runs, read, strict=True)])
+        self._machine_um2, self._rest_um2 = covariances(runs) if same is None else same.known_um2
+        self._by_size = np.array([log_likelihood(self._off, self._covariance_um2(size)) for size in SIZES])
+        self.logarithm = float(logsumexp(self._by_size))
+
+    @property
+    def known_um2(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Covariances by the machine's causes and by all else, shape (7 n, 7 n) each [µm²]."""
+        return self._machine_um2, self._rest_um2
+
+    def _covariance_um2(self, size: float) -> NDArray[np.float64]:
+        return float(size) ** 2 * self._machine_um2 + self._rest_um2
+
+    def fits(self, less_um: NDArray[np.float64] | float = 0.0) -> bool:
+        """Return whether the readings are as near to what is expected as those of a machine with the causes that are known.
+
+        Args:
+            less_um: what is taken off them before, shape (7 n,) [µm].
+        """
+        off = self._off - less_um
+        likeliest = max((self._covariance_um2(size) for size in SIZES), key=lambda each: log_likelihood(off, each))
+        return float(off @ np.linalg.solve(likeliest, off)) <= length_quantile(len(off)) ** 2
+
+    def gained(self, column: NDArray[np.float64], sigma: float) -> tuple[float, float]:
+        """Return by how much a column of unknown amount makes the readings likelier, as a logarithm, and how much of it they have.
+
+        Args:
+            column: what the readings are per amount, shape (7 n,).
+            sigma: standard deviation of the amount before.
+        """
+        logarithms, amounts = [], []
+        for size in SIZES:
+            covariance = self._covariance_um2(size)
+            pulled = np.linalg.solve(covariance, column)
+            # Matrix determinant lemma, and the conditional mean of one normal amount [Rasmussen and Williams, eq. A.9, A.10].
+            weight = float(column @ pulled) + sigma**-2
+            amount = float(pulled @ self._off) / weight
+            logarithms.append(0.5 * (amount**2 * weight - float(np.log(weight * sigma**2))))
+            amounts.append(amount)
+        joint = self._by_size + np.array(logarithms)
+        amount = float(np.exp(joint - logsumexp(joint)) @ np.array(amounts))
+        return float(logsumexp(joint)) - self.logarithm, amount

@@ -24,7 +24,7 @@ from tests.quality.equipment import Row, equipment, print_equipment
 from tests.quality.sessions import TESTS, calibrated, drifting_session, sound, spoilt
 from tests.quality.shares import spoil
 from tests.quality.spoilers import SPOILERS, larger, mirrored
-from tests.quality.strange import mirror_image, print_strange
+from tests.quality.strange import mirror_image, print_later, print_strange
 
 
 def false_alarms(folder: Path, seed: int, wanted: int, *, with_model: bool) -> None:
@@ -102,6 +102,9 @@ def main() -> None:
         "--only", default="", help="of the faults of other kinds those that match, as `all runs|ball with`"
     )
     parser.add_argument(
+        "--later", action="store_true", help="of these faults only those behind other tests, without a model"
+    )
+    parser.add_argument(
         "--shared", type=int, default=0, help="sessions of which all runs share a fault, in place of all else"
     )
     parser.add_argument("--limits", type=int, default=0, help="sessions whose limits are listed, in place of all else")
@@ -114,7 +117,7 @@ def main() -> None:
         if given.shared:
             shared(Path(folder), range(1000 + given.seed, 1000 + given.seed + given.shared))
         if given.strange:
-            print_strange(Path(folder), 1000 + given.seed, given.only)
+            (print_later if given.later else print_strange)(Path(folder), 1000 + given.seed, given.only)
         counted: Row = collections.Counter()
         for seed in range(given.seed, given.seed + given.equipment):
             counted.update(equipment(Path(folder) / str(seed), 1000 + seed))

@@ -365,6 +365,26 @@ def _with(one: Seen, recording: Recording) -> Seen:
     return seen(replace(one.run, recording=recording))
 
 
+def print_later(folder: Path, seed: int, only: str = "") -> None:
+    """The same in short: behind the first runs of all other tests, without a model."""
+    first = [one for one in sound(folder, seed, TESTS).runs if one.run.repeat == 1]
+    for fault in (each for each in STRANGE if re.search(only, f"{each.name}, {each.shared}")):
+        for size in fault.sizes:
+            faulty = {id(one): _spoilt(one, fault.spoiler, size) for one in first}
+            words: collections.Counter[Advice] = collections.Counter()
+            worst = 0.0
+            for one in first[1::2]:
+                spoilt = faulty[id(one)]
+                has = [other is one or _has(fault, other, one) for other in first]
+                runs = [faulty[id(other)] if had else other for other, had in zip(first, has, strict=True)]
+                word = answer(SessionRuns(runs).judge(spoilt).findings, spoilt.problem).word
+                words[word] += 1
+                if word is not Advice.REPEAT:
+                    worst = max(worst, float(np.linalg.norm(spoilt.local_um - one.local_um)))
+            cells = "/".join(str(words[word]) for word in (Advice.GOOD, Advice.CANNOT_TELL, Advice.REPEAT))
+            sys.stdout.write(f"| {fault.name} | {fault.shared} | {size:g} | {cells} | {worst:.1f} |\n")
+
+
 def print_strange(folder: Path, seed: int, only: str = "") -> None:
     """The table of docs/circles.md: GOOD, CANNOT TELL and REPEAT of each fault."""
     words, harm = strange(folder, seed, only)

@@ -86,6 +86,7 @@ class CircleChannel:
         for key, source in self.sources.items():
             self._laid[key] = self._on_a_grid(source)
         self._refined: dict[tuple[str, str], tuple[Variant, ...]] = {}
+        self._former: list[Variant] = []
         self._last: tuple[Calibration, list[BarReading]] = calibration, self.readings
 
     @property
@@ -251,6 +252,7 @@ class CircleChannel:
         # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
         covered = [len(p.grid) / (1.0 if p.listed else 2.5) for p in (parameters[k] for k in shaped)]
         weight = -float(np.log(max(float(np.prod(covered)), 1.0)))
+        self._former += self._refined.get((name, law), ())
         self._refined[name, law] = tuple(
             replace(
                 variant,
@@ -261,6 +263,13 @@ class CircleChannel:
             )
             for variant in variants
         )
+
+    def give_back(self) -> None:
+        """Let columns of forms that were laid out better since be replaced; no comparison may ask for them any more."""
+        former, self._former = self._former, []
+        if former:
+            columns = [part for one in former for part in (one.columns, one.slack, one.whole)]
+            self.columns.give_back(np.unique(np.concatenate(columns)))
 
     def _readings_about(self, fit: Calibration) -> list[BarReading]:
         """Readings of all runs as a fit predicts them; several causes are laid out about one fit, one after the other."""

@@ -10,7 +10,7 @@ from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.explained import MOST_MEMBERS
 from dbbstation.diagnosis.left_out import groups_of
 from dbbstation.inference.chosen_anew import ChosenAnew, chosen_anew
-from dbbstation.inference.hypotheses import search
+from dbbstation.inference.hypotheses import CLOSE, search
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -44,7 +44,7 @@ def without_tests(explained: Explained) -> ChosenAnew | None:
 
     def choose(comparison: ModelComparison) -> Sequence[Member]:
         begin = [settled.best.members]
-        return search(comparison, settled.causes, begin, most_members=MOST_MEMBERS).best.members
+        return search(comparison, settled.causes, begin, most_members=MOST_MEMBERS, likely=CLOSE).best.members
 
     of_all = channel.beside_base(noise_mm, settled.scatter).comparison(target)
     return chosen_anew(of_all, of_others(), choose, lambda name: (name,), lambda cause: cause.named)

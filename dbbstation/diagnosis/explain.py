@@ -20,7 +20,7 @@ from dbbstation.diagnosis.explained import MOST_MEMBERS, Explained, SettledCircl
 from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
-from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
+from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, Posterior, search
 from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.verdict import SURE
@@ -120,16 +120,17 @@ def _settle(channel: CircleChannel, progress: Callable[[str], None]) -> SettledC
     tried: set[frozenset[tuple[str, str]]] = set()
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     refused: dict[str, str] = {}
-    looked = False
-    for _ in range(MOST_ROUNDS):
+    looked, likely = False, CLOSE  # the most probable set alone is wanted, until nothing changes
+    for left in reversed(range(MOST_ROUNDS)):
+        channel.give_back()
         target = channel.target(fit)
         noise = channel.noise(target, unmodelled.causes, noise_mm)
         noise_mm = float(np.sqrt(noise.power[0]))
         beside = channel.beside_base(noise_mm, scatter)
         comparison = beside.comparison(target)
         causes = _listed(channel, unmodelled, comparison, refused)
-        named_causes = [cause for cause in causes if cause.named]
-        posterior = search(comparison, causes, seeds.values(), most_members=MOST_MEMBERS)
+        likely = likely if left else LIKELY
+        posterior = search(comparison, causes, seeds.values(), most_members=MOST_MEMBERS, likely=likely)
         if posterior.at_limit:
             return _without_a_name(channel, unmodelled, noise, scatter)
         best = _steady(posterior, fitted)
@@ -138,38 +139,44 @@ def _settle(channel: CircleChannel, progress: Callable[[str], None]) -> SettledC
             fit, posterior, best, comparison, causes, unmodelled, noise, misfit_of(fit, noise), refused, scatter=scatter
         )
         usual = _usual_scatter(fit) if any(m.cause.setup for m in best.members) else scatter
-        named_members = [m for m in best.members if m.cause.named]
-        pairs = [(m, m) for m in named_members]
-        pairs += [(m, r) for m in named_members for r in in_place_of(m.cause.name, comparison, named_causes, best)]
-        rough = [(m, r) for m, r in pairs if (r.cause.name, r.variant.law) not in laid_out]
+        rough = [(m, r) for m, r in _with_rivals(settled) if (r.cause.name, r.variant.law) not in laid_out]
         for member, rival in rough:
             laid_out.add((rival.cause.name, rival.variant.law))
             _lay_out(channel, beside, best, member, rival, fit, target)
-        named = frozenset((m.cause.name, m.variant.law) for m in best.members if m.cause.named)
+        named = frozenset((m.cause.name, m.variant.law) for m in settled.members)
         if rough or usual > scatter:
             scatter = max(usual, scatter)
             continue
         if named == fitted or named in tried:
-            break
+            if likely == LIKELY:
+                break
+            likely = LIKELY
+            continue
         tried.add(named)
         progress("joint fit with " + (", ".join(sorted(name for name, _ in named)) or "nothing more"))
         joint = _joint(channel, comparison, best)
-        if joint is None:
-            # An amplitude of next to nothing leaves a nonlinear parameter beside it without a hold, or a step leaves what
-            # the machine can reach: that cause cannot be modelled here.
-            weakest = min((m for m in best.members if m.cause.named), key=lambda m: best.log_factor(m.cause.name))
-            refused[weakest.cause.name] = "No machine with it explains these recordings: the joint fit does not settle."
-            continue
-        if negative := _negative(joint, channel):
-            refused |= negative
+        impossible = _impossible(joint, settled, channel)
+        if joint is None or impossible:
+            refused |= impossible
             continue
         fit, fitted = joint, named
         for name, law in sorted(named):
             channel.refine(name, law, _values_in(fit, name), fit)
         if not looked:
-            unmodelled.look(fit, [m for m in best.members if m.cause.named], noise_mm)
+            unmodelled.look(fit, settled.members, noise_mm)
             looked = True
     return _fitted_as_named(channel, settled)
+
+
+def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
+    """Named members of the most probable hypothesis, each with itself and with the causes that do best in its place."""
+    best, named = settled.best, [cause for cause in settled.causes if cause.named]
+    pairs = [(member, member) for member in settled.members]
+    return pairs + [
+        (member, rival)
+        for member in settled.members
+        for rival in in_place_of(member.cause.name, settled.comparison, named, best)
+    ]
 
 
 def _listed(
@@ -200,6 +207,16 @@ def _without_a_name(channel: CircleChannel, unmodelled: Unmodelled, noise: Spect
     return SettledCircles(
         fit, posterior, alone, comparison, causes, unmodelled, noise, left, at_limit=True, scatter=scatter
     )
+
+
+def _impossible(joint: Calibration | None, settled: SettledCircles, channel: CircleChannel) -> dict[str, str]:
+    """Causes that no machine has as these recordings ask for them, and what to say of it."""
+    if joint is not None:
+        return _negative(joint, channel)
+    # An amplitude of next to nothing leaves a nonlinear parameter beside it without a hold, or a step leaves what the machine can
+    # reach: that cause cannot be modelled here.
+    weakest = min(settled.members, key=lambda m: settled.best.log_factor(m.cause.name))
+    return {weakest.cause.name: "No machine with it explains these recordings: the joint fit does not settle."}
 
 
 def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.hypotheses import search
+from dbbstation.inference.hypotheses import CLOSE, search
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -63,7 +63,8 @@ class SettledCircles:
         """
         if self.at_limit:
             return None
-        return search(self.comparison, self.causes, most_members=MOST_MEMBERS).best.names == self.posterior.best.names
+        anew = search(self.comparison, self.causes, most_members=MOST_MEMBERS, likely=CLOSE)
+        return anew.best.names == self.posterior.best.names
 
     @property
     def members(self) -> tuple[Member, ...]:

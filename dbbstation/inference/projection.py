@@ -67,6 +67,8 @@ class CauseColumns:
         self._ready, self._shared = 0, False
         self._products = np.zeros((0, 0))
         self._along = np.zeros((self.axes.shape[1], 0))
+        self._free: list[int] = []
+        self._changed: list[int] = []  # columns of which products and share of the axes are those of former ones
         self.count = 0
 
     @property
@@ -85,6 +87,7 @@ class CauseColumns:
         """One that more columns may be added to by itself; those that are there are shared."""
         other: CauseColumns = copy(self)
         other._waiting = list(self._waiting)
+        self._free, other._free, other._changed = [], [], list(self._changed)
         # Either writes columns behind those that are there, and needs a buffer of its own for that.
         self._shared = other._shared = True
         return other
@@ -115,7 +118,22 @@ class CauseColumns:
             products[:, known:] = self.samples.T @ self.samples[:, known:]
             products[known:, :known] = products[:known, known:].T
             self._products = products
+        self._renew()
         return self._products
+
+    def _renew(self) -> None:
+        """Work products and share of the axes out again for columns that took the place of others."""
+        changed, self._changed = np.array(self._changed, dtype=np.int64), []
+        for known, products in ((len(self._products), True), (self._along.shape[1], False)):
+            own = changed[changed < known]
+            if not len(own):
+                continue
+            columns = self.samples[:, own]
+            if products:
+                self._products[:, own] = self.samples[:, :known].T @ columns
+                self._products[own] = self._products[:, own].T
+            else:
+                self._along[:, own] = self.axes.T @ columns
 
     @property
     def along(self) -> NDArray[np.float64]:
@@ -123,10 +141,17 @@ class CauseColumns:
         known = self._along.shape[1]
         if known < self.count:
             self._along = np.hstack([self._along, self.axes.T @ self.samples[:, known:]])
+        self._renew()
         return self._along
 
     def add(self, columns: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Take in columns, shape (m, q), and return their numbers."""
+        """Take in columns, shape (m, q), and return their numbers; they take the places of those that were given back first."""
+        taken = np.array(self._free[: columns.shape[1]], dtype=np.int64)
+        if len(taken):
+            self._free = self._free[len(taken) :]
+            self._changed += taken.tolist()
+            self._buffer[:, taken] = columns[:, : len(taken)]
+            columns = columns[:, len(taken) :]
         first, last = self.count, self.count + columns.shape[1]
         if self._whitened is None:
             # Nothing is to be worked out later, and a copy of what waits would take as much memory again.
@@ -136,7 +161,12 @@ class CauseColumns:
         else:
             self._waiting.append(columns)
         self.count = last
-        return np.arange(first, last)
+        return np.concatenate([taken, np.arange(first, last)])
+
+    def give_back(self, columns: NDArray[np.int64]) -> None:
+        """Let columns that nobody asks for any more, shape (q,), be replaced by those that are taken in next."""
+        if self._whitened is None and not self._shared:
+            self._free = sorted({*self._free, *columns.tolist()})
 
     def _make_room(self, last: int) -> None:
         """Have a buffer of one's own with room for so many columns."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.hypotheses import search
+from dbbstation.inference.hypotheses import CLOSE, search
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import spread
 
@@ -63,7 +63,7 @@ def selection_frequency(
         drawn = CauseColumns(rows[:, :base])
         drawn.add(rows[:, base:-1])
         comparison = BesideBase(drawn, known, held, noise).comparison(rows[:, -1])
-        for name in search(comparison, causes).best.names:
+        for name in search(comparison, causes, likely=CLOSE).best.names:
             times[name] += 1
     return {name: count / DRAWS for name, count in times.items()}
 

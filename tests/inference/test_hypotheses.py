@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.inference.hypotheses import LIKELY, NEGLIGIBLE, search
+from dbbstation.inference.hypotheses import CLOSE, LIKELY, NEGLIGIBLE, search
 from dbbstation.inference.model_comparison import FLEXIBLE, Member
 from tests.inference.dense import Dense, cause, variant
 from tests.inference.subsets import inclusion, log_posteriors
@@ -42,6 +42,8 @@ def test_probabilities_are_those_of_all_sets_and_all_sizes(rng, alike, noise):
     likely = [h for h in posterior.hypotheses if h.log_posterior > top - LIKELY]
     sizes = [h.log_posterior - full[h.names] for h in likely]
     assert posterior.best.names == max(full, key=full.get)
+    # Who wants that one alone need not look so far.
+    assert search(problem.comparison(), causes, likely=CLOSE).best.names == posterior.best.names
     assert np.abs(off).max() < 0.05
     assert np.abs(sizes).max() < 0.2
 

@@ -172,3 +172,30 @@ def test_rows_that_are_held_back_say_nothing(samples, rng, alone, only):
     assert held_back.log_evidence(members) == pytest.approx(expected.log_evidence(members), rel=1e-8)
     assert held_back.estimates(members).values == pytest.approx(expected.estimates(members).values, rel=1e-8)
     assert whole.samples == pytest.approx(causes)
+
+
+def test_columns_take_the_places_of_those_that_were_given_back(samples, rng):
+    """Products are those of the columns that are there now, whether they were asked for before or not; a copy keeps its own."""
+    base, causes, target = samples
+    columns = CauseColumns(base)
+    columns.add(causes)
+    held = held_rows(rng, 0)
+    before = BesideBase(columns, KNOWN, held, NOISE).comparison(target)
+    members = [Member(cause("a", variant(0, 2)), variant(0, 2), 1.0)]
+    evidence = before.log_evidence(members)
+    columns.give_back(np.array([1, 3]))
+    more = rng.normal(size=(SAMPLES, 3))
+    assert columns.add(more).tolist() == [1, 3, causes.shape[1]]
+    now = np.column_stack([causes, more[:, 2]])
+    now[:, [1, 3]] = more[:, :2]
+    assert columns.samples == pytest.approx(now)
+    assert columns.gram == pytest.approx(now.T @ now)
+    assert columns.along == pytest.approx(columns.axes.T @ now)
+    # What was compared before is as it was.
+    assert before.log_evidence(members) == evidence
+    columns.give_back(np.array([0]))
+    other = columns.copy()
+    other.add(more[:, :1])
+    columns.add(more[:, :1])
+    assert columns.samples[:, 0] == pytest.approx(now[:, 0])
+    assert other.samples[:, 0] == pytest.approx(now[:, 0])

@@ -131,28 +131,46 @@ class Alternatives:
 def named_already(
     comparison: ModelComparison, nameless: Sequence[Cause], named: Iterable[tuple[Variant, float]]
 ) -> frozenset[str]:
-    """Unmodelled effects, of one amplitude, that a named cause has among its forms, within what its formula may be off by.
+    """Unmodelled effects, of `MOST_ALIKE` amplitudes at the most, that a named cause has among its forms, within what its formula may be off by.
 
-    They are that cause and no hypothesis of their own: listed beside it they would share its probability.
+    They are that cause and no hypothesis of their own: listed beside it they would share its probability. What is left of an effect beside a
+    form is counted over all its amplitudes together, each by what is seen of it: a shift of balls that no circle shows decides nothing.
 
     Args:
         comparison: of columns.
         nameless: the unmodelled effects.
         named: forms of named causes, and by how much their formula may be off, as a share of the effect.
     """
-    forms = [(variant.columns[0], share) for variant, share in named if len(variant.columns) == 1 and share > 0.0]
-    single = [cause for cause in nameless if len(cause.variants[0].columns) == 1]
-    if not forms or not single:
-        return frozenset()
-    columns = np.array(
-        [*(int(cause.variants[0].columns[0]) for cause in single), *(int(column) for column, _ in forms)]
-    )
-    products = comparison.beside((), columns)
-    size = np.sqrt(np.maximum(np.diag(products), 1e-300))
-    cosine = np.abs(products[: len(single), len(single) :]) / np.outer(size[: len(single)], size[len(single) :])
-    apart = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-    inside = (apart <= [share for _, share in forms]).any(axis=1)
-    return frozenset(cause.name for cause, is_inside in zip(single, inside, strict=True) if is_inside)
+    found: set[str] = set()
+    by_size: dict[int, list[tuple[NDArray[np.int64], float]]] = {}
+    for variant, share in named:
+        if share > 0.0 and len(variant.columns) <= MOST_ALIKE:
+            by_size.setdefault(len(variant.columns), []).append((variant.columns, share))
+    for size, forms in by_size.items():
+        alike = [cause for cause in nameless if len(cause.variants[0].columns) == size]
+        if not alike:
+            continue
+        own = np.array([cause.variants[0].columns for cause in alike])
+        other = np.array([columns for columns, _ in forms])
+        products = comparison.beside((), np.concatenate([own.ravel(), other.ravel()]))
+        place = np.arange(len(products)).reshape(-1, size)
+        a, b = place[: len(own)], place[len(own) :]
+        whole = np.array([np.trace(products[np.ix_(one, one)]) for one in a])
+        roots = [_inverse_root(products[np.ix_(one, one)]) for one in b]
+        shown = np.array(
+            [
+                [np.sum(np.square(products[np.ix_(one, form)] @ root)) for form, root in zip(b, roots, strict=True)]
+                for one in a
+            ]
+        )
+        apart = np.sqrt(np.maximum(1.0 - shown / np.maximum(whole, 1e-300)[:, None], 0.0))
+        inside = (apart <= [share for _, share in forms]).any(axis=1)
+        found |= {cause.name for cause, is_inside in zip(alike, inside, strict=True) if is_inside}
+    return frozenset(found)
+
+
+MOST_ALIKE = 3
+"""Amplitudes of an effect up to which it is asked whether a named cause has it among its forms: a shift in space."""
 
 
 def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[Member]:

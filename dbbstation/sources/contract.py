@@ -106,6 +106,7 @@ class Setup:
             calibrator leaves [mm].
         bar_reads_long_mm: reading less true distance, as calibrator and temperature let expect it: part of every reading,
             and never taken off one [mm].
+        bar_length_mm: distance of the balls at which the bar was calibrated; None where nobody calibrated it [mm].
         place_known: False for a ball that was put up under the spindle: `fixed_ball_mm` is where the machine was told
             to stand then, and nobody knows where the ball is.
         set_up_errors: micrometer readings of such a ball; None where there are none.
@@ -132,6 +133,7 @@ class Setup:
     run: str = ""
     start_uncertainty_deg: float = 0.0
     bar_reads_long_mm: float = 0.0
+    bar_length_mm: float | None = None
     moving_s: tuple[tuple[float, float], ...] = ()
     thermometers: Mapping[str, Thermometer] = field(default_factory=dict)
 

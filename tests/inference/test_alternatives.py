@@ -86,3 +86,17 @@ def test_an_effect_that_a_named_cause_has_among_its_forms_is_that_cause(rng) -> 
         )
         assert found == expected
     assert named_already(dense.comparison(), nameless, []) == frozenset()
+
+
+def test_a_shift_in_space_that_a_named_cause_has_among_its_forms_is_that_cause(rng):
+    """Three amplitudes: what least squares leave of all columns together beside those of the named form, as a share of the whole."""
+    base, effects = rng.normal(size=(60, 3)), rng.normal(size=(60, 9))
+    effects[:, 3:6] = effects[:, :3] @ rng.normal(size=(3, 3)) + 0.2 * effects[:, 3:6] + base @ rng.normal(size=(3, 3))
+    dense = Dense(base, effects, np.zeros(60), 0.1)
+    one, other = dense.columns[:, 3:6], dense.columns[:, :3]
+    left = one - other @ np.linalg.lstsq(other, one, rcond=None)[0]
+    apart = float(np.linalg.norm(left) / np.linalg.norm(one))
+    assert 0.02 < apart < 0.5
+    nameless = [cause("alike", variant(3, 4, 5), named=False), cause("other", variant(6, 7, 8), named=False)]
+    for share, expected in ((1.01 * apart, {"alike"}), (0.99 * apart, set())):
+        assert named_already(dense.comparison(), nameless, [(variant(0, 1, 2), share)]) == expected

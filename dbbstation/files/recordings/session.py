@@ -141,6 +141,7 @@ class SessionFolder(SessionDetails):
             ball_uncertainty_mm=ball.uncertainty_mm,
             bar_uncertainty_mm=uncertainty_mm,
             bar_reads_long_mm=long_mm,
+            bar_length_mm=None if self.bar is None else self.bar.calibrated_length_mm,
             place_known=ball.place_known,
             set_up_errors=next((reading.to_domain() for reading in readings), None),
             plate=ball.plate,

@@ -24,9 +24,7 @@ class BarScale(LinearSource):
     """The reading is off by the square of its way from the bar's nominal length.
 
     The way is counted from the whole millimetre that a run's readings lie about. Where that is not the length at which the bar was
-    set, the square has a part in proportion and a constant besides. What is in proportion to the way is not asked for: kinematic
-    errors that are as much larger look the same, and what they leave of the readings is the readings' own noise, which such an
-    effect would follow. A machine whose circles deviate by a few micrometres does not show a bent scale either.
+    set, the square has a part in proportion and a constant besides. What is in proportion to the way is another source, `bar-gain`. A machine whose circles deviate by a few micrometres does not show a bent scale either.
     """
 
     name = "bar-scale"

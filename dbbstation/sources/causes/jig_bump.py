@@ -61,7 +61,7 @@ class JigBump(ErrorSource):
 
     def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:
         """Whether there are runs before and after it."""
-        after = [_number(motion) >= nonlinear[0] for motion in motions]
+        after = [_is_after(motion, nonlinear[0]) for motion in motions]
         return any(after) and not all(after)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
@@ -71,7 +71,7 @@ class JigBump(ErrorSource):
             ModelError: the motion has no time.
         """
         self.require(motion)
-        return Effect(fixed_ball_mm=MM_PER_UM * values[:3] * float(_number(motion) >= values[3]))
+        return Effect(fixed_ball_mm=MM_PER_UM * values[:3] * float(_is_after(motion, values[3])))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """By the shift; the number of runs before it is none that a fit could move.
@@ -80,7 +80,12 @@ class JigBump(ErrorSource):
             ModelError: the motion has no time.
         """
         self.require(motion)
-        return Effect(fixed_ball_mm=MM_PER_UM * np.eye(3, 4) * float(_number(motion) >= values[3]))
+        return Effect(fixed_ball_mm=MM_PER_UM * np.eye(3, 4) * float(_is_after(motion, values[3])))
+
+
+def _is_after(motion: Motion, runs: float) -> bool:
+    """Whether so many runs of the session came before the motion; a fit gives the number to within rounding only."""
+    return _number(motion) > runs - 0.5
 
 
 def _number(motion: Motion) -> int:

@@ -52,8 +52,8 @@ class WanderingBar(Mechanism):
 class BarScale(Mechanism):
     """The bar's scale is not quite a millimetre per millimetre, and is bent.
 
-    What it shows counts from the length at which it was set on its calibrator: per 0.1 mm from there it is off by
-    `linear_um`, and by `curved_um` where it is 0.1 mm away on either side.
+    What it shows counts from the length at which it was set on its calibrator, the radius of each test if `set_at_mm` is None: per 0.1 mm
+    from there it is off by `linear_um`, and by `curved_um` where it is 0.1 mm away on either side.
     """
 
     name: ClassVar[str] = "bar-scale"
@@ -61,12 +61,15 @@ class BarScale(Mechanism):
 
     linear_um: float = 0.0
     curved_um: float = 2.0
+    set_at_mm: float | None = None
 
     def reading_mm(self, motion: Motion, platform: Platform, length_mm: FloatArray) -> FloatArray:
-        """A parabola of the distance `(n,)`, constant beyond its range, in which no circle lies but feed-in and feed-out do."""
+        """A line and a parabola of the distance `(n,)`; the latter constant beyond its range, in which no circle lies but feed-in does."""
         del platform
-        off = np.clip((length_mm - motion.of_run.path.path.radius_mm) / 0.1, -RANGE, RANGE)
-        return (self.linear_um * off + self.curved_um * off**2) / 1000.0
+        set_at_mm = motion.of_run.path.path.radius_mm if self.set_at_mm is None else self.set_at_mm
+        off = (length_mm - set_at_mm) / 0.1
+        bent = np.clip(off, -RANGE, RANGE)
+        return (self.linear_um * off + self.curved_um * bent**2) / 1000.0
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,57 @@
+"""Error source: the bar's encoder shows more or less than a millimetre for each millimetre."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+
+class BarGain(LinearSource):
+    """The reading is off in proportion to the way of the encoder from the length at which the bar was calibrated.
+
+    The way is what was commanded of it. To first order a reading is r = n + J p: n the commanded distance less the calibrated length, J p what
+    geometric errors p add. Times one and a share s that is n + J p' + s n with p' = (1 + s) p: whatever the scale makes of geometric errors are other
+    geometric errors, which no bar can tell from them. What remains is s n. It is zero where every circle is as large as the bar was
+    calibrated, and shows where one bar measures circles of several sizes.
+    """
+
+    name = "bar-gain"
+    belongs_to = Owner.INSTRUMENT
+    varies_with = "commanded distance"
+    form_uncertainty = 0.1  # a scale is off in more ways than in proportion
+    texts = Texts(
+        what="The encoder in the bar shows a little more or less than a millimetre for each millimetre.",
+        shows="Circles that are larger or smaller than the length at which the bar was calibrated are off in their mean radius, in proportion. "
+        "All deviations of a circle are off by the same share, which geometric errors that are so much larger do as well.",
+        confirm="Measure one test with two radii, some millimetres apart, and the same bar; or move the bar by a millimetre against a better "
+        "length gauge.",
+        cure="Let the encoder be calibrated at two lengths; measure circles as large as the bar was calibrated.",
+        equation="reading = distance + s n, n = commanded distance less calibrated length of the bar",
+        origin="gain of a length encoder; one that is stated to 0.3 % is off by 3 µm/mm",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """One share."""
+        return (
+            Parameter(
+                "gain_um_mm", "µm/mm", 3.0, "reading less true way, for each millimetre from the calibrated length"
+            ),
+        )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """The commanded way; zero where the bar's calibrated length or the place of the ball is not known."""
+        setup = motion.setup
+        if setup is None or setup.bar_length_mm is None or not setup.place_known:
+            return Effect(reading_mm=np.zeros((len(motion), 1)))
+        distance = np.linalg.norm(motion.poses[:, :3] - setup.fixed_ball_mm, axis=1)
+        return Effect(reading_mm=MM_PER_UM * (distance - setup.bar_length_mm)[:, None])

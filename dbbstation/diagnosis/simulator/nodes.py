@@ -174,7 +174,7 @@ class Node:
 
 
 SHARES = (1.0, 0.3, 0.1)
-"""Shares of what the linear comparison proposes at which a refit is begun, one where the one before runs away."""
+"""Shares of what the linear comparison proposes at which a refit may be begun: that which leaves least, the next where it fails."""
 
 MOST_SHARE = 2.0
 """Share of the largest size tried that a fit may begin at: beyond, the answer was not taken."""
@@ -218,17 +218,27 @@ class Nodes:
             self.progress(f"refit with {one.name}")
             there = [member for member in settled.best.members if member.cause.name in node.names]
             numbers = np.array(_inside(one, node.numbers_of(settled, one, there)))
-            amplitudes = len(one.term.amplitudes)
-            for share in SHARES:
-                begun = np.concatenate([share * numbers[:amplitudes], numbers[amplitudes:]])
-                term = one.term.with_numbers(begun.tolist())
-                state = FittedState(node.fitted.state.values, (*node.fitted.state.terms, term))
+            for state in self._beginnings(node, one, numbers):
                 try:
-                    self.known[names] = self._fitted(node, state, (*node.inside, one))
-                    break
+                    found = self._fitted(node, state, (*node.inside, one), _left(node) / BETTER)
                 except RanAwayError:
                     continue
+                if found is not None:
+                    self.known[names] = found
+                    break
         return self.known.get(names)
+
+    def _beginnings(self, node: Node, one: Candidate, numbers: NDArray[np.float64]) -> list[FittedState]:
+        """States at which a refit with one more term may begin, the closest to the recordings first.
+
+        The linear comparison says how large the term is, which may be far too much.
+        """
+        amplitudes, states = len(one.term.amplitudes), []
+        for share in SHARES:
+            term = one.term.with_numbers([*(share * numbers[:amplitudes]), *numbers[amplitudes:]])
+            states.append(FittedState(node.fitted.state.values, (*node.fitted.state.terms, term)))
+        left = [_rms(rows) for rows in self.work.residuals(states, strict=False)]
+        return [states[int(k)] for k in np.argsort(left) if np.isfinite(left[int(k)])]
 
     def instead(
         self, node: Node, more: Sequence[Candidate], settled: Settled, beside: Sequence[Member] | None = None
@@ -272,23 +282,28 @@ class Nodes:
             found = self._fitted(node, state, inside)
         except RanAwayError:
             return known
-        if known is None or _left(found) < BETTER * _left(known):
+        if found is not None and (known is None or _left(found) < BETTER * _left(known)):
             self.known[names] = found
             if known is not None:
                 self.bettered.add(names)
-        return self.known[names]
+        return self.known.get(names)
 
     def again(self, node: Node, weigh: Weigh, sigma: float) -> Node:
         """The same terms, refitted in other noise."""
         self.known[node.names] = replace(node, fitted=fit(self.work, node.fitted.state, weigh, sigma=sigma))
         return self.known[node.names]
 
-    def _fitted(self, node: Node, state: FittedState, inside: tuple[Candidate, ...]) -> Node:
+    def _fitted(
+        self, node: Node, state: FittedState, inside: tuple[Candidate, ...], most: float = np.inf
+    ) -> Node | None:
         """Refit rows as they are, then in the noise that each refit leaves, until that is the same.
 
         The noise of a comparison is that beside linear answers, which may be far from the true ones: it is no place to begin from.
+        None where more than `most` is left, root mean square: a term more cannot leave clearly more, so this is a wrong minimum.
         """
         fitted, before = fit(self.work, state), None
+        if _rms(fitted.residual) > most:
+            return None
         for _ in range(MOST_NOISES):
             bank = noise_left(self.work, fitted.residual, fitted.columns)
             if before is not None and alike(bank.noise, before):
@@ -304,7 +319,13 @@ leaves about as much."""
 
 
 def _left(node: Node) -> float:
-    return float(np.sqrt(np.mean(np.square(node.fitted.residual))))
+    return _rms(node.fitted.residual)
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    """Root mean square; infinite, or not a number, where a simulation ran away."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _inside(one: Candidate, numbers: Sequence[float]) -> list[float]:

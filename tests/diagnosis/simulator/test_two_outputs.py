@@ -101,3 +101,15 @@ def test_a_term_with_which_simulations_run_away_is_given_up_and_not_the_whole_co
     away = Term("flow", TermForm.CUBIC, ("level",), (1e6,))
     with pytest.raises(RanAwayError, match="ran away"):
         fit(runs, FittedState((0.5,), (away,)))
+
+
+def test_a_refit_begins_where_a_term_leaves_least_and_not_where_its_linear_answer_points(rng):
+    runs = work(rng)
+    nodes = Nodes(runs)
+    node = nodes.base(FittedState((0.5,)))
+    one = next(each for each in node.outside if each.term.form is TermForm.SQUARE)
+    # Nothing is missing, so the less of it the better.
+    begun = nodes._beginnings(node, one, np.array([-0.2]))
+    assert [state.terms[0].amplitudes[0] for state in begun] == pytest.approx([-0.02, -0.06, -0.2])
+    # A term of which any amount makes the simulation run away is begun nowhere.
+    assert nodes._beginnings(node, one, np.array([1e6])) == []

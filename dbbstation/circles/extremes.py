@@ -42,9 +42,9 @@ curve."""
 QUANTILE = 1.96
 """Standard deviations of the end of a 95 % interval [normal distribution]."""
 
-STEPS = np.array([-9.0, -6.0, -4.0, -2.5, -1.0, 0.5, 2.0, 3.5])
-"""Sizes that are tried, as what was read and so many standard deviations of one sample's noise. Noise of a range of many thousand
-samples adds less than nine of them."""
+STEPS = np.array([-np.inf, -14.0, -9.0, -6.0, -4.0, -2.5, -1.0, 0.5, 2.0, 3.5])
+"""Sizes that are tried, as what was read and so many standard deviations of one sample's noise, down to none. Normal noise of a range of
+many thousand samples adds less than nine of them, long tails add more."""
 
 CERTAIN = 3.0
 """Standard deviations beyond which no further size is tried."""

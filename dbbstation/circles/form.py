@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.circles.continued import continued_noise
+from dbbstation.circles.pushes import NO_TAILS, pushes_of
 from dbbstation.inference.harmonics import bands
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.circles.continued import ContinuedNoise
+    from dbbstation.circles.pushes import Pushes
 
 CHANCE = 0.01
 """Chance at which noise alone has one line anywhere in its spectrum that counts as form."""
@@ -30,13 +32,13 @@ class FormAndNoise:
         form_um: its form, noise taken off as far as the spectrum tells both apart, shape (n,) [µm].
         power_um2: of the noise by line 0, 1, ... n // 2: the variance that white noise of the same power would have [µm²].
         continued: the same at the first of these lines, which form covers, by the memory that the noise may have.
-        excess: kurtosis of what pushes the noise from sample to sample, less the 3 of a normal one; zero where it may be one.
+        pushes: how what pushes the noise from sample to sample is distributed.
     """
 
     form_um: NDArray[np.float64]
     power_um2: NDArray[np.float64]
     continued: ContinuedNoise
-    excess: float = 0.0
+    pushes: Pushes = NO_TAILS
 
 
 def form_and_noise(deviation_um: NDArray[np.float64]) -> FormAndNoise:
@@ -68,46 +70,7 @@ def form_and_noise(deviation_um: NDArray[np.float64]) -> FormAndNoise:
         share[strongest] = 1.0  # nothing stands out: what form there may be most likely has this one
     white = np.where(share > 0.0, 0.0, lines / np.sqrt(count * np.maximum(noise, np.finfo(float).tiny)))
     white[: low + 1] = 0.0
-    return FormAndNoise(np.fft.irfft(share * lines, count) + sharp, noise, continued, _excess(white, count))
-
-
-TAILS, NO_TAILS = 2.0, 3.0
-"""Standard errors from which a kurtosis above, and one below that of a normal distribution counts. Chance that shortens an interval is the
-worse one."""
-
-
-def _excess(white: NDArray[np.complex128], count: int) -> float:
-    """Kurtosis of white noise less 3, from those of its lines that were seen, others zero, shape (n // 2 + 1,); zero within chance.
-
-    What is missing makes it more normal: fourth cumulants of the rest keep the square of the share that is there. The standard error
-    of a normal one is sqrt(24 / n) [Kendall and Stuart, The Advanced Theory of Statistics, vol. 1, ch. 12].
-    """
-    there = float(np.count_nonzero(white)) / len(white)
-    pushes = np.fft.irfft(white, count)
-    square = float(np.mean(pushes**2))
-    if not square > 0.0:
-        return 0.0
-    excess = float(np.mean(pushes**4)) / square**2 - 3.0
-    error = float(np.sqrt(24.0 / count))
-    return excess / there**2 if excess > TAILS * error or excess < -NO_TAILS * error else 0.0
-
-
-def _pushes(rng: np.random.Generator, excess: float, size: tuple[int, int]) -> NDArray[np.float64]:
-    """Draw white noise of unit variance with this kurtosis: normal, Student's t, or a symmetrical beta distribution.
-
-    These are Pearson's types VII and II; their kurtosis less 3 is 6 / (f - 4) and -6 / (2 a + 3).
-    """
-    if excess > 0.0:
-        freedom = 4.0 + 6.0 / excess
-        return np.asarray(rng.standard_t(freedom, size) * np.sqrt((freedom - 2.0) / freedom))
-    if excess < 0.0:
-        shape = max(-3.0 / excess - 1.5, LEAST_BETA)
-        return np.asarray((2.0 * rng.beta(shape, shape, size) - 1.0) * np.sqrt(2.0 * shape + 1.0))
-    return rng.standard_normal(size)
-
-
-LEAST_BETA = 0.5
-"""Parameter of the flattest distribution that is drawn, that of a sine: no noise has less kurtosis."""
+    return FormAndNoise(np.fft.irfft(share * lines, count) + sharp, noise, continued, pushes_of(white, count))
 
 
 STANDS_OUT = 3.0
@@ -122,10 +85,13 @@ def _sharp(quick_um: NDArray[np.float64], low: int) -> NDArray[np.float64]:
     round the turn: where that is further out than noise would be anywhere, it is form.
     """
     count = len(quick_um)
-    lines = np.arange(count // 2 + 1.0)
-    smooth = np.fft.irfft(np.fft.rfft(quick_um) * np.exp2(-((lines / (4.0 * low)) ** 2)), count)
-    usual = float(np.median(np.abs(smooth))) / MEDIAN_OF_NORMAL
-    out = np.abs(smooth) > usual * float(np.sqrt(2.0 * np.log(8.0 * low / CHANCE)))
+    passed = np.exp2(-((np.arange(count // 2 + 1.0) / (4.0 * low)) ** 2))
+    smooth, beside = (
+        np.fft.irfft(np.fft.rfft(values) * passed, count)
+        for values in (quick_um, np.median([np.roll(quick_um, 1), quick_um, np.roll(quick_um, -1)], axis=0))
+    )
+    usual = float(np.median(np.abs(beside))) / MEDIAN_OF_NORMAL
+    out = np.abs(beside) > usual * float(np.sqrt(2.0 * np.log(8.0 * low / CHANCE)))
     if not out.any():
         return np.zeros(count)
     reach = max(count // (4 * low), 1)
@@ -177,7 +143,7 @@ def drawn_noise(
         rng: generator.
     """
     count = len(apart.form_um)
-    lines = np.fft.rfft(_pushes(rng, apart.excess, (draws, count)), axis=1)
+    lines = np.fft.rfft(apart.pushes.drawn(rng, draws, count), axis=1)
     below = apart.continued.drawn(rng, draws)
     seen = below.shape[1]
     lines[:, :seen] *= np.sqrt(below) * passed[:seen]

@@ -70,14 +70,34 @@ def most_probable_tails(new: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
     squares = np.square(new)
     best, found = -np.inf, (np.ones(len(new)), np.inf)
     for tails in TAILS:
-        scale = 1.0
-        for _ in range(TAIL_ROUNDS):  # expectation and maximisation [Lange, Little and Taylor, JASA 84 (1989) 881]
-            weight = (tails + 1.0) / (tails + squares / scale)
-            scale = max(float(np.mean(weight * squares)), 1e-300)
-        likely = float(np.sum(log_student(new / np.sqrt(scale), tails))) - 0.5 * len(new) * float(np.log(scale))
+        scale = _scale_of(squares, tails)
+        likely = _likelihood(new, tails, scale)
         if likely > best:
             best, found = likely, (np.sqrt((tails + 1.0) / (tails + squares / scale)), tails)
     return found
+
+
+def student_likelihood(new: NDArray[np.float64], tails: float) -> float:
+    """Log likelihood of Student's t of its most probable scale, over the height of the normal density.
+
+    Args:
+        new: in units of its standard deviation, shape (m,). A normal distribution has -m / 2.
+        tails: degrees of freedom.
+    """
+    return _likelihood(new, tails, _scale_of(np.square(new), tails))
+
+
+def _likelihood(new: NDArray[np.float64], tails: float, scale: float) -> float:
+    return float(np.sum(log_student(new / np.sqrt(scale), tails))) - 0.5 * len(new) * float(np.log(scale))
+
+
+def _scale_of(squares: NDArray[np.float64], tails: float) -> float:
+    """Square of the most probable scale, by expectation and maximisation [Lange, Little and Taylor, JASA 84 (1989) 881]."""
+    scale = 1.0
+    for _ in range(TAIL_ROUNDS):
+        weight = (tails + 1.0) / (tails + squares / scale)
+        scale = max(float(np.mean(weight * squares)), 1e-300)
+    return scale
 
 
 def has_long_tails(new: NDArray[np.float64]) -> bool:

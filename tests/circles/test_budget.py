@@ -127,7 +127,7 @@ def test_a_raised_bar_does_not_tell_the_radius_from_the_height():
     ("noise", "most"),
     [
         ("uniform", 0.25),
-        ("laplace", 1.3),
+        ("laplace", 1.6),
         ("louder in one half", 1.2),
         ("remembers nineteen twentieths", 2.2),
     ],

@@ -110,7 +110,7 @@ def test_elsewhere_the_joint_model_is_right_where_the_kinematic_one_is_not(gravi
     assert in_plane(wrong_um(diagnosis.after)) < 3
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # backlash is among the three causes of tests/diagnosis/test_recipes.py
 def test_backlash_is_named_strut_by_strut(tmp_path):
     _, diagnosis = diagnosed(tmp_path / "s", 22, Backlash())
     assert named(diagnosis) == {"backlash"}
@@ -155,7 +155,7 @@ def test_pairs_are_both_named(tmp_path, pair, names):
     assert diagnosis.left.probability > 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # pairs are in CI
 def test_drifts_of_struts_and_bar_together_keep_their_concealed_shares(tmp_path):
     """The direction that the tests cannot see is held; at the fitted geometry it would swallow another fifth."""
     _, diagnosis = diagnosed(tmp_path / "s", 3003, ThermalStruts(), BarDrift())
@@ -164,7 +164,7 @@ def test_drifts_of_struts_and_bar_together_keep_their_concealed_shares(tmp_path)
     assert finding(diagnosis, "bar-drift").concealed == pytest.approx(0.74, abs=0.06)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # a bar that drifts is in tests/diagnosis/test_thermometers.py
 def test_a_bar_that_warms_within_one_run_does_not_end_the_diagnosis(tmp_path):
     """Its time constant lies below the grid's; a second drift called in beside it has no amplitude to hold on to."""
     _, diagnosis = diagnosed(tmp_path / "s", 2020, BarDrift(Warming(2.0, 120.0)))

@@ -57,7 +57,7 @@ def test_amplitudes_of_a_joint_fit_are_bounded_where_nothing_else_bounds_them(tm
     assert np.all(np.abs(fit.x[term.columns]) < 9.0 * plausible)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # bounds of amplitudes are in CI
 def test_contacts_that_stiffen_under_load_call_in_no_second_cause(tmp_path):
     """Compliance that falls by some per cent with the load is what `form_uncertainty` of gravity says, not play."""
     record(

@@ -39,7 +39,7 @@ def test_one_strut_that_is_late_is_named_though_circles_see_no_common_lag(tmp_pa
     assert values[3] - others == pytest.approx(late_ms, abs=0.004)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # a strut that is late is in CI
 def test_a_backlash_of_one_strut_is_no_effect_without_a_name(tmp_path):
     """A jump by the sign of one strut's speed does the same but near reversals, and would share its probability."""
     found = identified(diagnosed(tmp_path / "s", 60, Backlash((0.0, 0.0, 0.3, 0.0, 0.0, 0.0))))
@@ -47,7 +47,7 @@ def test_a_backlash_of_one_strut_is_no_effect_without_a_name(tmp_path):
     assert found["backlash"].parameters["strut_3_um"].value == pytest.approx(0.3, abs=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # a strut that is late is in CI
 def test_a_backlash_that_all_struts_share_is_named_where_no_single_one_would_be(tmp_path):
     play_um = 0.15
     found = identified(diagnosed(tmp_path / "s", 52, Backlash((play_um,) * 6)))

@@ -35,7 +35,7 @@ def _doubtful(summary):
     }
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # three causes at once are in CI
 def test_a_lead_and_gravity_are_named_though_both_act_over_the_length(tmp_path):
     found, _ = _diagnosed(screw_lead_and_gravity, tmp_path / "s")
     summary = found.summary()
@@ -77,13 +77,13 @@ def test_a_second_stage_of_a_warm_up_is_no_second_cause(tmp_path):
     assert "formula of thermal-struts" in found.summary()["unexplained"]["text"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # a second stage alone is in CI
 def test_a_frame_that_warms_beside_a_warm_up_in_two_stages_is_one(tmp_path):
     found, _ = _diagnosed(warm_up_in_two_stages_and_warm_frame, tmp_path / "s")
     assert _named(found.summary()) == {"thermal-struts", "thermal-frame"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # a wave is among the three causes and the notebook
 def test_a_screw_wave_is_not_taken_for_noise(tmp_path):
     found, truth = _diagnosed(screw_wave_under_coloured_noise, tmp_path / "s")
     summary = found.summary()

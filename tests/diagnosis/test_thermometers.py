@@ -56,7 +56,7 @@ def diagnosed(folder, mechanism, *more):
     [
         pytest.param("thermal-struts", marks=pytest.mark.nightly),
         pytest.param("thermal-frame", marks=pytest.mark.nightly),  # with coarser thermometers below
-        "spindle-growth",
+        pytest.param("spindle-growth", marks=pytest.mark.nightly),
         "bar-drift",
     ],
 )

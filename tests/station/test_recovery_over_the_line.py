@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # the demonstration does it too, over the same line: tests/test_demo.py
 def test_calibrating_what_was_recorded_gives_back_the_errors_of_the_machine(tmp_path: Path) -> None:
     plan_file = tmp_path / "plan.yaml"
     text = (shipped_folder("protocols") / "plans" / "table2-elevated.yaml").read_text(encoding="utf-8")

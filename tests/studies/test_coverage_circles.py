@@ -15,8 +15,8 @@ ROWS = {
 """Every figure of circles that is printed with U."""
 
 
-DRAWS = 12
-"""For each of six noises: half a minute."""
+DRAWS = 6
+"""For each of six noises: half a minute of one core."""
 
 
 @pytest.mark.slow

@@ -108,6 +108,7 @@ def test_the_figure_has_the_conditions_of_one_place_by_tilt_and_is_the_same_ever
     assert gravity_figure(study) == picture
 
 
+@pytest.mark.nightly  # table and figure are those of the tests above
 def test_the_command_prints_the_table_and_writes_the_figure(tmp_path):
     picture = tmp_path / "gravity.svg"
     arguments = ["study", "gravity", "--machines", "3", "--seed", "300"]

@@ -22,7 +22,7 @@ def test_from_a_faint_sign_to_a_name_that_is_certain(reference):
     assert more[0].held_out[1] == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_larger_errors_are_corrected_elsewhere_too(reference):
     jig = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
     *_, last = platform_joints(reference, jig, 1, 0.02, lambda _: None, most_rounds=2)

@@ -113,7 +113,7 @@ def test_centre_of_gravity_gains_and_friction_are_found(tmp_path, seed):
         assert abs(circles[0] - dict(zip("xyz", SHIFT_MM, strict=True))[axis]) < 8.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # struts that weigh nothing are in CI
 def test_struts_that_weigh_something_are_taken_from_the_machine_file(tmp_path):
     """Telescopes of 30 kg, of which the motor moves half, and motors of 20 kg behind the joint."""
     drives = replace(DRIVES, moving_kg=15.0)

@@ -82,7 +82,8 @@ def _sharp(quick_um: NDArray[np.float64], low: int) -> NDArray[np.float64]:
     """Form that is too short for the low undulations and stands at few places, such as a reversal spike, shape (n,).
 
     What lies above the low undulations is looked at through a Gaussian filter of four times as many. Noise is about alike all
-    round the turn: where that is further out than noise would be anywhere, it is form.
+    round the turn: where that is further out than noise would be anywhere, it is form. Places are looked for in medians of three
+    neighbours: what one reading shows alone is a tail of the noise.
     """
     count = len(quick_um)
     passed = np.exp2(-((np.arange(count // 2 + 1.0) / (4.0 * low)) ** 2))

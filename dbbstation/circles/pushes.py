@@ -89,10 +89,10 @@ def pushes_of(white: NDArray[np.complex128], count: int) -> Pushes:
     if not square > 0.0:
         return NO_TAILS
     scaled = pushes / np.sqrt(square)
-    # What is missing makes it more normal: fourth cumulants of the rest keep the square of the share that is there. The standard
-    # error of a normal one is sqrt(24 / n) [Kendall and Stuart, The Advanced Theory of Statistics, vol. 1, ch. 12].
     excess = float(np.mean(scaled**4)) - 3.0
+    # The standard error of a normal kurtosis is sqrt(24 / n) [Kendall and Stuart, The Advanced Theory of Statistics, vol. 1, ch. 12].
     if excess < -SHORTER * float(np.sqrt(24.0 / count)):
+        # What is missing makes it more normal: fourth cumulants of the rest keep the square of the share that is there.
         there = float(np.count_nonzero(white)) / len(white)
         return Pushes(_NORMAL_ALONE, excess / there**2)
     likely = np.array(

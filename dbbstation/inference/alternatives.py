@@ -153,16 +153,15 @@ def named_already(
         own = np.array([cause.variants[0].columns for cause in alike])
         other = np.array([columns for columns, _ in forms])
         products = comparison.beside((), np.concatenate([own.ravel(), other.ravel()]))
+        count = len(own)
         place = np.arange(len(products)).reshape(-1, size)
-        a, b = place[: len(own)], place[len(own) :]
-        whole = np.array([np.trace(products[np.ix_(one, one)]) for one in a])
-        roots = [_inverse_root(products[np.ix_(one, one)]) for one in b]
-        shown = np.array(
-            [
-                [np.sum(np.square(products[np.ix_(one, form)] @ root)) for form, root in zip(b, roots, strict=True)]
-                for one in a
-            ]
-        )
+        blocks = products[place[:, :, None], place[:, None, :]]
+        whole = np.trace(blocks[:count], axis1=1, axis2=2)
+        roots = np.array([_inverse_root(block) for block in blocks[count:]])
+        across = products[: count * size, count * size :].reshape(count * size, len(other), size)
+        # Every effect beside every form at once: tens of thousands of pairs.
+        shown = np.square(np.matmul(across.transpose(1, 0, 2), roots)).sum(axis=2)
+        shown = shown.reshape(len(other), count, size).sum(axis=2).T
         apart = np.sqrt(np.maximum(1.0 - shown / np.maximum(whole, 1e-300)[:, None], 0.0))
         inside = (apart <= [share for _, share in forms]).any(axis=1)
         found |= {cause.name for cause, is_inside in zip(alike, inside, strict=True) if is_inside}

@@ -20,7 +20,7 @@ from dbbstation.inference.model_comparison import FLEXIBLE, SLACK_SHARES, Member
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from dbbstation.inference.model_comparison import Cause, ModelComparison, Scan, Variant
+    from dbbstation.inference.model_comparison import Around, Cause, ModelComparison, Scan, Variant
 
 PAIRS = 3
 """Best pairs of named causes that are looked at together."""
@@ -181,7 +181,7 @@ class _Search:
         self._look_at(())
         for members in seeds:
             self._look_at([self._anew(member) for member in members if member.cause.name in self._causes])
-        self._pairs(())
+        self._pairs((), self._comparison.scan((), self._causes.values()))
         expanded: set[frozenset[str]] = set()
         challenged: set[frozenset[str]] = set()
         while len(expanded) < self._most:
@@ -203,29 +203,33 @@ class _Search:
 
     def _expand(self, hypothesis: Hypothesis) -> None:
         """Look at neighbours: one more, one less, one in the place of another."""
-        self._try_more(hypothesis.members, hypothesis.log_posterior)
+        around = self._around(hypothesis)
+        self._try_more(hypothesis.members, hypothesis.log_posterior, around.without(())[0])
         for member, factor in zip(hypothesis.members, hypothesis.log_factors, strict=True):
             others = hypothesis.without(member.cause.name)
             without = hypothesis.log_posterior - factor - member.cause.log_prior_odds
             self._score(others, without)
-            self._try_more(others, without)
+            self._try_more(others, without, around.without([member.cause.name])[0])
 
     def _challenge(self, hypothesis: Hypothesis) -> None:
         """Try one cause in the place of two, and two in the place of one that is flexible or has no name."""
+        around = self._around(hypothesis)
         for pair in combinations(sorted(hypothesis.names), 2):
             others = hypothesis.without(*pair)
-            scan = self._scan(others)
+            scan, evidence = around.without(pair)
             worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
             k = int(worth.argmax())
-            if self._may_be_likely(others, float(worth[k])):
+            if self._may_be_likely(others, evidence, float(worth[k])):
                 self._look_at([*others, scan.best[k]])
         for member in hypothesis.members:
             if not member.cause.named or len(member.variant.columns) >= FLEXIBLE:
-                self._pairs(hypothesis.without(member.cause.name))
+                self._pairs(hypothesis.without(member.cause.name), around.without([member.cause.name])[0])
 
-    def _try_more(self, members: Sequence[Member], log_posterior: float) -> None:
+    def _around(self, hypothesis: Hypothesis) -> Around:
+        return self._comparison.around(hypothesis.members, self._causes.values())
+
+    def _try_more(self, members: Sequence[Member], log_posterior: float, scan: Scan) -> None:
         """Score every further cause beside members; look at those that make a likely hypothesis more probable."""
-        scan = self._scan(members)
         for cause, factor, best in zip(scan.causes, scan.log_factor, scan.best, strict=True):
             worth = float(factor) + cause.log_prior_odds
             self._score([*members, best], log_posterior + worth, worth=worth)
@@ -244,9 +248,8 @@ class _Search:
         self._scored = {key: score for key, score in self._scored.items() if score > self._top - NEGLIGIBLE}
         self._room = max(MOST_SCORES, 2 * len(self._scored))
 
-    def _pairs(self, members: Sequence[Member]) -> None:
+    def _pairs(self, members: Sequence[Member], scan: Scan) -> None:
         """Look at the best pairs of named causes beside members: each may show only beside the other."""
-        scan = self._scan(members)
         hidden = {
             c.name for c, factor in zip(scan.causes, scan.log_factor, strict=True) if factor + c.log_prior_odds <= 0.0
         }
@@ -270,17 +273,13 @@ class _Search:
         alone = self._comparison.log_evidence(members)
         for pairs in (both, slim):
             for evidence, a, b in sorted(pairs, reverse=True)[:PAIRS]:
-                if self._may_be_likely(members, evidence - alone):
+                if self._may_be_likely(members, alone, evidence - alone):
                     self._look_at([*members, named[a], named[b]])
 
-    def _may_be_likely(self, members: Sequence[Member], worth: float) -> bool:
-        """Whether members with something of so much worth beside them may, settled, be anything but negligible."""
+    def _may_be_likely(self, members: Sequence[Member], evidence: float, worth: float) -> bool:
+        """Whether members of this evidence with something of so much worth beside them may, settled, be anything but negligible."""
         odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
-        return self._comparison.log_evidence(members) + odds + worth > self._top - NEGLIGIBLE
-
-    def _scan(self, members: Sequence[Member]) -> Scan:
-        names = {member.cause.name for member in members}
-        return self._comparison.scan(members, [c for name, c in self._causes.items() if name not in names])
+        return evidence + odds + worth > self._top - NEGLIGIBLE
 
     def _anew(self, member: Member) -> Member:
         """The same form of a cause as it is laid out now."""
@@ -310,34 +309,35 @@ class _Search:
     def _settled(self, members: list[Member]) -> Hypothesis:
         """Sizes and variants that suit each member beside the others, and what each is worth there."""
         many = len(members) > MANY
+        beside = _Beside(self._comparison, members)
         for _ in range(SWEEPS if len(members) > 1 else 1):
-            at_once = [one for one, _, _ in self._comparison.each_beside_others(members)] if many else members
+            at_once = [one for one, _, _ in beside.local.each_beside_others(members)] if many else members
             for k, member in enumerate(members):
                 if many and _single(member):
                     members[k] = at_once[k]
                     continue
-                others = [*members[:k], *members[k + 1 :]]
-                members[k] = self._comparison.scan(others, [member.cause]).best[0]
-            members = self._with_slack(members)
-        members, more = self._as_close_as_it_is(members)
-        evidence, factors = self._comparison.log_evidence(members), []
-        possible = self._possible(members)
+                comparison, others = beside.others(members, k)
+                members[k] = comparison.scan(others, [member.cause]).best[0]
+            members = self._with_slack(beside.local, members)
+        members, more = self._as_close_as_it_is(beside, members)
+        evidence, factors = beside.log_evidence(members), []
+        possible = self._possible(beside.local, members)
         more += sum(possible)
-        each = self._comparison.each_beside_others(members) if many else []
+        each = beside.local.each_beside_others(members) if many else []
         for k, member in enumerate(members):
             if many and _single(member):
                 factors.append(each[k][1] + possible[k])
                 more += each[k][1] - each[k][2]
                 continue
-            others = [*members[:k], *members[k + 1 :]]
-            scan = self._comparison.scan(others, [member.cause])
+            comparison, others = beside.others(members, k)
+            scan = comparison.scan(others, [member.cause])
             averaged = float(scan.log_factor[0] - scan.log_best[0])
-            factors.append(evidence - self._comparison.log_evidence(others) + averaged + possible[k])
+            factors.append(evidence - comparison.log_evidence(others) + averaged + possible[k])
             more += averaged
         odds = sum(member.cause.log_prior_odds for member in members)
         return Hypothesis(tuple(members), evidence + more + odds, tuple(factors))
 
-    def _possible(self, members: list[Member]) -> list[float]:
+    def _possible(self, comparison: ModelComparison, members: list[Member]) -> list[float]:
         """What it makes of the evidence that amplitudes of each member are known not to be negative.
 
         A prior that is cut off at zero has twice the density above it, and the likelihood counts there alone: the posterior
@@ -346,7 +346,7 @@ class _Search:
         found = [0.0] * len(members)
         if not any(any(member.variant.positive) for member in members):
             return found
-        estimates = self._comparison.estimates(members)
+        estimates = comparison.estimates(members)
         sigma = np.sqrt(np.diag(estimates.covariance))
         first = 0
         for k, member in enumerate(members):
@@ -356,9 +356,9 @@ class _Search:
             first += len(member.columns)
         return found
 
-    def _as_close_as_it_is(self, members: list[Member]) -> tuple[list[Member], float]:
+    def _as_close_as_it_is(self, beside: _Beside, members: list[Member]) -> tuple[list[Member], float]:
         """Members with the share of their slack that suits each best, and what averaging over the shares adds."""
-        more, known = 0.0, self._comparison.log_evidence(members)
+        more, known = 0.0, beside.log_evidence(members)
         for k, member in enumerate(members):
             if not len(member.variant.slack):
                 continue
@@ -369,25 +369,61 @@ class _Search:
                 for share in SLACK_SHARES.tolist()
             ]
             evidence = [
-                known if one is member else self._comparison.log_evidence([*members[:k], one, *members[k + 1 :]])
-                for one in tried
+                known if one is member else beside.log_evidence([*members[:k], one, *members[k + 1 :]]) for one in tried
             ]
             best = int(np.argmax(evidence))
             members[k], known = tried[best], evidence[best]
             more += float(logsumexp(evidence)) - evidence[best] - float(np.log(len(tried)))
         return members, more
 
-    def _with_slack(self, members: list[Member]) -> list[Member]:
+    def _with_slack(self, comparison: ModelComparison, members: list[Member]) -> list[Member]:
         """Members whose slack belongs to the amplitudes that they have together."""
         if not any(len(member.variant.slack) for member in members):
             return members
-        values = self._comparison.values(members)
+        values = comparison.values(members)
         found = []
         for member in members:
             own = len(member.variant.columns)
             found.append(with_slack_of(member, values[:own]))
             values = values[len(member.columns) :]
         return found
+
+
+class _Beside:
+    """What members of one hypothesis are asked beside each other, the largest of them taken out once for all the others.
+
+    Args:
+        comparison: of all causes.
+        members: of the hypothesis; their forms and sizes may change.
+
+    Attributes:
+        local: comparison of their causes alone.
+    """
+
+    def __init__(self, comparison: ModelComparison, members: Sequence[Member]) -> None:
+        self.local = comparison.among(member.cause for member in members)
+        self._largest = max(range(len(members)), key=lambda k: len(members[k].columns), default=0)
+        self._last: tuple[Member, ModelComparison] | None = None
+
+    def others(self, members: Sequence[Member], k: int) -> tuple[ModelComparison, list[Member]]:
+        """Comparison, and members that are no part of its base, in which everything is asked beside all members but one."""
+        if k == self._largest:
+            return self.local, [*members[:k], *members[k + 1 :]]
+        first = self._largest
+        return self._beside_largest(members), [m for j, m in enumerate(members) if j not in {k, first}]
+
+    def log_evidence(self, members: Sequence[Member]) -> float:
+        """Log marginal likelihood of all members."""
+        if not members:
+            return self.local.log_evidence(members)
+        first = self._largest
+        return self._beside_largest(members).log_evidence([*members[:first], *members[first + 1 :]])
+
+    def _beside_largest(self, members: Sequence[Member]) -> ModelComparison:
+        largest = members[self._largest]
+        if self._last is None or self._last[0] is not largest:
+            self._last = largest, self.local.beside_of(largest)
+        return self._last[1]
 
 
 def _single(member: Member) -> bool:

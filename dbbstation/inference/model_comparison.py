@@ -23,7 +23,7 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -164,23 +164,26 @@ class _OfCause:
     Args:
         cause: any.
         gram: products of all columns, shape (n, n).
+        at: where columns stand there.
 
     Attributes:
         cause: the same.
-        groups: by number of amplitudes p: numbers of forms that have it, shape (m,); their columns and plausible sizes, shape (m, p) each;
+        groups: by number of amplitudes p: numbers of forms that have it, shape (m,); places of their columns and plausible sizes, shape (m, p) each;
             products of these columns, shape (m, p, p).
         weights: log probability of each form.
         slim: which forms have fewer than `FLEXIBLE` amplitudes.
     """
 
-    def __init__(self, cause: Cause, gram: NDArray[np.float64]) -> None:
+    def __init__(
+        self, cause: Cause, gram: NDArray[np.float64], at: Callable[[NDArray[np.int64]], NDArray[np.int64]]
+    ) -> None:
         by_size: dict[int, list[int]] = {}
         for number, variant in enumerate(cause.variants):
             by_size.setdefault(len(variant.columns), []).append(number)
         self.cause = cause
         self.groups: dict[int, _Group] = {}
         for size, numbers in by_size.items():
-            columns: NDArray[np.int64] = np.array([cause.variants[number].columns for number in numbers])
+            columns = at(np.array([cause.variants[number].columns for number in numbers]))
             plausible = np.array([cause.variants[number].plausible for number in numbers])
             blocks = gram[columns[:, :, None], columns[:, None, :]]
             self.groups[size] = np.array(numbers), columns, plausible, blocks
@@ -232,13 +235,50 @@ class ModelComparison:
     Args:
         gram: products of all columns, the base projected out, in units of the noise, shape (n, n).
         towards: products of the columns with the target, shape (n,).
+        columns: numbers of the columns, rising, shape (n,), where these are not all that there are; None: they are numbered from zero on.
+        evidence: log evidence of what is part of the base here, over the base that log evidences are told against.
     """
 
-    def __init__(self, gram: NDArray[np.float64], towards: NDArray[np.float64]) -> None:
+    def __init__(
+        self,
+        gram: NDArray[np.float64],
+        towards: NDArray[np.float64],
+        columns: NDArray[np.int64] | None = None,
+        evidence: float = 0.0,
+    ) -> None:
         self._gram, self._towards = gram, towards
+        self._columns, self._evidence = columns, evidence
         self._last: tuple[tuple[Member, ...], _Eliminated] | None = None
         self._of_causes: dict[str, _OfCause] = {}
         self._forms: dict[str, _Forms] = {}
+        self._forms_of_many: _Forms | None = None
+
+    def among(self, causes: Iterable[Cause]) -> ModelComparison:
+        """The same for some causes alone, whose products stand together: what asks for them many times finds them sooner."""
+        every = [part for cause in causes for one in cause.variants for part in (one.columns, one.slack)]
+        columns = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *every]))
+        own = self._at(columns)
+        return ModelComparison(self._gram[np.ix_(own, own)], self._towards[own], columns, self._evidence)
+
+    def beside_of(self, member: Member) -> ModelComparison:
+        """The same with a member as a part of the base: what is asked beside it then need not take it out each time."""
+        lower, z, evidence = self._eliminated((member,))
+        across = self._across((member,), lower, np.arange(len(self._gram)))
+        return ModelComparison(self._gram - across.T @ across, self._towards - across.T @ z, self._columns, evidence)
+
+    def _across(
+        self, members: Sequence[Member], lower: NDArray[np.float64], places: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """What the Cholesky factor of members makes of their products with columns at these places, shape (p, q)."""
+        if not members:
+            return np.zeros((0, len(places)))
+        taken, sd = _stacked(members)
+        products = sd[:, None] * self._gram[np.ix_(self._at(taken), places)]
+        return np.asarray(solve_triangular(lower, products, lower=True, check_finite=False), dtype=np.float64)
+
+    def _at(self, columns: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Where columns stand here."""
+        return columns if self._columns is None else np.searchsorted(self._columns, columns)
 
     def log_evidence(self, members: Sequence[Member]) -> float:
         """Log marginal likelihood of base and members over that of the base alone."""
@@ -260,34 +300,29 @@ class ModelComparison:
         columns, sd = _stacked(members)
         information = self._information(columns, sd)
         factor = cholesky(information)
-        values = cho_solve((factor, True), sd * self._towards[columns])
+        values = cho_solve((factor, True), sd * self._towards[self._at(columns)])
         inverse = cho_solve((factor, True), np.eye(len(sd)))
         return Estimates(sd * values, sd[:, None] * inverse * sd)
 
     def beside(self, members: Sequence[Member], columns: NDArray[np.int64]) -> NDArray[np.float64]:
         """Products of columns among each other, base and members projected out under their priors, shape (p, p)."""
+        columns = self._at(columns)
         own = self._gram[np.ix_(columns, columns)]
         if not members:
             return own
         lower, _, _ = self._eliminated(members)
-        taken, sd = _stacked(members)
-        across = solve_triangular(
-            lower, sd[:, None] * self._gram[np.ix_(taken, columns)], lower=True, check_finite=False
-        )
+        across = self._across(members, lower, columns)
         return np.asarray(own - across.T @ across, dtype=np.float64)
 
     def log_evidence_of_pairs(self, members: Sequence[Member], more: Sequence[Member]) -> dict[tuple[int, int], float]:
         """Log marginal likelihood of members with every pair of further ones, without the slack of these."""
         lower, z, evidence = self._eliminated(members)
-        columns = np.concatenate([np.zeros(0, dtype=np.int64), *(m.variant.columns for m in more)])
+        columns = self._at(np.concatenate([np.zeros(0, dtype=np.int64), *(m.variant.columns for m in more)]))
         sd = np.concatenate([np.zeros(0), *(m.variant.plausible * m.scale for m in more)])
         towards = self._towards[columns]
         gram = self._gram[np.ix_(columns, columns)]
         if members:
-            taken, taken_sd = _stacked(members)
-            across = solve_triangular(
-                lower, taken_sd[:, None] * self._gram[np.ix_(taken, columns)], lower=True, check_finite=False
-            )
+            across = self._across(members, lower, columns)
             gram, towards = gram - across.T @ across, towards - across.T @ z
         information, along = sd[:, None] * gram * sd + np.eye(len(sd)), sd * towards
         widths = [len(m.variant.columns) for m in more]
@@ -315,43 +350,22 @@ class ModelComparison:
             causes: none of theirs.
         """
         forms = self._forms_of(tuple(causes))
-        causes, needed = forms.causes, forms.needed
-        towards: NDArray[np.float64] = self._towards[needed]
-        across: NDArray[np.float64] = np.zeros((0, len(needed)))
+        needed = forms.needed
+        lower, z, _ = self._eliminated(members)
+        across = self._across(members, lower, needed)
+        towards = self._towards[needed] - across.T @ z
+        left = [products for _, _, _, products in forms.groups]
         if members:
-            lower, z, _ = self._eliminated(members)
-            taken, sd = _stacked(members)
-            across = solve_triangular(
-                lower, sd[:, None] * self._gram[np.ix_(taken, needed)], lower=True, check_finite=False
-            )
-            towards = towards - across.T @ z
-        factors = np.empty((len(forms.weights), len(SCALES)))
-        for numbers, own, plausible, products in forms.groups:
-            left = products
-            if members:
-                beside = across.T[own]
-                left = products - beside @ beside.transpose(0, 2, 1)
-            seen, axes = np.linalg.eigh(plausible[:, :, None] * left * plausible[:, None, :])
-            along = np.square(np.einsum("mpq,mp->mq", axes, plausible * towards[own]))
-            factors[numbers] = _log_factors(np.maximum(seen, 0.0), along)
-        weighted = factors + forms.weights[:, None] + LOG_SCALE_WEIGHTS
-        log_factor, log_best = np.empty(len(causes)), np.empty(len(causes))
-        best: list[Member] = []
-        narrow: list[Member | None] = []
-        ends = forms.ends
-        for k, cause in enumerate(causes):
-            each = weighted[ends[k] : ends[k + 1]]
-            form, scale = divmod(int(each.argmax()), len(SCALES))
-            top = each[form, scale]
-            log_factor[k] = top + np.log(np.exp(each - top).sum())
-            best.append(Member(cause, cause.variants[form], float(SCALES[scale])))
-            log_best[k] = factors[ends[k] + form, scale]
-            narrow.append(None)
-            slim = forms.slim[k]
-            if slim and form not in slim:
-                slot, size = divmod(int(each[slim].argmax()), len(SCALES))
-                narrow[-1] = Member(cause, cause.variants[slim[slot]], float(SCALES[size]))
-        return Scan(causes, log_factor, tuple(best), log_best, tuple(narrow))
+            besides = (across.T[own] for _, own, _, _ in forms.groups)
+            left = [one - beside @ beside.transpose(0, 2, 1) for one, beside in zip(left, besides, strict=True)]
+        return _scanned(forms, towards, left)
+
+    def around(self, members: Sequence[Member], causes: Iterable[Cause]) -> Around:
+        """Every cause beside members but for any few of them, for one elimination of all of them."""
+        forms = self._forms_of(tuple(causes))
+        lower, z, evidence = self._eliminated(members)
+        across = self._across(members, lower, forms.needed)
+        return Around(tuple(members), forms, lower, z, evidence, across, self._towards[forms.needed])
 
     def each_beside_others(self, members: Sequence[Member]) -> list[tuple[Member, float, float]]:
         """Every member beside all the others, in its own variant, without slack, at all sizes; one inversion serves all.
@@ -366,7 +380,7 @@ class ModelComparison:
         columns, sd = _stacked(members)
         information = self._information(columns, sd)
         inverse = np.linalg.inv(information)
-        values = inverse @ (sd * self._towards[columns])
+        values = inverse @ (sd * self._towards[self._at(columns)])
         found, first = [], 0
         for member in members:
             own = slice(first, first + len(member.variant.columns))
@@ -385,7 +399,8 @@ class ModelComparison:
 
     def _information(self, columns: NDArray[np.int64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
         """Information of amplitudes in units of their priors, that of the priors with it, shape (p, p)."""
-        information = self._gram[np.ix_(columns, columns)]
+        own = self._at(columns)
+        information = self._gram[np.ix_(own, own)]
         information *= sd[:, None]
         information *= sd
         information.flat[:: len(sd) + 1] += 1.0
@@ -397,11 +412,13 @@ class ModelComparison:
         for cause in causes:
             one = self._of_causes.get(cause.name)
             if one is None or one.cause is not cause:
-                one = self._of_causes[cause.name] = _OfCause(cause, self._gram)
+                one = self._of_causes[cause.name] = _OfCause(cause, self._gram, self._at)
                 self._forms.pop(cause.name, None)
             each.append(one)
         if len(each) != 1:
-            return _Forms(each, len(self._gram))
+            if self._forms_of_many is None or list(map(id, self._forms_of_many.causes)) != list(map(id, causes)):
+                self._forms_of_many = _Forms(each, len(self._gram))
+            return self._forms_of_many
         name = causes[0].name
         if name not in self._forms:
             self._forms[name] = _Forms(each, len(self._gram))
@@ -410,17 +427,120 @@ class ModelComparison:
     def _eliminated(self, members: Sequence[Member]) -> _Eliminated:
         """Cholesky factor of the members' information, what it makes of the target, and their log evidence."""
         if not members:
-            return np.zeros((0, 0)), np.zeros(0), 0.0
+            return np.zeros((0, 0)), np.zeros(0), self._evidence
         # A search scans beside a set of members and asks for the evidence of the same set right after it.
         if self._last is not None and len(self._last[0]) == len(members) and all(map(is_, self._last[0], members)):
             return self._last[1]
         columns, sd = _stacked(members)
         information = self._information(columns, sd)
         lower = cholesky(information)
-        z = solve_triangular(lower, sd * self._towards[columns], lower=True, check_finite=False)
-        found = lower, z, 0.5 * float(z @ z) - float(np.log(np.diag(lower)).sum())
+        z = solve_triangular(lower, sd * self._towards[self._at(columns)], lower=True, check_finite=False)
+        found = lower, z, self._evidence + 0.5 * float(z @ z) - float(np.log(np.diag(lower)).sum())
         self._last = tuple(members), found
         return found
+
+
+def _scanned(forms: _Forms, towards: NDArray[np.float64], left: Sequence[NDArray[np.float64]]) -> Scan:
+    """All forms of causes at all sizes.
+
+    Args:
+        forms: of the causes.
+        towards: what their columns say of the target beside a hypothesis, shape (q,).
+        left: products of the columns of each form beside it, for each group of forms, shape (m, p, p).
+    """
+    factors = np.empty((len(forms.weights), len(SCALES)))
+    for (numbers, own, plausible, _), products in zip(forms.groups, left, strict=True):
+        seen, axes = np.linalg.eigh(plausible[:, :, None] * products * plausible[:, None, :])
+        along = np.square(np.einsum("mpq,mp->mq", axes, plausible * towards[own]))
+        factors[numbers] = _log_factors(np.maximum(seen, 0.0), along)
+    weighted = factors + forms.weights[:, None] + LOG_SCALE_WEIGHTS
+    log_factor, log_best = np.empty(len(forms.causes)), np.empty(len(forms.causes))
+    best: list[Member] = []
+    narrow: list[Member | None] = []
+    ends = forms.ends
+    for k, cause in enumerate(forms.causes):
+        each = weighted[ends[k] : ends[k + 1]]
+        form, scale = divmod(int(each.argmax()), len(SCALES))
+        top = each[form, scale]
+        log_factor[k] = top + np.log(np.exp(each - top).sum())
+        best.append(Member(cause, cause.variants[form], float(SCALES[scale])))
+        log_best[k] = factors[ends[k] + form, scale]
+        narrow.append(None)
+        slim = forms.slim[k]
+        if slim and form not in slim:
+            slot, size = divmod(int(each[slim].argmax()), len(SCALES))
+            narrow[-1] = Member(cause, cause.variants[slim[slot]], float(SCALES[size]))
+    return Scan(forms.causes, log_factor, tuple(best), log_best, tuple(narrow))
+
+
+class Around:
+    """Causes beside a hypothesis but for a few of its members.
+
+    With A the information of all members, P its inverse and C their products with the columns of a cause, what the members but for some,
+    with the columns k, take of that cause is C^T P C - R^T (P_kk)^-1 R with R the rows k of P C [Schur complement; Horn and Johnson, Matrix
+    Analysis, 2nd ed., sec. 0.7.3].
+
+    Args:
+        members: of the hypothesis.
+        forms: of all causes, those of the members with them.
+        lower: Cholesky factor of the members' information.
+        z: what it makes of the target.
+        evidence: log evidence of all members.
+        across: what it makes of the products of members and causes, shape (p, q).
+        towards: products of the causes' columns with the target, shape (q,).
+    """
+
+    def __init__(
+        self,
+        members: tuple[Member, ...],
+        forms: _Forms,
+        lower: NDArray[np.float64],
+        z: NDArray[np.float64],
+        evidence: float,
+        across: NDArray[np.float64],
+        towards: NDArray[np.float64],
+    ) -> None:
+        self.members, self._forms, self._evidence = members, forms, evidence
+        self._towards = towards - across.T @ z
+        besides = (across.T[own] for _, own, _, _ in forms.groups)
+        self._left = [
+            products - beside @ beside.transpose(0, 2, 1)
+            for (_, _, _, products), beside in zip(forms.groups, besides, strict=True)
+        ]
+        if not members:
+            return
+        self._rows = solve_triangular(lower, across, lower=True, trans=1, check_finite=False)
+        self._values = solve_triangular(lower, z, lower=True, trans=1, check_finite=False)
+        self._inverse = solve_triangular(lower, np.eye(len(z)), lower=True, check_finite=False)
+        ends = np.cumsum([0, *(len(member.columns) for member in members)])
+        self._places = {m.cause.name: np.arange(a, b) for m, a, b in zip(members, ends[:-1], ends[1:], strict=True)}
+
+    def without(self, names: Collection[str]) -> tuple[Scan, float]:
+        """Every cause beside the members but for these, in their order, and the log evidence of those members."""
+        if not names:
+            return self._of_absent(_scanned(self._forms, self._towards, self._left), names), self._evidence
+        own = np.concatenate([self._places[m.cause.name] for m in self.members if m.cause.name in names])
+        # A root of P_kk, without squares of the information.
+        root = np.asarray(np.linalg.qr(self._inverse[:, own], mode="r"), dtype=np.float64).T
+        rows = solve_triangular(root, self._rows[own], lower=True, check_finite=False)
+        values = solve_triangular(root, self._values[own], lower=True, check_finite=False)
+        more = (rows.T[columns] for _, columns, _, _ in self._forms.groups)
+        left = [one + each @ each.transpose(0, 2, 1) for one, each in zip(self._left, more, strict=True)]
+        scan = _scanned(self._forms, self._towards + rows.T @ values, left)
+        evidence = self._evidence - 0.5 * float(values @ values) - float(np.log(np.abs(np.diag(root))).sum())
+        return self._of_absent(scan, names), evidence
+
+    def _of_absent(self, scan: Scan, names: Collection[str]) -> Scan:
+        """What was found of causes that are none of the members that are left."""
+        there = {m.cause.name for m in self.members} - set(names)
+        kept = [k for k, cause in enumerate(scan.causes) if cause.name not in there]
+        return Scan(
+            tuple(scan.causes[k] for k in kept),
+            scan.log_factor[kept],
+            tuple(scan.best[k] for k in kept),
+            scan.log_best[kept],
+            tuple(scan.narrow[k] for k in kept),
+        )
 
 
 def _factors(information: NDArray[np.float64]) -> NDArray[np.float64]:

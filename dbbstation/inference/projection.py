@@ -8,6 +8,7 @@ number of the base.
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,6 +49,7 @@ class CauseColumns:
     Attributes:
         base: the same.
         count: number of columns of causes.
+        numbers: of the columns that products are known of, where these are not all.
         axes: orthonormal, of all that the base can do, shape (n, k).
         on_axes: columns of the base along these, shape (k, k).
     """
@@ -70,6 +72,7 @@ class CauseColumns:
         self._free: list[int] = []
         self._changed: list[int] = []  # columns of which products and share of the axes are those of former ones
         self.count = 0
+        self.numbers: NDArray[np.int64] | None = None
 
     @property
     def samples(self) -> NDArray[np.float64]:
@@ -178,29 +181,92 @@ class CauseColumns:
         wider[:, : self._ready] = self._buffer[:, : self._ready]
         self._buffer, self._shared = wider, False
 
+    def towards(self, target: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Products with a target, shape (n,), of the columns, shape (p,), and of the axes, shape (k,)."""
+        return self.samples.T @ target, self.axes.T @ target
+
+    def part(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> Part:
+        """What some rows, shape (n,), say of the columns, or of some of them, shape (q,), rising."""
+        own = np.arange(self.count) if only is None else only
+        axes, columns = self.axes[rows], self.samples.T[np.ix_(own, np.flatnonzero(rows))]
+        return Part(rows, only, axes.T @ axes, (columns @ axes).T, columns @ columns.T)
+
     def but_for(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> CauseColumns:
         """The same causes as all other rows show them, the columns themselves shared; targets must be zero in these rows.
 
         Args:
             rows: that are held back, shape (n,).
-            only: columns that are asked for, in their order, shape (q,); products of the others are zero. All if None.
+            only: columns that are asked for, rising, shape (q,); all if None.
         """
-        # The axes, orthonormal over all rows, are made so over the rows that are left: few products of what is held back tell how.
-        own = np.arange(self.count) if only is None else only
-        axes, out = self.axes[rows], self.samples.T[np.ix_(own, np.flatnonzero(rows))]
-        share, turned = np.linalg.eigh(np.eye(axes.shape[1]) - axes.T @ axes)
-        turned, size = turned[:, share > LEAST_SHARE], np.sqrt(share[share > LEAST_SHARE])
-        left = np.where(rows[:, None], 0.0, self.axes) @ (turned / size)
-        kept = CauseColumns(
-            np.where(rows[:, None], 0.0, self.base), room=0, along=(left, (turned * size).T @ self.on_axes)
+        return self.without(self.part(rows, only))
+
+    def without(self, part: Part) -> CauseColumns:
+        """The same but for the rows of a part, as `but_for` has it."""
+        return _Without(self, part)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Products over some rows of a channel, which are taken from those over all of them.
+
+    Attributes:
+        rows: which, shape (n,).
+        numbers: of the columns, shape (q,); None where these are all.
+        of_axes: of the axes among each other, shape (k, k).
+        across: of the axes with the columns, shape (k, q).
+        of_columns: of the columns among each other, shape (q, q).
+    """
+
+    rows: NDArray[np.bool_]
+    numbers: NDArray[np.int64] | None
+    of_axes: NDArray[np.float64]
+    across: NDArray[np.float64]
+    of_columns: NDArray[np.float64]
+
+    def __add__(self, other: Part) -> Part:
+        """Both parts together; they have no row in common."""
+        return Part(
+            self.rows | other.rows,
+            self.numbers,
+            self.of_axes + other.of_axes,
+            self.across + other.across,
+            self.of_columns + other.of_columns,
         )
-        kept._buffer, kept.count, kept._ready = self._buffer, self.count, self.count
-        kept._products = np.zeros((self.count, self.count))
-        products = out @ out.T
-        kept._products[np.ix_(own, own)] = np.subtract(self.gram[np.ix_(own, own)], products, out=products)
-        kept._along = np.zeros((len(size), self.count))
-        kept._along[:, own] = (turned / size).T @ (self.along[:, own] - (out @ axes).T)
-        return kept
+
+
+class _Without(CauseColumns):
+    """All rows of a channel but those of a part.
+
+    The axes, orthonormal over all rows, are made so over the rows that are left: few products of what is held back tell how. What needs
+    them row by row is worked out where it is asked for.
+    """
+
+    def __init__(self, whole: CauseColumns, part: Part) -> None:
+        self._whole, self._rows, self.numbers, self.count = whole, part.rows, part.numbers, whole.count
+        share, turned = np.linalg.eigh(np.eye(len(part.of_axes)) - part.of_axes)
+        turned, size = turned[:, share > LEAST_SHARE], np.sqrt(share[share > LEAST_SHARE])
+        self._turned = turned / size
+        self.on_axes = (turned * size).T @ whole.on_axes
+        gram, along = whole.gram, whole.along
+        if part.numbers is not None:
+            gram, along = gram[np.ix_(part.numbers, part.numbers)], along[:, part.numbers]
+        self._gram_left, self._along_left = gram - part.of_columns, self._turned.T @ (along - part.across)
+
+    @property
+    def samples(self) -> NDArray[np.float64]:
+        return self._whole.samples
+
+    @property
+    def gram(self) -> NDArray[np.float64]:
+        return self._gram_left
+
+    @property
+    def along(self) -> NDArray[np.float64]:
+        return self._along_left
+
+    def towards(self, target: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        of_columns, of_axes = self._whole.towards(target)
+        return of_columns if self.numbers is None else of_columns[self.numbers], self._turned.T @ of_axes
 
 
 def _orthonormal(base: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -242,21 +308,22 @@ class BesideBase:
 
         Args:
             target: shape (n,).
-            only: columns that are asked for; all if None.
+            only: columns that are asked for, rising; all if None.
         """
         causes = self._causes
-        columns = causes.samples if only is None else causes.of(only)
-        of_base = self._taken @ (causes.along if only is None else causes.axes.T @ columns)
+        if only is None:
+            along, products, (of_columns, of_axes) = causes.along, causes.gram, causes.towards(target)
+        else:
+            columns = causes.of(only)
+            along, products = causes.axes.T @ columns, columns.T @ columns
+            of_columns, of_axes = columns.T @ target, causes.axes.T @ target
+        of_base = self._taken @ along
         # As many products as columns times columns fill tens of megabytes: one array of them is worked on in place.
         gram = of_base.T @ of_base
-        np.subtract(causes.gram if only is None else columns.T @ columns, gram, out=gram)
-        towards = columns.T @ target - of_base.T @ (self._taken @ (causes.axes.T @ target))
-        if only is not None:
-            some = gram, towards
-            gram, towards = np.zeros((causes.count, causes.count)), np.zeros(causes.count)
-            gram[np.ix_(only, only)], towards[only] = some
+        np.subtract(products, gram, out=gram)
+        towards = of_columns - of_base.T @ (self._taken @ of_axes)
         gram /= self._noise**2
-        return ModelComparison(gram, towards / self._noise**2)
+        return ModelComparison(gram, towards / self._noise**2, causes.numbers if only is None else only)
 
     def left(self, targets: NDArray[np.float64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
         """What base and causes together leave of targets, shape (n, m).

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
+from operator import add
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,13 +58,19 @@ def selection_frequency(
     )
     names = np.array(sorted(set(groups)))
     kept_groups = max(int(np.ceil(SHARE * len(names))), min(len(names), 2))
+    rows = spread(blocks, columns)
+    every, target = CauseColumns(rows[:, :base]), rows[:, -1]
+    every.add(rows[:, base:-1])
+    group_of = np.repeat(groups, [len(block.target) for block in blocks])
+    parts = {name: every.part(group_of == name) for name in names.tolist()}
     times = dict.fromkeys((cause.name for cause in causes), 0)
     for _ in range(DRAWS):
         kept = set(rng.choice(names, kept_groups, replace=False).tolist())
-        rows = spread([block for block, group in zip(blocks, groups, strict=True) if group in kept], columns)
-        drawn = CauseColumns(rows[:, :base])
-        drawn.add(rows[:, base:-1])
-        comparison = BesideBase(drawn, known, held, noise).comparison(rows[:, -1])
+        out = [part for name, part in parts.items() if name not in kept]
+        # Products of a group are worked out once, however many draws leave it out.
+        drawn = every.without(reduce(add, out)) if out else every
+        left = np.where(np.isin(group_of, [*kept]), target, 0.0)
+        comparison = BesideBase(drawn, known, held, noise).comparison(left)
         for name in search(comparison, causes, likely=CLOSE).best.names:
             times[name] += 1
     return {name: count / DRAWS for name, count in times.items()}

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from dbbstation.trace.columns import Logged
 
 
-_Worked = TypeVar("_Worked", Frames, Struts)
+Worked = TypeVar("Worked")
 
 State = Any
 """What a source remembers of the way so far, of any type that the source likes; never changed in place."""
@@ -175,24 +175,31 @@ class Motion(WithLogged):
     reading_mm: NDArray[np.float64] | None = None
     reading_is_measured: bool = False
     put_up: Motion | None = None
-    _known: dict[str, tuple[Hexapod, Frames | Struts]] = field(default_factory=dict, init=False, repr=False)
+    _known: dict[str, tuple[Hexapod | None, object]] = field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.poses)
 
     def frames(self, machine: Machine) -> Frames:
         """Commanded poses as frames of the platform; worked out once, whatever number of sources asks."""
-        return self._once("frames", machine, lambda: Frames.from_poses(self.poses, machine.hexapod.rotation))
+        return self.once("frames", machine, lambda: Frames.from_poses(self.poses, machine.hexapod.rotation))
 
     def struts(self, machine: Machine) -> Struts:
         """Struts of the machine at the commanded poses; worked out once, whatever number of sources asks."""
-        return self._once("struts", machine, lambda: inverse(machine.hexapod, self.frames(machine)))
+        return self.once("struts", machine, lambda: inverse(machine.hexapod, self.frames(machine)))
 
-    def _once(self, what: str, machine: Machine, work: Callable[[], _Worked]) -> _Worked:
-        known = self._known.get(what)
-        if known is None or known[0] is not machine.hexapod:
-            known = self._known[what] = machine.hexapod, work()
-        return cast("_Worked", known[1])
+    def once(self, what: str, machine: Machine | None, work: Callable[[], Worked]) -> Worked:
+        """Something that hangs on the motion and a machine's joints alone, worked out once as long as these are asked for.
+
+        Args:
+            what: names it.
+            machine: whose joints; None for what hangs on the motion alone.
+            work: works it out.
+        """
+        joints, known = None if machine is None else machine.hexapod, self._known.get(what)
+        if known is None or known[0] is not joints:
+            known = self._known[what] = joints, work()
+        return cast("Worked", known[1])
 
     def commanded(self, frames: Frames, machine: Machine) -> Motion:
         """The motion with other poses, those of these frames."""

@@ -291,3 +291,49 @@ def test_information_whose_rounding_is_negative_is_that_of_the_prior_there(rng: 
     assert np.all(np.diag(lower) > 0.0)
     np.testing.assert_allclose(np.triu(lower, 1), 0.0, atol=1e-9)
     np.testing.assert_allclose(lower @ lower.T, turned @ np.diag([1.0, 3.0, 79.0, 1e6]) @ turned.T, atol=1e-7)
+
+
+@pytest.mark.parametrize("left_out", [(), (0,), (1,), (2,), (0, 2), (0, 1, 2)])
+def test_causes_around_a_hypothesis_are_those_beside_its_members_but_for_some(problem, left_out):
+    """All sizes of every absent cause, against integrals over the members that are left; those that are left out are absent, too."""
+    members, fourth = members_of(), cause("fourth", variant(8), variant(9, 10, plausible=0.7))
+    causes = [members[1].cause, fourth, members[0].cause, members[2].cause]
+    left = [m for k, m in enumerate(members) if k not in left_out]
+    scan, evidence = problem.comparison().around(members, causes).without([members[k].cause.name for k in left_out])
+    known = problem.log_evidence(columns_of(left), np.concatenate([np.zeros(0), *map(sd_of, left)])) if left else 0.0
+    assert evidence == pytest.approx(known, abs=1e-8)
+    assert [c.name for c in scan.causes] == [c.name for c in causes if c.name not in {m.cause.name for m in left}]
+    for one, factor, best in zip(scan.causes, scan.log_factor, scan.best, strict=True):
+        every = np.array([
+            [
+                problem.log_evidence(
+                    np.r_[form.columns, columns_of(left) if left else np.zeros(0, dtype=int)],
+                    np.concatenate([form.plausible * scale, *map(sd_of, left)]),
+                )
+                - known
+                + form.log_weight
+                for scale in SCALES
+            ]
+            for form in one.variants
+        ])
+        assert factor == pytest.approx(logsumexp(every + LOG_SCALE_WEIGHTS), abs=1e-7)
+        form, scale = np.unravel_index(np.argmax(every + LOG_SCALE_WEIGHTS), every.shape)
+        assert (best.variant, best.scale) == (one.variants[form], SCALES[scale])
+
+
+def test_a_member_as_part_of_the_base_leaves_the_evidence_of_all_as_it_is(problem):
+    """Also in a comparison of the causes of these members alone, whose columns keep their numbers."""
+    members = members_of()
+    local = problem.comparison().among([m.cause for m in members])
+    sd = np.concatenate([sd_of(m) for m in members])
+    expected = problem.log_evidence(columns_of(members), sd)
+    assert local.log_evidence(members) == pytest.approx(expected, abs=1e-9)
+    for k, member in enumerate(members):
+        others = [*members[:k], *members[k + 1 :]]
+        beside = local.beside_of(member)
+        assert beside.log_evidence(others) == pytest.approx(expected, abs=1e-9)
+        alone = problem.log_evidence(columns_of([member]), sd_of(member))
+        assert beside.log_evidence([]) == pytest.approx(alone, abs=1e-9)
+        assert beside.values(others) == pytest.approx(
+            problem.comparison().estimates([*others, member]).values[: len(columns_of(others))], abs=1e-9
+        )

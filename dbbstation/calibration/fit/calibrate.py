@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from dbbstation.errors import CalibrationError
 from dbbstation.inference.noise import Noise, noise_of_turns
 from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve, unseen_combinations
 from dbbstation.machine.compiled import in_parallel
+from dbbstation.model.observation import Observation
 from dbbstation.sources.contract import Need, Owner
 from dbbstation.sources.registry import sources_named
 from dbbstation.trace.circle import RawCircle
@@ -30,8 +31,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.model.observation import Observation
-    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.sources.contract import ErrorSource, Motion
 
 Found = TypeVar("Found")
 
@@ -62,6 +62,13 @@ needed costs two steps and changes nothing."""
 NOISE_STEPS = 12
 """Steps in which the noise is read anew. What is left to be called noise depends on how it is weighted against what is known
 of balls; where physics is missing the two creep, or run, after each other without an end."""
+
+MOST_KEPT = 50_000
+"""Poses of all runs up to which a fit keeps their motions from step to step: up to a hundred numbers a pose, 40 MB. A diagnosis of thirty
+circles has half as many."""
+
+MotionOf: TypeAlias = "Callable[[Observation], Motion]"
+"""Motion of a run."""
 
 AT_NODES = frozenset({Need.POSE, Need.TIME})
 """What a source may need for its effect to be as smooth as the circle; a path's history and logged values are not."""
@@ -171,11 +178,12 @@ def calibrate(
     x = _start_values(layout, {**current_start(layout, channel), **(start or {})})
     noise = Noise(FIRST_NOISE_MM, 1.0)
     runs = looked_at(observations, layout.needs)
-    nominal, left = linearise(layout, runs, x)
+    motion_of = _motions_of(runs)
+    nominal, left = linearise(layout, runs, x, motion_of)
     nominal += current_blocks(layout, channel, x)
     blocks, before, share = nominal, np.zeros_like(x), 1.0
     if _rms_mm(left) > COARSE_MM:
-        x, blocks = _approached(layout, runs, nominal, left)
+        x, blocks = _approached(layout, runs, nominal, left, motion_of)
         blocks += current_blocks(layout, channel, x)
     lost, held = np.zeros((0, 0)), None
     for steps in range(MOST_STEPS):
@@ -197,7 +205,7 @@ def calibrate(
         before = step
         if change < 1.0:
             break
-        blocks, left = linearise(layout, runs, x)
+        blocks, left = linearise(layout, runs, x, motion_of)
         blocks += current_blocks(layout, channel, x)
         if steps < NOISE_STEPS:
             noise = noise_of_turns(left, solution.freedom_used)
@@ -213,8 +221,8 @@ def calibrate(
         solution=solution,
         noise=noise,
         observations=tuple(observations),
-        machine_residual_mm=_residuals(layout.model(x).of_the_machine(), runs),
-        residual_mm=_residuals(layout.model(x), runs),
+        machine_residual_mm=_residuals(layout.model(x).of_the_machine(), runs, motion_of),
+        residual_mm=_residuals(layout.model(x), runs, motion_of),
         blocks=tuple(blocks),
         directions_lost=in_words(layout, of_circles(layout, lost)),
         directions_regularised=in_words(layout, unseen(nominal, layout, noise)),
@@ -228,6 +236,7 @@ def _approached(
     runs: Sequence[Observation | RunNodes],
     nominal: Sequence[Block],
     left: Sequence[NDArray[np.float64]],
+    motion_of: MotionOf,
 ) -> tuple[NDArray[np.float64], list[Block]]:
     """Approach the values of a machine that is millimetres off by Gauss-Newton steps with the noise of a usual bar.
 
@@ -239,6 +248,7 @@ def _approached(
         runs: as the fit looks at them.
         nominal: blocks at the starting values.
         left: per run, what the starting values leave, shape (n,) [mm].
+        motion_of: motion of a run.
 
     Returns:
         Values of all columns, shape (k,), and blocks of the circles about them.
@@ -249,7 +259,7 @@ def _approached(
     for _ in range(MOST_STEPS):
         before_mm = _rms_mm(left)
         x = layout.nominal + solve(blocks, layout.known, noise, held).x
-        blocks, left = linearise(layout, runs, x)
+        blocks, left = linearise(layout, runs, x, motion_of)
         if _rms_mm(left) > before_mm / 2.0:
             break
     return x, blocks
@@ -335,8 +345,28 @@ def looked_at(observations: Sequence[Observation], needs: frozenset[Need]) -> li
     return [run if seen is None else seen for run, seen in zip(observations, nodes, strict=True)]
 
 
+def _motions_of(runs: Sequence[Observation | RunNodes]) -> MotionOf:
+    """Motion of a run, kept with all that is worked out of it alone where all runs are short enough for that."""
+    if _usual_length(runs) * len(runs) > MOST_KEPT:
+        return Observation.motion
+    short = {id(run.coarse if isinstance(run, RunNodes) else run) for run in runs}
+    known: dict[int, Motion] = {}
+
+    def motion_of(run: Observation) -> Motion:
+        if id(run) not in short:  # all samples of one that its nodes do not do for
+            return run.motion()
+        if id(run) not in known:
+            known[id(run)] = run.motion()
+        return known[id(run)]
+
+    return motion_of
+
+
 def linearise(
-    layout: Layout, runs: Sequence[Observation | RunNodes], x: NDArray[np.float64]
+    layout: Layout,
+    runs: Sequence[Observation | RunNodes],
+    x: NDArray[np.float64],
+    motion_of: MotionOf = Observation.motion,
 ) -> tuple[list[Block], list[NDArray[np.float64]]]:
     """Compress every run about the values x, shape (k,), so that a solution of the blocks is x less its nominal.
 
@@ -347,12 +377,12 @@ def linearise(
 
     def of_run(run: Observation | RunNodes) -> tuple[Block, NDArray[np.float64]]:
         if isinstance(run, RunNodes):
-            columns, jacobian, length = _predicted(layout, model, run.coarse, x)
+            columns, jacobian, length = _predicted(layout, model, run.coarse, motion_of(run.coarse), x)
             if smooth(jacobian) and smooth(length[:, None] - run.run.raw.circle.bar_mm):
                 block = run.compressed(columns, jacobian, length, (x - layout.nominal)[columns])
                 return block, run.run.raw.length_mm - run.samples_of(length)
             run = run.run
-        columns, jacobian, length = _predicted(layout, model, run, x)
+        columns, jacobian, length = _predicted(layout, model, run, motion_of(run), x)
         left = run.raw.length_mm - length
         return compress(columns, jacobian, left + jacobian @ (x - layout.nominal)[columns]), left
 
@@ -361,10 +391,9 @@ def linearise(
 
 
 def _predicted(
-    layout: Layout, model: MachineModel, observation: Observation, x: NDArray[np.float64]
+    layout: Layout, model: MachineModel, observation: Observation, motion: Motion, x: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Columns that act on a run, shape (k,), their derivatives, shape (n, k), and the reading, shape (n,) [mm]."""
-    motion = observation.motion()
     reading = model.bar(motion)
     terms = [term for term in layout.terms if term.acts_on(motion)]
     jacobian = np.hstack([np.zeros((len(observation.raw), 0))] + [reading.by_fitted(term.fitted(x)) for term in terms])
@@ -407,22 +436,24 @@ def of_residuals(
     runs = looked_at(observations, needs)
 
     def of_run(run: Observation | RunNodes) -> Found:
-        return work(run.run if isinstance(run, RunNodes) else run, _residual(model, run))
+        return work(run.run if isinstance(run, RunNodes) else run, _residual(model, Observation.motion, run))
 
     return in_parallel(of_run, runs, _usual_length(runs))
 
 
-def _residuals(model: MachineModel, runs: Sequence[Observation | RunNodes]) -> tuple[NDArray[np.float64], ...]:
-    return tuple(in_parallel(partial(_residual, model), runs, _usual_length(runs)))
+def _residuals(
+    model: MachineModel, runs: Sequence[Observation | RunNodes], motion_of: MotionOf
+) -> tuple[NDArray[np.float64], ...]:
+    return tuple(in_parallel(partial(_residual, model, motion_of), runs, _usual_length(runs)))
 
 
-def _residual(model: MachineModel, run: Observation | RunNodes) -> NDArray[np.float64]:
+def _residual(model: MachineModel, motion_of: MotionOf, run: Observation | RunNodes) -> NDArray[np.float64]:
     if isinstance(run, RunNodes):
-        length = model.bar(run.coarse.motion()).length_mm
+        length = model.bar(motion_of(run.coarse)).length_mm
         if smooth(length[:, None] - run.run.raw.circle.bar_mm):
             return run.run.raw.length_mm - run.samples_of(length)
         run = run.run
-    return run.raw.length_mm - model.bar(run.motion()).length_mm
+    return run.raw.length_mm - model.bar(motion_of(run)).length_mm
 
 
 def _usual_length(runs: Sequence[Observation | RunNodes]) -> int:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.statics import DOWN, GRAVITY_M_S2, Load, stretch_mm, strut_tensions
+from dbbstation.machine.statics import GRAVITY_M_S2, Load, stretch_mm, strut_tensions
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.weights import for_such_struts, platform_masses, strut_compliance
 
@@ -56,6 +56,16 @@ class CogShift(LinearSource):
             for axis in "xyz"
         )
 
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """The moment of the whole shift at once: a model asks for it at each of the places that its weights lead to.
+
+        Raises:
+            ModelError: the machine file has no masses.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        stretch, tension = self._of_a_shift(motion, machine, values)
+        return Effect(strut_mm=stretch, load_n=tension)
+
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Each coordinate its own moment.
 
@@ -63,12 +73,17 @@ class CogShift(LinearSource):
             ModelError: the machine file has no masses.
             KinematicsError: a pose where the struts cannot hold the platform.
         """
-        weight = platform_masses(self.name, machine).platform_kg * GRAVITY_M_S2 * DOWN
-        frames, struts = motion.frames(machine), motion.struts(machine)
-        stretch, tensions = [], []
-        for axis in range(3):
-            moment = np.cross(frames.rotation[:, :, axis], weight)
-            tension = strut_tensions(struts, Load(np.zeros_like(moment), moment))
-            stretch.append(stretch_mm(struts, strut_compliance(machine), tension))
-            tensions.append(tension)
-        return Effect(strut_mm=np.stack(stretch, axis=-1), load_n=np.stack(tensions, axis=-1))
+        each = [self._of_a_shift(motion, machine, axis) for axis in np.eye(3)]
+        stretch, tensions = (np.stack(one, axis=-1) for one in zip(*each, strict=True))
+        return Effect(strut_mm=stretch, load_n=tensions)
+
+    def _of_a_shift(
+        self, motion: Motion, machine: Machine, shift_mm: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Stretch of the struts [mm] and their tension [N], shape (n, 6) each, by a shift in the platform's frame, shape (3,)."""
+        weight_n = platform_masses(self.name, machine).platform_kg * GRAVITY_M_S2
+        struts = motion.struts(machine)
+        x, y, _ = (motion.frames(machine).rotation @ shift_mm).T
+        moment = weight_n * np.column_stack([-y, x, np.zeros(len(x))])  # of a weight that points down
+        tension = strut_tensions(struts, Load(np.zeros_like(moment), moment))
+        return stretch_mm(struts, strut_compliance(machine), tension), tension

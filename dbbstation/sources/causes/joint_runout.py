@@ -83,16 +83,28 @@ class JointRunout(LinearSource):
             ]
         return tuple(found)
 
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Each strut's own offsets alone: of the derivative five sixths are zeros."""
+        lengths = motion.once(self.name, machine, lambda: _per_offset(motion, machine))
+        return Effect(strut_mm=MM_PER_UM * np.einsum("nkp,kp->nk", lengths, values.reshape(STRUTS, -1)))
+
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Each strut answers to the offsets of its own two joints."""
-        frames = motion.frames(machine)
-        unit, rest = motion.struts(machine).unit, inverse(machine.hexapod, middle(machine)).unit[0]
-        across = _across(rest)
-        in_platform = np.einsum("nji,nkj->nki", frames.rotation, unit)
-        swings = [np.einsum("nki,kai->nka", seen - rest, across) for seen in (unit, in_platform)]
-        lengths = np.concatenate([*(-_forms(swing) for swing in swings), swings[1]], axis=2)
-        own = lengths[:, :, None, :] * np.eye(STRUTS)[:, :, None]
-        return Effect(strut_mm=MM_PER_UM * own.reshape(len(motion), STRUTS, -1))
+        lengths = motion.once(self.name, machine, lambda: _per_offset(motion, machine))
+        own = np.zeros((len(motion), STRUTS, STRUTS, lengths.shape[2]))
+        each = np.arange(STRUTS)
+        own[:, each, each] = MM_PER_UM * lengths
+        return Effect(strut_mm=own.reshape(len(motion), STRUTS, -1))
+
+
+def _per_offset(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    """Change of each strut's length per offset of its own joints, in the order of its parameters, shape (n, 6, 8) [1]."""
+    frames = motion.frames(machine)
+    unit, rest = motion.struts(machine).unit, inverse(machine.hexapod, middle(machine)).unit[0]
+    across = _across(rest)
+    in_platform = np.einsum("nji,nkj->nki", frames.rotation, unit)
+    swings = [np.einsum("nki,kai->nka", seen - rest, across) for seen in (unit, in_platform)]
+    return np.concatenate([*(-_forms(swing) for swing in swings), swings[1]], axis=2)
 
 
 def _across(rest: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,6 +22,10 @@ def reading_without_noise_mm(motion: Motion) -> NDArray[np.float64]:
 
     An error taken at readings with their noise in them resembles that noise, and would be found where there is none.
     """
+    return motion.once("reading without noise", None, lambda: _smoothed(motion))
+
+
+def _smoothed(motion: Motion) -> NDArray[np.float64]:
     reading = np.array(motion.reading_mm, dtype=np.float64)
     own = reading[motion.kept]
     window = 2 * (len(own) // (2 * WINDOWS)) + 1

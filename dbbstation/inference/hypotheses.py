@@ -220,7 +220,7 @@ class _Search:
             worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
             k = int(worth.argmax())
             if self._may_be_likely(others, evidence, float(worth[k])):
-                self._look_at([*others, scan.best[k]])
+                self._look_at([*others, scan.best_of(k)])
         for member in hypothesis.members:
             if not member.cause.named or len(member.variant.columns) >= FLEXIBLE:
                 self._pairs(hypothesis.without(member.cause.name), around.without([member.cause.name])[0])
@@ -230,9 +230,9 @@ class _Search:
 
     def _try_more(self, members: Sequence[Member], log_posterior: float, scan: Scan) -> None:
         """Score every further cause beside members; look at those that make a likely hypothesis more probable."""
-        for cause, factor, best in zip(scan.causes, scan.log_factor, scan.best, strict=True):
-            worth = float(factor) + cause.log_prior_odds
-            self._score([*members, best], log_posterior + worth, worth=worth)
+        worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
+        for k in np.flatnonzero(log_posterior + worth > self._top - NEGLIGIBLE).tolist():
+            self._score([*members, scan.best_of(k)], log_posterior + float(worth[k]), worth=float(worth[k]))
 
     def _score(self, members: Sequence[Member], log_posterior: float, worth: float = 1.0) -> None:
         """Keep a first score, and look at the hypothesis where it is likely and its last member is worth its odds."""
@@ -317,7 +317,7 @@ class _Search:
                     members[k] = at_once[k]
                     continue
                 comparison, others = beside.others(members, k)
-                members[k] = comparison.scan(others, [member.cause]).best[0]
+                members[k] = comparison.scan(others, [member.cause]).best_of(0)
             members = self._with_slack(beside.local, members)
         members, more = self._as_close_as_it_is(beside, members)
         evidence, factors = beside.log_evidence(members), []

@@ -20,7 +20,8 @@ from operator import is_
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from scipy.linalg import cho_solve, solve_triangular
+from scipy.linalg import cho_solve
+from scipy.linalg.lapack import dtrtrs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -137,17 +138,66 @@ class Scan:
 
     Attributes:
         log_factor: log Bayes factor of each cause that was asked for, averaged over variants and sizes, shape (c,).
-        best: the variant and scale that suit it best.
-        log_best: log Bayes factor of that, without the weight of variant and scale, shape (c,).
-        narrow: the best of the variants that have fewer than `FLEXIBLE` amplitudes; None where that is `best`, or where
-            there is none.
+        factors: log Bayes factors of all forms at all sizes, shape (m, s).
+        weighted: the same with their weights.
+        first: first form of each cause among all, shape (c,).
+        last: the one behind its last, shape (c,).
+        slim: which forms of each cause have fewer than `FLEXIBLE` amplitudes.
     """
 
     causes: tuple[Cause, ...]
     log_factor: NDArray[np.float64]
-    best: tuple[Member, ...]
-    log_best: NDArray[np.float64]
-    narrow: tuple[Member | None, ...]
+    factors: NDArray[np.float64]
+    weighted: NDArray[np.float64]
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    slim: tuple[list[int], ...]
+
+    def best_of(self, k: int) -> Member:
+        """The variant and scale that suit a cause best."""
+        form, scale = self._best(k)
+        return Member(self.causes[k], self.causes[k].variants[form], float(SCALES[scale]))
+
+    @cached_property
+    def best(self) -> tuple[Member, ...]:
+        """The same of each cause."""
+        return tuple(self.best_of(k) for k in range(len(self.causes)))
+
+    @cached_property
+    def log_best(self) -> NDArray[np.float64]:
+        """Log Bayes factor of the best, without the weight of variant and scale, shape (c,)."""
+        best = (self._best(k) for k in range(len(self.causes)))
+        return np.array([self.factors[self.first[k] + form, scale] for k, (form, scale) in enumerate(best)])
+
+    @cached_property
+    def narrow(self) -> tuple[Member | None, ...]:
+        """The best of the variants that have fewer than `FLEXIBLE` amplitudes; None where that is `best`, or where there is none."""
+        return tuple(self._narrow(k) for k in range(len(self.causes)))
+
+    def of(self, kept: Sequence[int]) -> Scan:
+        """The same for some of the causes."""
+        causes, slim = (tuple(every[k] for k in kept) for every in (self.causes, self.slim))
+        numbers = np.array(kept, dtype=np.int64)
+        return replace(
+            self,
+            causes=causes,
+            slim=slim,
+            log_factor=self.log_factor[numbers],
+            first=self.first[numbers],
+            last=self.last[numbers],
+        )
+
+    def _best(self, k: int) -> tuple[int, int]:
+        """Form and size of the best of one cause."""
+        return divmod(int(self.weighted[self.first[k] : self.last[k]].argmax()), len(SCALES))
+
+    def _narrow(self, k: int) -> Member | None:
+        slim = self.slim[k]
+        if not slim or self._best(k)[0] in slim:
+            return None
+        each = self.weighted[self.first[k] : self.last[k]]
+        slot, size = divmod(int(each[slim].argmax()), len(SCALES))
+        return Member(self.causes[k], self.causes[k].variants[slim[slot]], float(SCALES[size]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,8 +323,9 @@ class ModelComparison:
         if not members:
             return np.zeros((0, len(places)))
         taken, sd = _stacked(members)
-        products = sd[:, None] * self._gram[np.ix_(self._at(taken), places)]
-        return np.asarray(solve_triangular(lower, products, lower=True, check_finite=False), dtype=np.float64)
+        products = self._gram[np.ix_(places, self._at(taken))]  # so that the solver finds them in its order
+        products *= sd
+        return _solved(lower, products.T)
 
     def _at(self, columns: NDArray[np.int64]) -> NDArray[np.int64]:
         """Where columns stand here."""
@@ -293,7 +344,7 @@ class ModelComparison:
         """Posterior means of the amplitudes and the slack of members, in the order of their columns, shape (p,)."""
         lower, z, _ = self._eliminated(members)
         _, sd = _stacked(members)
-        return np.asarray(sd * solve_triangular(lower, z, lower=True, trans=1, check_finite=False), dtype=np.float64)
+        return np.asarray(sd * _solved(lower, z, transposed=True), dtype=np.float64)
 
     def estimates(self, members: Sequence[Member]) -> Estimates:
         """Posterior means and covariance of the amplitudes and the slack of members."""
@@ -434,7 +485,7 @@ class ModelComparison:
         columns, sd = _stacked(members)
         information = self._information(columns, sd)
         lower = cholesky(information)
-        z = solve_triangular(lower, sd * self._towards[self._at(columns)], lower=True, check_finite=False)
+        z = _solved(lower, sd * self._towards[self._at(columns)])
         found = lower, z, self._evidence + 0.5 * float(z @ z) - float(np.log(np.diag(lower)).sum())
         self._last = tuple(members), found
         return found
@@ -454,23 +505,13 @@ def _scanned(forms: _Forms, towards: NDArray[np.float64], left: Sequence[NDArray
         along = np.square(np.einsum("mpq,mp->mq", axes, plausible * towards[own]))
         factors[numbers] = _log_factors(np.maximum(seen, 0.0), along)
     weighted = factors + forms.weights[:, None] + LOG_SCALE_WEIGHTS
-    log_factor, log_best = np.empty(len(forms.causes)), np.empty(len(forms.causes))
-    best: list[Member] = []
-    narrow: list[Member | None] = []
-    ends = forms.ends
-    for k, cause in enumerate(forms.causes):
-        each = weighted[ends[k] : ends[k + 1]]
-        form, scale = divmod(int(each.argmax()), len(SCALES))
-        top = each[form, scale]
-        log_factor[k] = top + np.log(np.exp(each - top).sum())
-        best.append(Member(cause, cause.variants[form], float(SCALES[scale])))
-        log_best[k] = factors[ends[k] + form, scale]
-        narrow.append(None)
-        slim = forms.slim[k]
-        if slim and form not in slim:
-            slot, size = divmod(int(each[slim].argmax()), len(SCALES))
-            narrow[-1] = Member(cause, cause.variants[slim[slot]], float(SCALES[size]))
-    return Scan(forms.causes, log_factor, tuple(best), log_best, tuple(narrow))
+    first, last = forms.ends[:-1], forms.ends[1:]
+    log_factor = np.zeros(0)
+    if len(first):
+        top = np.maximum.reduceat(weighted.max(axis=1), first)
+        above = np.exp(weighted - np.repeat(top, last - first)[:, None]).sum(axis=1)
+        log_factor = top + np.log(np.add.reduceat(above, first))
+    return Scan(forms.causes, log_factor, factors, weighted, first, last, tuple(forms.slim))
 
 
 class Around:
@@ -509,9 +550,9 @@ class Around:
         ]
         if not members:
             return
-        self._rows = solve_triangular(lower, across, lower=True, trans=1, check_finite=False)
-        self._values = solve_triangular(lower, z, lower=True, trans=1, check_finite=False)
-        self._inverse = solve_triangular(lower, np.eye(len(z)), lower=True, check_finite=False)
+        self._rows = _solved(lower, across, transposed=True)
+        self._values = _solved(lower, z, transposed=True)
+        self._inverse = _solved(lower, np.eye(len(z)))
         ends = np.cumsum([0, *(len(member.columns) for member in members)])
         self._places = {m.cause.name: np.arange(a, b) for m, a, b in zip(members, ends[:-1], ends[1:], strict=True)}
 
@@ -522,8 +563,8 @@ class Around:
         own = np.concatenate([self._places[m.cause.name] for m in self.members if m.cause.name in names])
         # A root of P_kk, without squares of the information.
         root = np.asarray(np.linalg.qr(self._inverse[:, own], mode="r"), dtype=np.float64).T
-        rows = solve_triangular(root, self._rows[own], lower=True, check_finite=False)
-        values = solve_triangular(root, self._values[own], lower=True, check_finite=False)
+        rows = _solved(root, self._rows[own])
+        values = _solved(root, self._values[own])
         more = (rows.T[columns] for _, columns, _, _ in self._forms.groups)
         left = [one + each @ each.transpose(0, 2, 1) for one, each in zip(self._left, more, strict=True)]
         scan = _scanned(self._forms, self._towards + rows.T @ values, left)
@@ -533,14 +574,17 @@ class Around:
     def _of_absent(self, scan: Scan, names: Collection[str]) -> Scan:
         """What was found of causes that are none of the members that are left."""
         there = {m.cause.name for m in self.members} - set(names)
-        kept = [k for k, cause in enumerate(scan.causes) if cause.name not in there]
-        return Scan(
-            tuple(scan.causes[k] for k in kept),
-            scan.log_factor[kept],
-            tuple(scan.best[k] for k in kept),
-            scan.log_best[kept],
-            tuple(scan.narrow[k] for k in kept),
-        )
+        return scan.of([k for k, cause in enumerate(scan.causes) if cause.name not in there])
+
+
+def _solved(lower: NDArray[np.float64], right: NDArray[np.float64], *, transposed: bool = False) -> NDArray[np.float64]:
+    """Solution of a lower triangle, or of its transposed, without the checks that take longer than a small one."""
+    if not len(lower):
+        return right
+    found, info = dtrtrs(np.asarray(lower, order="C").T, right, lower=0, trans=0 if transposed else 1)
+    if info:
+        raise np.linalg.LinAlgError("singular triangle")
+    return np.asarray(found, dtype=np.float64)
 
 
 def _factors(information: NDArray[np.float64]) -> NDArray[np.float64]:

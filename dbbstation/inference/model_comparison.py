@@ -176,12 +176,11 @@ class Scan:
 
     def of(self, kept: Sequence[int]) -> Scan:
         """The same for some of the causes."""
-        causes, slim = (tuple(every[k] for k in kept) for every in (self.causes, self.slim))
         numbers = np.array(kept, dtype=np.int64)
         return replace(
             self,
-            causes=causes,
-            slim=slim,
+            causes=tuple(self.causes[k] for k in kept),
+            slim=tuple(self.slim[k] for k in kept),
             log_factor=self.log_factor[numbers],
             first=self.first[numbers],
             last=self.last[numbers],

@@ -247,10 +247,14 @@ class _Without(CauseColumns):
         turned, size = turned[:, share > LEAST_SHARE], np.sqrt(share[share > LEAST_SHARE])
         self._turned = turned / size
         self.on_axes = (turned * size).T @ whole.on_axes
-        gram, along = whole.gram, whole.along
-        if part.numbers is not None:
-            gram, along = gram[np.ix_(part.numbers, part.numbers)], along[:, part.numbers]
-        self._gram_left, self._along_left = gram - part.of_columns, self._turned.T @ (along - part.across)
+        along = whole.along
+        if part.numbers is None:
+            self._gram_left = whole.gram - part.of_columns
+        else:
+            along = along[:, part.numbers]
+            self._gram_left = whole.gram[np.ix_(part.numbers, part.numbers)]
+            self._gram_left -= part.of_columns  # as many products fill tens of megabytes
+        self._along_left = self._turned.T @ (along - part.across)
 
     @property
     def samples(self) -> NDArray[np.float64]:

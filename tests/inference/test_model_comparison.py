@@ -304,18 +304,20 @@ def test_causes_around_a_hypothesis_are_those_beside_its_members_but_for_some(pr
     assert evidence == pytest.approx(known, abs=1e-8)
     assert [c.name for c in scan.causes] == [c.name for c in causes if c.name not in {m.cause.name for m in left}]
     for one, factor, best in zip(scan.causes, scan.log_factor, scan.best, strict=True):
-        every = np.array([
+        every = np.array(
             [
-                problem.log_evidence(
-                    np.r_[form.columns, columns_of(left) if left else np.zeros(0, dtype=int)],
-                    np.concatenate([form.plausible * scale, *map(sd_of, left)]),
-                )
-                - known
-                + form.log_weight
-                for scale in SCALES
+                [
+                    problem.log_evidence(
+                        np.r_[form.columns, columns_of(left) if left else np.zeros(0, dtype=int)],
+                        np.concatenate([form.plausible * scale, *map(sd_of, left)]),
+                    )
+                    - known
+                    + form.log_weight
+                    for scale in SCALES
+                ]
+                for form in one.variants
             ]
-            for form in one.variants
-        ])
+        )
         assert factor == pytest.approx(logsumexp(every + LOG_SCALE_WEIGHTS), abs=1e-7)
         form, scale = np.unravel_index(np.argmax(every + LOG_SCALE_WEIGHTS), every.shape)
         assert (best.variant, best.scale) == (one.variants[form], SCALES[scale])

@@ -7,6 +7,7 @@ anew at its fitted values: exact columns, tangents of its nonlinear parameters, 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from dbbstation.calibration.checks.scatter import LEAST_STATED_MM
 from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_MM
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.parts import parts_of
+from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
 from dbbstation.inference.projection import BesideBase, CauseColumns
@@ -241,8 +243,10 @@ class CircleChannel:
         tangents = np.vstack([d[:, shaped] for d in derivatives])
         tangent_sd = np.array([_spacing(parameters[k], float(first[k])) for k in shaped])
         effects = [
-            Effects(motion, reading, values[own], derivative)
-            for motion, reading, own, derivative in zip(self.motions, readings, shared, derivatives, strict=True)
+            Effects(motion, reading, values[own], derivative, known)
+            for motion, reading, own, derivative, known in zip(
+                self.motions, readings, shared, derivatives, self._variables, strict=True
+            )
         ]
         discrepancy = discrepancy_of(source, self.machine, effects)
         slack = self.columns.add(np.hstack([tangents, discrepancy]))
@@ -263,6 +267,11 @@ class CircleChannel:
             )
             for variant in variants
         )
+
+    @cached_property
+    def _variables(self) -> list[dict[str, NDArray[np.float64]]]:
+        """What errors may follow, of all rows of each run; forms are laid out along them again and again."""
+        return [variables(motion, self.machine) for motion in self.motions]
 
     def give_back(self) -> None:
         """Let columns of forms that were laid out better since be replaced; no comparison may ask for them any more."""

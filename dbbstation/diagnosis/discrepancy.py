@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.model_form import modulated
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
@@ -46,12 +45,14 @@ class Effects:
         reading: what a model predicts for it.
         values: of all parameters of the source, shape (p,).
         derivative: of the reading by these, shape (n, p).
+        known: variables that errors may follow, as `variables` has them.
     """
 
     motion: Motion
     reading: BarReading
     values: NDArray[np.float64]
     derivative: NDArray[np.float64]
+    known: Mapping[str, NDArray[np.float64]]
 
 
 def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
@@ -67,7 +68,7 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
         # What an instrument does wrong it does to the whole reading, though a model may write it as errors of struts.
         of_struts = source.belongs_to is not Owner.INSTRUMENT
         by_strut = _strut_contributions(source, motion, machine, run.values, run.reading) if of_struts else None
-        known = variables(motion, machine)
+        known = run.known
         if by_strut is None:
             followed = _followed(source, known, motion)[motion.kept]
             total = run.derivative[:, amplitude] @ run.values[amplitude]

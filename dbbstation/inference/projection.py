@@ -346,9 +346,13 @@ class BesideBase:
         along = causes.along[:, used] if every else axes.T @ columns
         products = causes.gram[np.ix_(used, used)] if every else columns.T @ columns
         of_base = self._taken @ (along * size)
-        gram = size[:, None] * products * size - of_base.T @ of_base
+        # As many products as columns times columns fill tens of megabytes: one array of them is worked on in place.
+        products *= size[:, None]
+        products *= size
+        products -= of_base.T @ of_base
+        products.flat[:: len(used) + 1] += 1.0
         towards = size[:, None] * (columns.T @ targets)[own] - of_base.T @ (self._taken @ (axes.T @ targets))
         values = np.zeros((columns.shape[1], targets.shape[1]))
-        values[own] = size[:, None] * cho_solve((cholesky(gram + np.eye(len(used))), True), towards)
+        values[own] = size[:, None] * cho_solve((cholesky(products), True), towards, check_finite=False)
         left = np.asarray(targets - columns @ values, dtype=np.float64)
         return left - axes @ (self._taken.T @ (self._taken @ (axes.T @ left)))

@@ -11,6 +11,7 @@ import numpy as np
 
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.parts import ALIKE, parts_of
+from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.channel import Law
 from dbbstation.sources.contract import Effect, LinearSource, Need
@@ -213,7 +214,8 @@ class Change:
         runs, sides = [], self.sides
         for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
             values = self._values(point, np.split(amplitudes, self._sets)[group])
-            runs.append(Effects(motion, reading, values, reading.by_source(self.source, sides.machine, values)))
+            derivative = reading.by_source(self.source, sides.machine, values)
+            runs.append(Effects(motion, reading, values, derivative, variables(motion, sides.machine)))
         found = discrepancy_of(self.source, sides.machine, runs)
         return sides.averaged(side, np.split(found, np.cumsum([len(run.derivative) for run in runs])[:-1]))
 

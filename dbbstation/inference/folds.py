@@ -57,7 +57,7 @@ class Fold:
         before: with the base fitted to the other parts by ordinary least squares.
         after: with what was chosen from the other parts.
         gains: by kind of the effects that were chosen from the other parts, sum of squares of the errors without them, less that with
-            them, in the squared unit of the residual.
+            them, in the squared unit of the residual; of a simulator, log density of the prediction with them less that without.
     """
 
     name: str

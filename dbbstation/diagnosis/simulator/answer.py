@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.diagnosis.simulator.fit import not_told_apart
-from dbbstation.diagnosis.simulator.held import held_out_error, parts
+from dbbstation.diagnosis.simulator.held import PredictedPartsError, parts, predicted_parts
 from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
 from dbbstation.diagnosis.simulator.search import compared, moves, search
 from dbbstation.diagnosis.simulator.separate import separations
 from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns
+from dbbstation.inference.chosen_anew import LEAST_PARTS
+from dbbstation.inference.folds import Fold
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.read_off import Trial, read_off
@@ -24,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.simulator.model import Model
-    from dbbstation.diagnosis.simulator.nodes import Node
+    from dbbstation.diagnosis.simulator.nodes import Challenge, Node
     from dbbstation.diagnosis.simulator.own import PortSource
     from dbbstation.diagnosis.simulator.search import SearchOutcome
     from dbbstation.diagnosis.simulator.separate import Separation
@@ -69,7 +72,8 @@ class SimulatorComparison:
         left: tests of the residual.
         held_out: error of parts that took no part; None where it was not asked for.
         as_simulated: measured less simulated values with the parameters as stated, shape (n,).
-        nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term.
+        nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term; not a number
+            where no simulations were left to ask for it.
         not_asked: candidates that were not compared in the end, and why.
         separations: what would distinguish terms that these recordings do not.
         stopped: why it ended early; empty where it did not.
@@ -139,12 +143,13 @@ def find(
     nodes = Nodes(work, own, progress)
     base = nodes.base(stated)
     found = search(nodes, base, lambda channel: compared(channel, progress))
-    stopped, held_out = found.stopped, None
+    stopped, folds = found.stopped, list[Fold]()
     if hold_out and not stopped:
         try:
-            held_out = held_out_error(nodes, base, found, stated, progress)
+            folds.extend(predicted_parts(nodes, base, found, stated, progress))
         except BudgetSpentError as error:
             stopped = error.what
+    held_out = PredictedPartsError(tuple(folds)) if len(folds) >= LEAST_PARTS else None
     return _said(nodes, base, found, held_out, as_simulated, stopped)
 
 
@@ -174,8 +179,13 @@ def _said(
     try:
         nonlinear = _nonlinear(nodes.work, found)
     except BudgetSpentError:
-        nonlinear = {term.name: np.inf for term in found.state.terms}
-    findings = tuple(_judged(one, found, nonlinear) for one in read_off(settled, Trial(held_out, refits)))
+        nonlinear = {term.name: np.nan for term in found.state.terms}
+    try:
+        not_asked = node.asked[1]
+    except BudgetSpentError:
+        not_asked = {}
+    open_to = {name: one for one in nodes.withstood(node) if one.log_odds > 0.0 for name in one.names}
+    findings = tuple(_judged(one, found, nonlinear, open_to) for one in read_off(settled, Trial(held_out, refits)))
     findings = tuple(sorted(findings, key=lambda one: (one.verdict.rank, -one.log_factor)))
     return SimulatorComparison(
         model=nodes.work.model,
@@ -187,20 +197,21 @@ def _said(
         held_out=held_out,
         as_simulated=as_simulated,
         nonlinear=nonlinear,
-        not_asked=node.asked[1] | dict.fromkeys(found.refuted, REFUTED),
+        not_asked=not_asked | dict(found.refuted),
         separations=separations(nodes, found, findings),
         stopped=stopped,
     )
 
 
-def _judged(one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, float]) -> CauseFinding:
-    """A finding whose values are those of the term, and without a claim where linear and true answer differ."""
+def _judged(
+    one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, float], open_to: Mapping[str, Challenge]
+) -> CauseFinding:
+    """A finding whose values are those of the term, and without a claim where linear and true answer differ, or a curve does better."""
     inside = {c.name: (c, term) for c, term in zip(found.node.inside, found.state.terms, strict=True)}
     if one.name not in inside:
         if one.verdict.rank < Verdict.AMBIGUOUS.rank:
-            return replace(
-                one, verdict=Verdict.AMBIGUOUS, text="It was not put in: the search came back to where it had been."
-            )
+            why = NOT_REACHED if found.stopped else CAME_BACK
+            return replace(one, verdict=Verdict.AMBIGUOUS, text=f"It was not put in: {why}.")
         return one
     candidate, term = inside[one.name]
     values = dict(one.values)
@@ -208,19 +219,30 @@ def _judged(one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, flo
         if name in values:
             values[name] = replace(values[name], value=number)
     one = replace(one, values=values)
+    why = _why_open(one.name, found, nonlinear[one.name], open_to.get(one.name))
+    if not why or one.verdict.rank >= Verdict.AMBIGUOUS.rank:
+        return one
+    curves = (open_to[one.name].curve,) if one.name in open_to else ()
+    return replace(one, verdict=Verdict.AMBIGUOUS, text=why, ambiguous_with=(*one.ambiguous_with, *curves))
+
+
+def _why_open(name: str, found: SearchOutcome, nonlinear: float, curve: Challenge | None) -> str:
+    """Why there is no claim about a term that was put in; empty where there may be one."""
     farthest = max(moves(found.node, found.settled).items(), key=lambda pair: pair[1], default=("", 0.0))
-    if farthest[1] > MOST_ASKED and one.verdict.rank < Verdict.AMBIGUOUS.rank:
-        it = "it" if farthest[0] == one.name else farthest[0]
-        what = f"Refitted, {it} is {farthest[1]:.1f} standard uncertainties from where the comparison about the refit has it: no verdict."
-        return replace(one, verdict=Verdict.AMBIGUOUS, text=what)
-    if nonlinear[one.name] > AGREE and one.verdict.rank < Verdict.AMBIGUOUS.rank:
-        what = f"True and linear answer to it differ by {100.0 * nonlinear[one.name]:.0f} %: no verdict."
-        return replace(one, verdict=Verdict.AMBIGUOUS, text=what)
-    return one
+    if farthest[1] > MOST_ASKED:
+        it = "it" if farthest[0] == name else farthest[0]
+        return f"Refitted, {it} is {farthest[1]:.1f} standard uncertainties from where the comparison about the refit has it: no verdict."
+    if np.isnan(nonlinear):
+        return "No simulations were left to test its answer by: no verdict."
+    if nonlinear > AGREE:
+        return f"True and linear answer to it differ by {100.0 * nonlinear:.0f} %: no verdict."
+    if curve is not None:
+        return f"A {curve.curve} is more probable by odds of {math.exp(curve.log_odds):.2g}; 19 would refute the name."
+    return ""
 
 
-REFUTED = "it was put in and refitted, and is not worth it there"
-"""Why a term that linear answers asked for is not compared in the end."""
+CAME_BACK = "the search came back to where it had been"
+NOT_REACHED = "the simulations that were allowed were spent before"
 
 MOST_ASKED = 2.0
 """Standard uncertainties by which a term may be from where the comparison about its refit has it: beyond, which is one case in twenty, what

@@ -1,6 +1,7 @@
 """Whether refitted terms are worth what they cost, and named terms in the place of a curve.
 
-A curve over a signal contains most terms over it. So it is challenged by each of these alone and in pairs.
+A curve over a signal contains most terms over it. So it is challenged by each of these alone and in pairs, and stays only where it
+refutes them all.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ from scipy.special import logsumexp
 
 from dbbstation.diagnosis.simulator.fit import near
 from dbbstation.diagnosis.simulator.laws import discrepancy, form_uncertainty
+from dbbstation.diagnosis.simulator.nodes import Challenge
 from dbbstation.diagnosis.simulator.noise_left import log_probability_of, noise_left
 from dbbstation.diagnosis.simulator.terms import TermForm
+from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.candidates import Candidate
@@ -27,6 +30,10 @@ SHARES = (0.0, 0.3, 1.0)
 
 FIRST = 6
 """Terms that are each tried as the first of a pair, at the most: those that do best alone."""
+
+
+WORTH = math.log(SURE / ABSENT)
+"""Log odds that a term must have once it is refitted, those without it being one, to stay."""
 
 
 def cost(nodes: Nodes, node: Node, settled: Settled) -> float:
@@ -57,9 +64,12 @@ def cost(nodes: Nodes, node: Node, settled: Settled) -> float:
 
 
 def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
-    """A node with one or two named terms in the place of a curve, where that is more probable; None where none is."""
+    """A node with one or two named terms in the place of a curve, unless odds of 19 are for the curve; None where there is none.
+
+    A curve says any smooth law over its signal, so it tests the form of a name rather than being another cause.
+    """
     for one in node.inside:
-        if one.term.form is not TermForm.CURVE or one.name not in settled.best.names:
+        if one.term.form is not TermForm.CURVE:
             continue
         others = [member for member in settled.best.without(one.name) if member.cause.name in node.names]
         outside = {each.name: each for each in node.outside if each.term.form is not TermForm.CURVE}
@@ -67,7 +77,11 @@ def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
         if not named:
             continue
         found = nodes.instead(node, [outside[member.cause.name] for member in named], settled, [*others, *named])
-        if found is not None and cost(nodes, found, settled) < cost(nodes, node, settled):
+        if found is None:
+            continue
+        odds = cost(nodes, found, settled) - cost(nodes, node, settled)
+        if odds < WORTH:
+            nodes.challenges.append(Challenge(one.name, frozenset(member.cause.name for member in named), odds))
             return found
     return None
 

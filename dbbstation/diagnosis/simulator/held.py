@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.simulator.density import log_density
 from dbbstation.diagnosis.simulator.fit import near
-from dbbstation.diagnosis.simulator.nodes import noise_of, spread_of
+from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
 from dbbstation.diagnosis.table.mismatch import FOLD_ROWS
 from dbbstation.inference.folds import ENOUGH_BLOCKS, FOLDS, Fold, HeldOutError, beside
+from dbbstation.inference.verdict import DensityGains
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection, Iterator
 
     from numpy.typing import NDArray
 
@@ -26,7 +28,16 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.search import SearchOutcome
     from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
     from dbbstation.inference.channel import Channel
+    from dbbstation.inference.folds import Kind
     from dbbstation.inference.settled import Settled
+
+
+class PredictedPartsError(HeldOutError):
+    """Parts that were held back, and what each term brought there as log density of the prediction."""
+
+    def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
+        """What terms brought together in each part; nothing where none of them was chosen."""
+        return DensityGains(tuple(sum(fold.gains.get(kind, 0.0) for kind in set(kinds)) for fold in self.folds))
 
 
 def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:
@@ -57,10 +68,10 @@ def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:
     return found
 
 
-def held_out_error(
+def predicted_parts(
     nodes: Nodes, base: Node, found: SearchOutcome, stated: FittedState, progress: Callable[[str, int, int], None]
-) -> HeldOutError:
-    """Hold parts back in turn; choose terms anew, refit, simulate.
+) -> Iterator[Fold]:
+    """Hold parts back in turn; choose terms anew, refit, simulate; one after the other, since simulations may be spent.
 
     Args:
         nodes: that were visited.
@@ -71,8 +82,7 @@ def held_out_error(
     """
     work, channel = nodes.work, found.node.channel
     as_simulated = work.residuals([stated])[0]
-    weight = 1.0 / spread_of(work, found.settled)[work.output]
-    every, folds = parts(work), []
+    every = parts(work)
     for done, (name, rows) in enumerate(every):
         progress("held-out part", done, len(every))
         out = rows | beside(channel, rows, found.settled.noise.correlation_samples)
@@ -80,15 +90,15 @@ def held_out_error(
         one = search(nodes, base, partial(_without, out=out, found=found), refits=False)
         weigh, sigma = noise_of(one.settled)
         _, refitted = near(work, base.fitted, lambda r, out=out: r[~out], max(base.size, 1e-300))  # type: ignore[misc]  # bound now
-        with_all = float(np.sum(np.square(weight[rows] * one.residual[rows])))
+        others = channel.without(out)
+        with_all = log_density(work, others, rows, one.residual, one.node.fitted.columns)
         gains: dict[tuple[str, ...], float] = {}
         for term in one.node.names:
             less = nodes.without(one.node, term)
             _, left = near(work, less.fitted, weigh, sigma)
-            gains[(term,)] = float(np.sum(np.square(weight[rows] * left[rows]))) - with_all
+            gains[(term,)] = with_all - log_density(work, others, rows, left, less.fitted.columns)
         before, middle, after = (_rms(values[rows]) for values in (as_simulated, refitted, one.residual))
-        folds.append(Fold(name, int(rows.sum()), before, middle, after, gains))
-    return HeldOutError(tuple(folds))
+        yield Fold(name, int(rows.sum()), before, middle, after, gains)
 
 
 def _without(channel: Channel, out: NDArray[np.bool_], found: SearchOutcome) -> Settled:

@@ -111,6 +111,14 @@ class Node:
     @cached_property
     def channel(self) -> Channel:
         """Channel of everything that may be put in, and of what is."""
+        return self._channel(self.off, self.asked[0])
+
+    @cached_property
+    def alone(self) -> Channel:
+        """Channel of what is put in, without rivals and as if it had no uncertainty of form: it asks for no simulations."""
+        return self._channel({}, ())
+
+    def _channel(self, off: Departures, others: Sequence[Law]) -> Channel:
         work, fitted, count = self.work, self.fitted, len(self.work.model.parameters)
         parameters = work.model.parameters
         residual = fitted.residual.copy()
@@ -124,17 +132,17 @@ class Node:
             columns = fitted.columns[:, first : first + len(term.numbers)]
             first += len(term.numbers)
             residual += columns[:, : len(term.amplitudes)] @ np.array(term.amplitudes)
-            mine.append(self._law(one, columns, term.numbers))
+            mine.append(self._law(one, columns, term.numbers, off))
         prior = np.array([np.inf if p.uncertainty is None else p.uncertainty for p in parameters])
         base = Base(tuple(p.name for p in parameters), fitted.columns[:, :count], prior, np.zeros(count, dtype=bool))
-        return channel_of(work, residual, base, (*mine, *self.asked[0]))
+        return channel_of(work, residual, base, (*mine, *others))
 
     def but_for(self, refuted: Collection[str]) -> Channel:
         """The channel without some of the terms that may be put in."""
         laws_left = tuple(law for law in self.channel.laws if law.name not in refuted)
         return replace(self.channel, laws=laws_left)
 
-    def _law(self, one: Candidate, columns: NDArray[np.float64], numbers: Sequence[float]) -> Law:
+    def _law(self, one: Candidate, columns: NDArray[np.float64], numbers: Sequence[float], off: Departures) -> Law:
         """Law of a term that is put in: its numbers of all kinds are amplitudes of its answers there."""
         amplitudes, rms = len(one.term.amplitudes), np.sqrt(np.mean(np.square(columns), axis=0))
         usual = self.size / np.maximum(rms, 1e-300)
@@ -147,7 +155,7 @@ class Node:
             units=one.units,
             log_odds=one.log_odds,
             form_uncertainty=form_uncertainty(one),
-            discrepancy=discrepancy(one, self.off),
+            discrepancy=discrepancy(one, off),
         )
 
     def numbers_of(self, settled: Settled, one: Candidate, beside: Sequence[Member] | None = None) -> tuple[float, ...]:
@@ -183,6 +191,21 @@ CURVED_MOST = 3.0 * AGREE
 """Difference of the answers to two doses, over the answer, beyond which a candidate is not asked: its answer is no column."""
 
 
+@dataclass(frozen=True)
+class Challenge:
+    """Named terms in the place of a curve.
+
+    Attributes:
+        curve: its name.
+        names: of the terms.
+        log_odds: for the curve, all that both cost being counted.
+    """
+
+    curve: str
+    names: frozenset[str]
+    log_odds: float
+
+
 @dataclass(eq=False)
 class Nodes:
     """Nodes that were visited, by the names of their terms.
@@ -193,6 +216,7 @@ class Nodes:
         progress: called with what is being done.
         begun: from which terms others were refitted already.
         bettered: terms for which a better minimum was found than that which had been compared.
+        challenges: curves that names were put in the place of.
     """
 
     work: SimulationRuns
@@ -201,6 +225,11 @@ class Nodes:
     known: dict[frozenset[str], Node] = field(default_factory=dict)
     begun: set[tuple[frozenset[str], frozenset[str]]] = field(default_factory=set)
     bettered: set[frozenset[str]] = field(default_factory=set)
+    challenges: list[Challenge] = field(default_factory=list)
+
+    def withstood(self, node: Node) -> list[Challenge]:
+        """Those in which a node has the names, and not the curve."""
+        return [one for one in self.challenges if one.names <= node.names and one.curve not in node.names]
 
     def base(self, start: FittedState) -> Node:
         """The simulator as it is, refitted from several starts."""

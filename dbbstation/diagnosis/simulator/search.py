@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.simulator.challenge import challenger, cost
+from dbbstation.diagnosis.simulator.challenge import WORTH, challenger, cost
 from dbbstation.diagnosis.simulator.fit import near
+from dbbstation.diagnosis.simulator.laws import form_uncertainty
 from dbbstation.diagnosis.simulator.nodes import noise_of
+from dbbstation.diagnosis.simulator.trials import beside
 from dbbstation.diagnosis.simulator.work import BudgetSpentError
 from dbbstation.inference.named_values import named_values
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
-from dbbstation.inference.verdict import ABSENT, SURE
+from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from dbbstation.diagnosis.simulator.candidates import Candidate
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
@@ -36,9 +40,6 @@ RIVAL_SHARE = 0.5
 """Log posterior of a rival by the linear comparison, over that of the best, from which on it is put in: linear answers to a term that
 is not small may be off by about as much."""
 
-WORTH = math.log(SURE / ABSENT)
-"""Log odds that a term must have once it is refitted, those without it being one, to stay."""
-
 STILL = 0.1
 """Move, over its standard uncertainty, from which on a value has settled."""
 
@@ -53,7 +54,7 @@ class SearchOutcome:
         state: values, as fitted to the rows of that comparison.
         residual: measured less simulated at that state, shape (n,).
         is_settled: whether everything moved by less than a tenth of its uncertainty in the end, and the comparison wants nothing else.
-        refuted: terms that linear answers asked for, and that were not worth it once they were refitted.
+        refuted: terms that linear answers asked for and that compete no more beside it, and why.
         stopped: why it ended early; empty where it did not.
     """
 
@@ -62,7 +63,7 @@ class SearchOutcome:
     state: FittedState
     residual: np.ndarray
     is_settled: bool
-    refuted: frozenset[str] = frozenset()
+    refuted: Mapping[str, str] = field(default_factory=dict)
     stopped: str = ""
 
 
@@ -92,19 +93,21 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
         refits: refit each node in the noise that is found beside it, until nothing moves; False: where rows are held back, which are
             refitted from the node each time.
     """
-    node, been, refuted, refitted, stopped = base, {base.names}, frozenset[str](), 0, ""
-    settled, still = compare(node.channel), False
+    node, been, refuted, refitted, stopped = base, {base.names}, dict[str, str](), 0, ""
+    settled, still, put_in = compare(node.channel), False, node
     try:
         for _ in range(MOST_ROUNDS):
             wanted: Node | None = challenger(nodes, node, settled)
-            more: frozenset[str] = frozenset()
+            more: Mapping[str, str] = {}
             if wanted is None or wanted.names in been:
                 wanted, more = _wanted(nodes, node, settled)
             been -= nodes.bettered
             nodes.bettered.clear()
             if wanted is not None and wanted.names not in been:
                 been.add(wanted.names)
-                settled, node, refuted, refitted = compare(wanted.channel), wanted, frozenset(), 0
+                put_in = wanted
+                without = dict.fromkeys((one.curve for one in nodes.withstood(wanted)), BEATEN)
+                settled, node, refuted, refitted = compare(wanted.but_for(without)), wanted, without, 0
                 still = False
             elif more:
                 refuted |= more
@@ -119,6 +122,9 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
         if not refits:
             raise
         stopped = error.what
+        if put_in is not node:
+            # What was put in last is said beside nothing else: its rivals have not been asked about it.
+            node, settled = put_in, compare(put_in.alone)
     if refits:
         still = still and not stopped and node.names <= settled.best.names
         return SearchOutcome(node, settled, node.fitted.state, node.fitted.residual, still, refuted, stopped)
@@ -130,30 +136,97 @@ MOST_REFITS = 4
 """Refits of the same terms in noise found anew, at the most."""
 
 
-def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, frozenset[str]]:
+REFUTED = "it was put in and refitted, and is not worth it there"
+BEATEN = "named terms are in its place, and it does not refute them"
+WITHIN = "it is less than what the terms at its port may be off by"
+"""Why a term that linear answers asked for is not compared in the end."""
+
+
+def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Mapping[str, str]]:
     """Node that a comparison wants next: with the term that is worth most, or without one that is not needed; None: this one.
 
-    With it come terms that the comparison wants, and that are not worth it once they are refitted.
+    With it come terms that the comparison wants, and that are to compete no more about this node, with the reason.
     """
     outside = {one.name: one for one in node.outside}
     more = [member.cause.name for member in settled.best.members if member.cause.name in outside]
     if settled.averaged(settled.posterior.probability(outside), outside) < SURE:
         more = []  # the recordings do not want anything more for sure
+    small = within_forms(node, settled, more)
+    if small and len(small) == len(more):
+        return None, dict.fromkeys(small, WITHIN)
+    more = [name for name in more if name not in small]
     if more:
         first = max(more, key=settled.best.log_factor)
         # Linear answers about a good fit are right: what is better than some of its terms stands in their place.
         displaced = not node.names <= settled.best.names
         together = [nodes.instead(node, [outside[name] for name in more], settled)] if displaced else []
         rivals = (nodes.with_more(node, one, settled) for one in _rivals(node, settled, outside[first]))
-        tried = [one for one in (*together, *rivals) if one is not None]
+        tried = [one for one in (*together, *rivals) if one is not None and not _within_forms_refitted(one, node.names)]
         costs = [cost(nodes, one, settled) for one in tried]
         if not tried or cost(nodes, node, settled) - min(costs) < WORTH:
-            return None, frozenset(more)  # by linear answers only, or the simulation runs away with them
+            return None, dict.fromkeys(more, REFUTED)  # by linear answers only, or the simulation runs away with them
         best = tried[int(np.argmin(costs))]
         nodes.progress(f"put in {', '.join(best.names - node.names)}")
-        return best, frozenset()
+        return best, {}
     less = [name for name in node.names if name not in settled.best.names]
-    return (nodes.without(node, less[0]) if less else None), frozenset()
+    return (nodes.without(node, less[0]) if less else None), {}
+
+
+def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str]:
+    """Those of some members of the best hypothesis that do less than others at the same port may be off by.
+
+    They would be told from a departure of the others' forms by their shape only, and real objects depart from forms in any shape. Of all
+    effects what the parameters take up is left out. What terms do together counts, too: two that are alike may each be large, and
+    cancel each other.
+    """
+    every = {one.name: one for one in (*node.inside, *node.outside)}
+    members = [every[member.cause.name] for member in settled.best.members]
+    channel, bank = settled.channel, settled.bank
+    alone = bank.base_values(np.zeros(len(channel.residual)))
+
+    def size(of: Sequence[str]) -> float:
+        effect = settled.effect(of)
+        return _rms(effect + channel.base.samples @ (bank.base_values(effect) - alone))
+
+    return _less(members, size, names)
+
+
+def _within_forms_refitted(node: Node, but_for: Collection[str]) -> list[str]:
+    """The same of terms that are put in, as they are refitted."""
+    base = node.fitted.columns[:, : len(node.work.model.parameters)]
+    terms = {one.name: term for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
+
+    def size(of: Sequence[str]) -> float:
+        effect = np.sum([node.answers_of(name) @ np.array(terms[name].amplitudes) for name in of], axis=0)
+        return _rms(beside(base, effect))
+
+    return _less(node.inside, size, [name for name in terms if name not in but_for])
+
+
+def _less(members: Sequence[Candidate], size: Callable[[Sequence[str]], float], names: Sequence[str]) -> list[str]:
+    """Those of some members that do less, alone or all of them together, than the others at their port may be off by.
+
+    Args:
+        members: of a hypothesis.
+        size: of what some of them do together, root mean square.
+        names: that are asked about.
+    """
+    ports = {one.name: one.term.port for one in members}
+    off = {one.name: form_uncertainty(one) * size([one.name]) for one in members}
+
+    def within(some: Sequence[str]) -> bool:
+        others = [off[one] for one in off if one not in some and ports[one] == ports[some[0]]]
+        return size(some) < math.hypot(*others)
+
+    found = []
+    for port in sorted({ports[name] for name in names}):
+        own = [name for name in names if ports[name] == port]
+        found += own if within(own) else [name for name in own if within([name])]
+    return found
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidate]:

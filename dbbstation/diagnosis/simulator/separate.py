@@ -74,7 +74,7 @@ def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding
     differ most, in simulations under these.
     """
     settled = found.settled
-    base = settled.bank.whitened(found.node.channel.base.samples) / settled.noise.innovation
+    base = settled.bank.whitened(settled.channel.base.samples) / settled.noise.innovation
     every, proposals = parts(nodes.work), []
     for pair in _wanted(found, findings)[:MOST]:
         columns = [_column(found, each) for each in pair]
@@ -93,7 +93,7 @@ def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding
 
 def _wanted(found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> list[tuple[str, str]]:
     """Pairs of which at least one term was put in first, then those of which none was."""
-    laws = {law.name for law in found.node.channel.laws}
+    laws = {cause.name for cause in found.settled.causes}
     wanted: list[tuple[str, str]] = []
     for one in findings:
         if one.verdict is Verdict.AMBIGUOUS:

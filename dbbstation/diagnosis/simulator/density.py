@@ -1,0 +1,67 @@
+"""How probable rows are that took no part, as a refit to the others predicts them.
+
+The noise that the refit leaves in the others counts with its memory: a slow drift of the part that is predicted is as free for one
+refit as for another. What the others leave open of the fitted numbers is averaged over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.noise_left import noise_left
+from dbbstation.inference.uneven import log_student
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.work import SimulationRuns
+    from dbbstation.inference.channel import Channel
+
+
+def log_density(
+    work: SimulationRuns,
+    channel: Channel,
+    rows: NDArray[np.bool_],
+    residual: NDArray[np.float64],
+    columns: NDArray[np.float64],
+) -> float:
+    """Log density of rows under a refit to others, in the noise that it leaves there [Good, J. R. Stat. Soc. B 14 (1952) 107].
+
+    Where that noise has long tails, rows count by Student's t about the prediction alone.
+
+    Args:
+        work: simulations.
+        channel: whose kept rows were refitted.
+        rows: that are predicted, shape (n,).
+        residual: measured less simulated at the refit, scaled, of all rows, shape (n,).
+        columns: what one more of each fitted number does, shape (n, m).
+    """
+    bank = noise_left(work, residual, columns, rows=channel)
+    noise, kinds = bank.noise, work.output[channel.kept]
+    sizes = np.array([float(np.mean(bank.spread[kinds == k])) for k in range(len(work.model.outputs))])
+    spread = sizes[work.output[rows]]
+    whitening = noise.whitening(replace(channel, kept=rows, apart=1).stretches)
+
+    def white(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        even = (values[rows].T / spread).T
+        return np.asarray(even if whitening is None else whitening @ even) / noise.innovation
+
+    level = 0.0 if whitening is None else float(np.log(whitening.diagonal()).sum())
+    level -= float(np.log(np.sqrt(2.0 * np.pi) * noise.innovation * spread).sum())
+    left = white(residual)
+    if np.isfinite(bank.tails):
+        return level + float(np.sum(log_student(left, bank.tails)))
+    own = bank.whitened(columns) / noise.innovation
+    known = np.array([1.0 / p.uncertainty**2 if p.uncertainty else 0.0 for p in work.model.parameters])
+    normal = own.T @ own + np.diag(np.concatenate([known, np.zeros(own.shape[1] - len(known))]))
+    norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    open_ = np.linalg.pinv(normal / np.outer(norm, norm), rcond=1e-10, hermitian=True)
+    there = white(columns) / norm
+    # The covariance of the rows is one plus there @ open_ @ there.T; its inverse and determinant come from the small side [Woodbury].
+    inner = np.eye(len(open_)) + open_ @ (there.T @ there)
+    towards = there.T @ left
+    squares = float(left @ left - towards @ np.linalg.solve(inner, open_ @ towards))
+    return level - 0.5 * (squares + float(np.linalg.slogdet(inner)[1]))

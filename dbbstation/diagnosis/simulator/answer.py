@@ -184,7 +184,7 @@ def _said(
         not_asked = node.asked[1]
     except BudgetSpentError:
         not_asked = {}
-    open_to = {name: one for one in nodes.withstood(node) if one.log_odds > 0.0 for name in one.names}
+    open_to = {name: one for one in found.withstood if one.log_odds > 0.0 for name in one.names}
     findings = tuple(_judged(one, found, nonlinear, open_to) for one in read_off(settled, Trial(held_out, refits)))
     findings = tuple(sorted(findings, key=lambda one: (one.verdict.rank, -one.log_factor)))
     return SimulatorComparison(

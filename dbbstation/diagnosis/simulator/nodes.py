@@ -216,7 +216,7 @@ class Nodes:
         progress: called with what is being done.
         begun: from which terms others were refitted already.
         bettered: terms for which a better minimum was found than that which had been compared.
-        challenges: curves that names were put in the place of.
+        challenges: curves that names were put in the place of in the search that goes on.
     """
 
     work: SimulationRuns

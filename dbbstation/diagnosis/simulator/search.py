@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.simulator.candidates import Candidate
-    from dbbstation.diagnosis.simulator.nodes import Node, Nodes
+    from dbbstation.diagnosis.simulator.nodes import Challenge, Node, Nodes
     from dbbstation.diagnosis.simulator.work import FittedState
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.settled import Settled
@@ -56,6 +56,7 @@ class SearchOutcome:
         is_settled: whether everything moved by less than a tenth of its uncertainty in the end, and the comparison wants nothing else.
         refuted: terms that linear answers asked for and that compete no more beside it, and why.
         stopped: why it ended early; empty where it did not.
+        withstood: curves in whose place names are.
     """
 
     node: Node
@@ -65,6 +66,7 @@ class SearchOutcome:
     is_settled: bool
     refuted: Mapping[str, str] = field(default_factory=dict)
     stopped: str = ""
+    withstood: tuple[Challenge, ...] = ()
 
 
 def compared(channel: Channel, progress: Callable[[str], None] = lambda _: None) -> Settled:
@@ -93,6 +95,7 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
         refits: refit each node in the noise that is found beside it, until nothing moves; False: where rows are held back, which are
             refitted from the node each time.
     """
+    nodes.challenges.clear()  # those of other rows say nothing here
     node, been, refuted, refitted, stopped = base, {base.names}, dict[str, str](), 0, ""
     settled, still, put_in = compare(node.channel), False, node
     try:
@@ -127,7 +130,8 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
             node, settled = put_in, compare(put_in.alone)
     if refits:
         still = still and not stopped and node.names <= settled.best.names
-        return SearchOutcome(node, settled, node.fitted.state, node.fitted.residual, still, refuted, stopped)
+        found = node.fitted.state, node.fitted.residual
+        return SearchOutcome(node, settled, *found, still, refuted, stopped, tuple(nodes.withstood(node)))
     state, residual = near(nodes.work, node.fitted, *noise_of(settled))
     return SearchOutcome(node, settled, state, residual, is_settled=True)
 

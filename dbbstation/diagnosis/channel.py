@@ -210,12 +210,13 @@ class CircleChannel:
 
     def blocks(self, columns: NDArray[np.int64], target: NDArray[np.float64]) -> list[Block]:
         """Compressed runs of base columns, then of those of some causes, one block per run."""
-        samples = np.hstack([self.columns.base, self.columns.samples[:, columns]])
-        every = np.arange(samples.shape[1])
+        every = np.arange(self.columns.base.shape[1] + len(columns))
         found = []
         for rows in self.runs:
-            touched = np.flatnonzero(samples[rows].any(axis=0))
-            found.append(compress(every[touched], samples[rows][:, touched], target[rows]))
+            # One run at a time: many columns of all of them would take as much memory again.
+            samples = np.hstack([self.columns.base[rows], self.columns.samples[rows, columns]])
+            touched = np.flatnonzero(samples.any(axis=0))
+            found.append(compress(every[touched], samples[:, touched], target[rows]))
         return found
 
     def refine(self, name: str, law: str, values: Mapping[str, NDArray[np.float64]], fit: Calibration) -> None:

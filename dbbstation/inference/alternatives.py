@@ -169,7 +169,8 @@ def named_already(
 
 
 MOST_ALIKE = 3
-"""Amplitudes of an effect up to which it is asked whether a named cause has it among its forms: a shift in space."""
+"""Amplitudes of an effect up to which it is asked whether a named cause has it among its forms: a shift in space. With 1 a bumped jig is
+ambiguous with a step over time in two of two sessions; with 6 four sessions are as they are."""
 
 
 def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[Member]:

@@ -2,8 +2,6 @@
 
 import pytest
 
-pytest.importorskip("mujoco", reason="MuJoCo is not installed")
-
 from dbbstation.diagnosis.simulator.answer import find
 from dbbstation.diagnosis.simulator.ports import simulated
 from tests.diagnosis.simulator import arm

@@ -612,8 +612,13 @@ def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:
     """Return the member with the slack that amplitudes of these values have, shape (p,)."""
     if len(member.variant.slack) == 0:
         return member
-    size = float(np.sqrt(np.mean(np.square(values / member.variant.plausible))))
+    size = amplitude_size(member, values)
     return replace(member, slack_scale=member.slack_share * min(size / member.variant.slack_at, MOST_SLACK))
+
+
+def amplitude_size(member: Member, values: NDArray[np.float64]) -> float:
+    """Root mean square of amplitudes of a member, shape (p,), in plausible ones."""
+    return float(np.sqrt(np.mean(np.square(values / member.variant.plausible))))
 
 
 def _log_factors(seen: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:

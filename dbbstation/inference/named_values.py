@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.jackknife import weighted_jackknife
-from dbbstation.inference.settle import moved
+from dbbstation.inference.settle import growth, moved
 from dbbstation.inference.verdict import Value
 
 if TYPE_CHECKING:
@@ -41,10 +41,10 @@ def named_values(
             )
             for k, j in enumerate(amplitudes_of(member.variant).tolist())
         }
-        shaped, every = moved(law, member, values), len(law.plausible)
+        shaped, every, per = moved(law, member, values), len(law.plausible), growth(member, values)
         for k, name in enumerate(law.parameters[every:]):
             known = len(member.variant.slack) > k
-            found[name] = Value(shaped[k], float(sigma[width + k]) if known else np.nan, law.units[every + k])
+            found[name] = Value(shaped[k], float(sigma[width + k] / per) if known else np.nan, law.units[every + k])
         return found
     pattern = settled.bank.patterns[member.cause.name]
     unit = settled.channel.unit

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.alternatives import in_place_of
-from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
+from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of, spacing_of
 from dbbstation.inference.hypotheses import Hypothesis, search
 from dbbstation.inference.impossible import impossible
+from dbbstation.inference.model_comparison import amplitude_size
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import MOVED, places_anew, seen
 from dbbstation.inference.settled import MOST_EXPANDED, Beginning, Settled
@@ -193,7 +194,7 @@ def _settled(
     """
     channel, look = bank.channel, options.look
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
-    laid_out: set[str] = set()
+    laid_out: dict[str, int] = {}  # how often, by name
     refused: dict[str, str] = dict(impossible or {})
     looked: set[frozenset[str]] = set()
     compared: Settled | None = None  # after the last look
@@ -219,9 +220,11 @@ def _settled(
         settled = met = Settled(channel, bank, bank.noise, tuple(causes), comparison, posterior, dict(refused))
         best = posterior.best.members
         compared = settled if looking else None
-        if rough := [m for m in _laws_of(settled) if m.cause.name not in laid_out]:
-            laid_out |= {member.cause.name for member in rough}
-            _lay_out(bank, beside, posterior.best, rough)
+        rough = {m.cause.name: m for m in _laws_of(settled) if m.cause.name not in laid_out}
+        rough |= {m.cause.name: m for m in _strayed(settled) if laid_out.get(m.cause.name, 0) < MOST_LAID_OUT}
+        if rough:
+            laid_out |= {name: laid_out.get(name, 0) + 1 for name in rough}
+            _lay_out(bank, beside, posterior.best, tuple(rough.values()))
             continue
         if negative := _negative(settled):
             refused |= negative
@@ -381,6 +384,31 @@ def _laws_of(settled: Settled) -> list[Member]:
     return list({m.cause.name: m for m in found}.values())
 
 
+def _strayed(settled: Settled) -> list[Member]:
+    """Members whose tangents carry them further from where they were laid out than `FAR`."""
+    members, laws = settled.best.members, settled.bank.laws
+    if not any(m.cause.name in laws and len(m.variant.slack) for m in members):
+        return []
+    values, found, start = settled.comparison.values(members), [], 0
+    for member in members:
+        own = values[start : start + len(member.columns)]
+        start += len(member.columns)
+        law = laws.get(member.cause.name)
+        if law is None or not len(member.variant.slack):
+            continue
+        places = zip(law.grids, member.variant.nonlinear, moved(law, member, own), strict=True)
+        if any(abs(now - then) > FAR * spacing_of(grid, then) for grid, then, now in places):
+            found.append(member)
+    return found
+
+
+FAR = 0.25
+"""Spacings of the grid of a nonlinear parameter over which a tangent is believed: half way to the next point would be the other's."""
+
+MOST_LAID_OUT = 3
+"""Times that a law is laid out, each at the best values that the last hypothesis had for it."""
+
+
 def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, rough: Sequence[Member]) -> None:
     """Lay out laws at their best values in the best hypothesis, or beside it in the place of what they compete with."""
     for member in rough:
@@ -390,12 +418,15 @@ def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, rough: Sequence[M
 def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Member) -> None:
     target, law = bank.target, bank.laws[member.cause.name]
     others = best.without(member.cause.name)
-    for _ in range(STEPS if law.grids or law.at else 1):
+    begun = (
+        _between_points(bank, beside, others, member) if len(law.grids) == 1 and not len(member.variant.slack) else None
+    )
+    for number in range(STEPS if law.grids or law.at else 1):
         values = beside.comparison(target).estimates([member, *others]).values[: len(member.columns)]
         width = len(member.variant.columns)
-        nonlinear = moved(law, member, values)
         if not values[:width].any():
             return
+        nonlinear = moved(law, member, values) if number or begun is None else begun
         every = np.zeros(len(law.plausible))
         every[amplitudes_of(member.variant)] = values[:width]
         bank.refine(law.name, nonlinear, every)
@@ -404,13 +435,57 @@ def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Membe
         member = replace(member, cause=cause, variant=same)
 
 
+def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], member: Member) -> tuple[float, ...]:
+    """Where a law of one nonlinear parameter explains most, between the neighbours of the point of its grid where it stands.
+
+    Tangents lead no further than to where an effect bends: a variable that jumps, late by a time, bends at each row.
+    """
+    law, target = bank.laws[member.cause.name], bank.target
+    if others:
+        columns = np.concatenate([one.columns for one in others])
+        values = beside.comparison(target).values([member, *others])[len(member.columns) :]
+        target = target - bank.fitted(columns) @ values
+    axes = np.linalg.qr(bank.base)[0]
+    target = target - axes @ (axes.T @ target)
+    used = amplitudes_of(member.variant)
+
+    def explained(value: float) -> float:
+        columns = bank.whitened(law.columns((value,))[:, used])
+        columns = columns - axes @ (axes.T @ columns)
+        return float(np.sum(np.square(columns @ np.linalg.lstsq(columns, target, rcond=None)[0])))
+
+    (grid,), (value,) = law.grids, member.variant.nonlinear
+    at = int(np.argmin(np.abs(np.subtract(grid, value))))
+    low, high = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
+    for _ in range(2):
+        places = [value, *np.linspace(low, high, PLACES).tolist()]
+        value = places[int(np.argmax([explained(one) for one in places]))]
+        step = (high - low) / (PLACES - 1)
+        low, high = max(value - step, grid[0]), min(value + step, grid[-1])
+    return (value,)
+
+
+PLACES = 17
+"""Values between the neighbours of a point of a grid that are tried, and again between the neighbours of the best of these."""
+
+
 def moved(law: Law, member: Member, values: NDArray[np.float64]) -> tuple[float, ...]:
     """Nonlinear parameters of a law, moved along their tangents by the values of a member, within their grids."""
     nonlinear = list(member.variant.nonlinear)
     if len(member.variant.slack):
+        per = growth(member, values)
         for k, grid in enumerate(law.grids):
-            nonlinear[k] = float(np.clip(nonlinear[k] + values[len(member.variant.columns) + k], grid[0], grid[-1]))
+            by = values[len(member.variant.columns) + k] / per
+            nonlinear[k] = float(np.clip(nonlinear[k] + by, grid[0], grid[-1]))
     return tuple(nonlinear)
+
+
+def growth(member: Member, values: NDArray[np.float64]) -> float:
+    """Amplitudes of a member over those that its tangents were made for; a tangent times this is what a step of one does."""
+    if not len(member.variant.slack):
+        return 1.0
+    size = amplitude_size(member, values[: len(member.variant.columns)])
+    return size / member.variant.slack_at if size > 0.0 else 1.0
 
 
 STEPS = 3

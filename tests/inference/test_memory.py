@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
+from dbbstation.inference.bank import Bank
+from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.memory import lagging, memory_laws
+from dbbstation.inference.model_comparison import Member
+from dbbstation.inference.settle import growth, moved
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import Verdict
 from tests.diagnosis.table.nulls import moving, table_of
@@ -119,3 +125,57 @@ def test_a_dead_time_of_some_rows_is_one_of_what_comes_late():
     assert finding.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}
     value = finding.values["dead time"]
     assert abs(value.value - delay) < 3.0 * value.uncertainty
+
+
+@pytest.mark.parametrize("rows_late", [5, 11, 23])
+def test_a_dead_time_of_a_variable_that_jumps_is_found_to_a_fraction_of_a_row(rng, rows_late):
+    # Tangents end at the next row: what jumps changes by a whole jump there.
+    jumps = np.zeros(600)
+    jumps[rng.choice(np.arange(30, 590), 24, replace=False)] = rng.normal(0.0, 30.0, 24)
+    valve = Variable("valve", "percent", Kind.ANY, np.cumsum(jumps))
+    time = Variable("t_s", "s", Kind.TIME, 0.05 * np.arange(600))
+    late = np.concatenate([np.full(rows_late, valve.values[0]), valve.values[:-rows_late]])
+    effect = 0.01 * (late - valve.values)
+    measured = effect + 0.2 * np.std(effect) * rng.standard_normal(600)
+    table = Table(
+        measured=measured,
+        simulated=np.zeros(600),
+        unit="mm",
+        simulated_name="simulated_mm",
+        variables=(time, valve),
+        derivatives={},
+        columns={},
+        blocks=(slice(0, 600),),
+        names=("run",),
+        clock=time,
+    )
+    found = find_mismatch(table, hold_out=False)
+    (finding,) = (one for one in found.there if one.name == "dead time of valve")
+    value = finding.values["dead time"]
+    assert abs(value.value - 0.05 * rows_late) < 3.0 * value.uncertainty
+    assert value.uncertainty < 0.02
+    assert {one.name for one in found.there} == {"dead time of valve"}
+
+
+def test_a_step_along_a_tangent_counts_in_the_amplitudes_that_it_was_made_for(rng):
+    # Of a law that was laid out at a sixth of its amplitude: exp(-t / tau), whose effect is known in closed form.
+    time = np.linspace(0.0, 5.0, 400)
+    law = Law(
+        name="fading",
+        columns=lambda point: np.exp(-time / point[0])[:, None],
+        plausible=np.array([1.0]),
+        parameters=("amplitude", "time constant"),
+        units=("mm", "s"),
+        grids=((0.5, 1.0, 2.0),),
+    )
+    residual = 6.0 * np.exp(-time / 1.1) + 1e-3 * rng.standard_normal(400)
+    base = Base.flat(("offset",), np.ones((400, 1)))
+    bank = Bank(Channel(residual, "mm", (slice(0, 400),), ("run",), (), base, laws=(law,)))
+    bank.noise = Coloured(1e-3)
+    bank.refine("fading", (1.05,), np.array([1.0]))
+    (cause,) = bank.causes
+    member = Member(cause, cause.variants[0], scale=6.0, slack_scale=6.0)
+    values = bank.beside().comparison(bank.target).values([member])
+    assert growth(member, values) == pytest.approx(6.0, rel=0.02)
+    # What is left is of second order in the step: 0.05 squared over the time constant.
+    assert moved(law, member, values)[0] == pytest.approx(1.1, abs=0.005)

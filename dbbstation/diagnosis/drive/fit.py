@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve_triangular
 from scipy.special import log_ndtr
 
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
-from dbbstation.inference.settle import moved
+from dbbstation.inference.settle import growth, moved
 from dbbstation.inference.verdict import OUT, Value
 
 if TYPE_CHECKING:
@@ -87,10 +87,11 @@ class DriveFit:
             p.name: Value(float(values[k]), float(np.hypot(sigma[k], METHOD_U_SHARE * values[k])), p.unit)
             for k, p in enumerate(form.amplitudes)
         }
-        shaped = moved(law, member, values)
+        shaped, per = moved(law, member, values), growth(member, values)
         for k, p in enumerate(form.shapes):
             laid_out = len(member.variant.slack) > k
-            found[p.name] = Value(shaped[k], float(sigma[width + k]) if laid_out else float(law.grids[k][-1]), p.unit)
+            u = float(sigma[width + k] / per) if laid_out else float(law.grids[k][-1])
+            found[p.name] = Value(shaped[k], u, p.unit)
         return found
 
     def at_end(self, name: str) -> dict[str, tuple[float, float]]:

@@ -1,6 +1,9 @@
 """Tables of a second origin in which nothing is missing: other objects, other noise, written to a file and read as a user's are.
 
     python -m tests.diagnosis.table.other_nulls --count 6 --seed 1 --out other-nulls.csv [--kinds pink,held] [--workers 2]
+    python -m tests.diagnosis.table.other_nulls --count 2 --seed 5 --files 10 --set inference.coloured.SHORTEST_OF_ALL=8 --out short-8.csv
+
+With `--files` each table has so many runs, with `--set` a constant of the program another value.
 
 It shares no line with `nulls`. Four objects: a robot along a path, a heated tank, a spindle on a test bench, poses that a laser
 tracker visits. Half of the tables bring derivatives of the simulated value. Rows of a file that is there are not run again.
@@ -17,6 +20,8 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
+from importlib import import_module
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -98,7 +103,7 @@ def _spindle(rng: Rng, rows: int, at: NDArray[np.float64]) -> Recorded:
     torque = 0.02 * load + 1e-4 * speed + 0.01 * place
     if rng.random() < 0.5:
         columns["d_viscous"] = speed / 1000.0
-    return Recorded(at * rows * 0.004, torque, np.abs(load - load.min()) / np.ptp(load), columns, unit="n_m")
+    return Recorded(at * rows * 0.004, torque, np.abs(load - load.min()) / (np.ptp(load) or 1.0), columns, unit="n_m")
 
 
 def _poses(rng: Rng, rows: int, at: NDArray[np.float64]) -> Recorded:
@@ -268,10 +273,11 @@ MISSING = 0.3
 """Share of tables from which rows are missing, one in ten of them."""
 
 
-def write(kind: str, seed: int, folder: Path) -> tuple[list[Path], TableOptions]:
-    """Write one table, of one file or of several, and say how it is to be read."""
+def write(kind: str, seed: int, folder: Path, runs: int = 0) -> tuple[list[Path], TableOptions]:
+    """Write one table, of so many files or of one, three or six, and say how it is to be read."""
     rng = np.random.default_rng([4711, seed, sum(map(ord, kind))])
     files = int(rng.choice([1, 1, 3, 6]))
+    files = runs or files
     make = OBJECTS[int(rng.integers(len(OBJECTS)))]
     total = int(rng.integers(300, 900))
     paths, measured = [], ""
@@ -297,11 +303,11 @@ def write(kind: str, seed: int, folder: Path) -> tuple[list[Path], TableOptions]
     return paths, TableOptions(measured, measured.replace("measured", "model"))
 
 
-def answer(kind: str, seed: int, *, hold_out: bool = True) -> dict[str, object]:
+def answer(kind: str, seed: int, runs: int = 0, *, hold_out: bool = True) -> dict[str, object]:
     """What the program says of one table: names by verdict; parts are held out only where that decides."""
     began = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
-        table = load_tables(*write(kind, seed, Path(folder))).table
+        table = load_tables(*write(kind, seed, Path(folder), runs)).table
     found = find_mismatch(table, hold_out=False)
     if hold_out and found.identified:
         found = find_mismatch(table)
@@ -322,6 +328,14 @@ def answer(kind: str, seed: int, *, hold_out: bool = True) -> dict[str, object]:
     }
 
 
+def set_constant(text: str) -> None:
+    """Give a constant of the program another value, written as `inference.coloured.SHORTEST_OF_ALL=8`."""
+    name, value = text.split("=")
+    module, constant = name.rsplit(".", 1)
+    declared = import_module(f"dbbstation.{module}")
+    setattr(declared, constant, type(getattr(declared, constant))(value))
+
+
 def main() -> None:
     """Run what the file has not, and print how many tables have a false name."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -330,15 +344,20 @@ def main() -> None:
     options.add_argument("--kinds", default=",".join(NOISES))
     options.add_argument("--out", type=Path, required=True)
     options.add_argument("--workers", type=int, default=os.cpu_count())
+    options.add_argument("--files", type=int, default=0)
+    options.add_argument("--set", action="append", default=[], metavar="MODULE.NAME=VALUE")
     chosen = options.parse_args()
+    for text in chosen.set:
+        set_constant(text)
     rows: list[dict[str, str]] = []
     if chosen.out.exists():
         with chosen.out.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
     known = {(row["kind"], int(row["seed"])) for row in rows}
     wanted = [(kind, chosen.seed * 1000 + k) for k in range(chosen.count) for kind in chosen.kinds.split(",")]
-    with ProcessPoolExecutor(chosen.workers) as pool:
-        for done in as_completed([pool.submit(answer, *one) for one in wanted if one not in known]):
+    # Forked, so that the values that were set hold in the workers.
+    with ProcessPoolExecutor(chosen.workers, get_context("fork")) as pool:
+        for done in as_completed([pool.submit(answer, *one, chosen.files) for one in wanted if one not in known]):
             rows.append({name: str(value) for name, value in done.result().items()})
             with chosen.out.open("w", encoding="utf-8", newline="") as file:
                 writer = csv.DictWriter(file, list(rows[0]))

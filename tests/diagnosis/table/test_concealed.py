@@ -1,0 +1,20 @@
+"""What refitted parameters hide is found in tables as a user writes them, and its clean twin is silent; all cases: `concealed`."""
+
+import pytest
+
+from tests.diagnosis.table.concealed import answer
+
+
+@pytest.mark.parametrize("case", ["load-cell", "creep", "dead-time"])
+def test_what_the_parameters_hide_is_found(case):
+    said = answer(case, 3, "white", 5.0)
+    assert said["answer"] == "right", said
+    if case != "dead-time":  # which no gain can do
+        assert float(said["hidden"]) > 0.4
+
+
+@pytest.mark.parametrize("case", ["payload", "creep"])
+def test_nothing_is_found_in_its_clean_twin(case):
+    said = answer(case, 3, "averaged", 0.0)
+    assert said["answer"] == "nothing", said
+    assert said["identified"] == said["happened"] == ""

@@ -160,6 +160,10 @@ def _print_whether(result: SimulatorResult) -> None:
             f"There is a mismatch: {rms.as_simulated:.3g} {unit} rms as simulated, {rms.refitted:.3g} refitted, "
             f"{rms.corrected:.3g} corrected."
         )
+    elif result.stopped:
+        echo(
+            "No mismatch was found before: whether what the refitted simulator leaves is noise was not asked to the end."
+        )
     else:
         echo(
             f"No mismatch: what the refitted simulator leaves, {rms.refitted:.3g} {unit} rms, is noise.".replace(

@@ -48,7 +48,7 @@ def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -
             )
         ),
         runs=tuple(SimulatedRun(run.name, len(run)) for run in model.runs),
-        mismatch=bool(answer.terms) or not answer.left.is_noise,
+        mismatch=answer.is_there,
         rms=SimulationRms(*answer.rms),
         noise=SimulationNoise(
             settled.noise.sigma,

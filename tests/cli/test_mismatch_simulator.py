@@ -96,6 +96,19 @@ def test_how_many_simulations_are_allowed_is_said_beforehand_and_where_it_ended(
     assert "60" in outcome.out + outcome.err
 
 
+def test_where_simulations_are_spent_what_would_come_next_is_a_mismatch_without_a_verdict(run, tmp_path):
+    figure = tmp_path / "figure.svg"
+    outcome = run(*ASKED, "--most-runs", "400", "--json", "--figure", figure)
+    assert outcome.code == 0, outcome.err
+    assert outcome.data["stopped"]
+    assert outcome.data["mismatch"] is True
+    assert outcome.data["findings"][0]["verdict"] == "ambiguous"
+    assert figure.exists()
+    told = run(*ASKED, "--most-runs", "400")
+    assert told.out.startswith("Ended early: ")
+    assert "No mismatch" not in told.out
+
+
 def test_a_simulator_that_lacks_nothing_is_told_so(run, decay):
     outcome = run(*decay())
     assert outcome.code == 0, outcome.err

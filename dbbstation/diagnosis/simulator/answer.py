@@ -103,6 +103,12 @@ class SimulatorComparison:
         return self.found.state.terms
 
     @property
+    def is_there(self) -> bool:
+        """Whether the simulator lacks anything; where the search ended early, also what it would have put in next."""
+        next_in = bool(self.stopped) and bool(self.found.settled.best.members)
+        return bool(self.terms) or not self.left.is_noise or next_in
+
+    @property
     def identified(self) -> tuple[CauseFinding, ...]:
         """Findings of what is there and predicts, where that was asked."""
         return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)

@@ -41,7 +41,8 @@ def named_values(
             )
             for k, j in enumerate(amplitudes_of(member.variant).tolist())
         }
-        shaped, every, per = moved(law, member, values), len(law.plausible), growth(member, values)
+        per, every = growth(member, values), len(law.plausible)
+        shaped = moved(law, member, values, per)
         for k, name in enumerate(law.parameters[every:]):
             known = len(member.variant.slack) > k
             found[name] = Value(shaped[k], float(sigma[width + k] / per) if known else np.nan, law.units[every + k])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.alternatives import in_place_of
-from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of, spacing_of
+from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, search
 from dbbstation.inference.impossible import impossible
 from dbbstation.inference.model_comparison import amplitude_size
@@ -194,7 +194,7 @@ def _settled(
     """
     channel, look = bank.channel, options.look
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
-    laid_out: dict[str, int] = {}  # how often, by name
+    laid_out: set[str] = set()
     refused: dict[str, str] = dict(impossible or {})
     looked: set[frozenset[str]] = set()
     compared: Settled | None = None  # after the last look
@@ -220,11 +220,9 @@ def _settled(
         settled = met = Settled(channel, bank, bank.noise, tuple(causes), comparison, posterior, dict(refused))
         best = posterior.best.members
         compared = settled if looking else None
-        rough = {m.cause.name: m for m in _laws_of(settled) if m.cause.name not in laid_out}
-        rough |= {m.cause.name: m for m in _strayed(settled) if laid_out.get(m.cause.name, 0) < MOST_LAID_OUT}
-        if rough:
-            laid_out |= {name: laid_out.get(name, 0) + 1 for name in rough}
-            _lay_out(bank, beside, posterior.best, tuple(rough.values()))
+        if rough := [m for m in _laws_of(settled) if m.cause.name not in laid_out]:
+            laid_out |= {member.cause.name for member in rough}
+            _lay_out(bank, beside, posterior.best, rough)
             continue
         if negative := _negative(settled):
             refused |= negative
@@ -384,31 +382,6 @@ def _laws_of(settled: Settled) -> list[Member]:
     return list({m.cause.name: m for m in found}.values())
 
 
-def _strayed(settled: Settled) -> list[Member]:
-    """Members whose tangents carry them further from where they were laid out than `FAR`."""
-    members, laws = settled.best.members, settled.bank.laws
-    if not any(m.cause.name in laws and len(m.variant.slack) for m in members):
-        return []
-    values, found, start = settled.comparison.values(members), [], 0
-    for member in members:
-        own = values[start : start + len(member.columns)]
-        start += len(member.columns)
-        law = laws.get(member.cause.name)
-        if law is None or not len(member.variant.slack):
-            continue
-        places = zip(law.grids, member.variant.nonlinear, moved(law, member, own), strict=True)
-        if any(abs(now - then) > FAR * spacing_of(grid, then) for grid, then, now in places):
-            found.append(member)
-    return found
-
-
-FAR = 0.25
-"""Spacings of the grid of a nonlinear parameter over which a tangent is believed: half way to the next point would be the other's."""
-
-MOST_LAID_OUT = 3
-"""Times that a law is laid out, each at the best values that the last hypothesis had for it."""
-
-
 def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, rough: Sequence[Member]) -> None:
     """Lay out laws at their best values in the best hypothesis, or beside it in the place of what they compete with."""
     for member in rough:
@@ -469,11 +442,17 @@ PLACES = 17
 """Values between the neighbours of a point of a grid that are tried, and again between the neighbours of the best of these."""
 
 
-def moved(law: Law, member: Member, values: NDArray[np.float64]) -> tuple[float, ...]:
-    """Nonlinear parameters of a law, moved along their tangents by the values of a member, within their grids."""
+def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.0) -> tuple[float, ...]:
+    """Nonlinear parameters of a law, moved along their tangents by the values of a member, within their grids.
+
+    Args:
+        law: of the member.
+        member: laid out with tangents, or on its grid.
+        values: of its columns, shape (p,).
+        per: what a step of one along a tangent counts: `growth` where tangents were made for another form or hypothesis.
+    """
     nonlinear = list(member.variant.nonlinear)
     if len(member.variant.slack):
-        per = growth(member, values)
         for k, grid in enumerate(law.grids):
             by = values[len(member.variant.columns) + k] / per
             nonlinear[k] = float(np.clip(nonlinear[k] + by, grid[0], grid[-1]))

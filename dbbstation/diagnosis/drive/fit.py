@@ -87,7 +87,8 @@ class DriveFit:
             p.name: Value(float(values[k]), float(np.hypot(sigma[k], METHOD_U_SHARE * values[k])), p.unit)
             for k, p in enumerate(form.amplitudes)
         }
-        shaped, per = moved(law, member, values), growth(member, values)
+        per = growth(member, values)
+        shaped = moved(law, member, values, per)
         for k, p in enumerate(form.shapes):
             laid_out = len(member.variant.slack) > k
             u = float(sigma[width + k] / per) if laid_out else float(law.grids[k][-1])

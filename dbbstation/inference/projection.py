@@ -185,11 +185,11 @@ class CauseColumns:
         """Products with a target, shape (n,), of the columns, shape (p,), and of the axes, shape (k,)."""
         return self.samples.T @ target, self.axes.T @ target
 
-    def part(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> Part:
+    def part(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> RowProducts:
         """What some rows, shape (n,), say of the columns, or of some of them, shape (q,), rising."""
         own = np.arange(self.count) if only is None else only
         axes, columns = self.axes[rows], self.samples.T[np.ix_(own, np.flatnonzero(rows))]
-        return Part(rows, only, axes.T @ axes, (columns @ axes).T, columns @ columns.T)
+        return RowProducts(rows, only, axes.T @ axes, (columns @ axes).T, columns @ columns.T)
 
     def but_for(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> CauseColumns:
         """The same causes as all other rows show them, the columns themselves shared; targets must be zero in these rows.
@@ -200,13 +200,13 @@ class CauseColumns:
         """
         return self.without(self.part(rows, only))
 
-    def without(self, part: Part) -> CauseColumns:
+    def without(self, part: RowProducts) -> CauseColumns:
         """The same but for the rows of a part, as `but_for` has it."""
         return _Without(self, part)
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class RowProducts:
     """Products over some rows of a channel, which are taken from those over all of them.
 
     Attributes:
@@ -223,9 +223,9 @@ class Part:
     across: NDArray[np.float64]
     of_columns: NDArray[np.float64]
 
-    def __add__(self, other: Part) -> Part:
+    def __add__(self, other: RowProducts) -> RowProducts:
         """Both parts together; they have no row in common."""
-        return Part(
+        return RowProducts(
             self.rows | other.rows,
             self.numbers,
             self.of_axes + other.of_axes,
@@ -241,7 +241,7 @@ class _Without(CauseColumns):
     them row by row is worked out where it is asked for.
     """
 
-    def __init__(self, whole: CauseColumns, part: Part) -> None:
+    def __init__(self, whole: CauseColumns, part: RowProducts) -> None:
         self._whole, self._rows, self.numbers, self.count = whole, part.rows, part.numbers, whole.count
         share, turned = np.linalg.eigh(np.eye(len(part.of_axes)) - part.of_axes)
         turned, size = turned[:, share > LEAST_SHARE], np.sqrt(share[share > LEAST_SHARE])

@@ -363,6 +363,11 @@ class Bank:
         """Columns of the base over the kept rows, whitened, shape (m, k)."""
         return self._columns.base
 
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """Orthonormal axes of the base over the kept rows, shape (m, r); fewer than its columns where some say the same."""
+        return self._columns.axes
+
     def base_values(self, effect: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values of the base columns beside an effect over all rows, shape (k,)."""
         target = self.whitened(self.channel.residual - effect)

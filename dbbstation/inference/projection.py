@@ -44,7 +44,6 @@ class CauseColumns:
         whitened: makes columns as they are taken in, shape (m, q), those over the samples, shape (n, q); the same if None. It is
             asked for a column when that is wanted first.
         room: columns for which room is made at first; more need a copy of all. Room that stays empty takes no memory.
-        along: axes and the base along them, where they are known.
 
     Attributes:
         base: the same.
@@ -59,10 +58,9 @@ class CauseColumns:
         base: NDArray[np.float64],
         whitened: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
         room: int = MARGIN,
-        along: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         self.base = base
-        self.axes, self.on_axes = along or _orthonormal(base)
+        self.axes, self.on_axes = _orthonormal(base)
         self._whitened = whitened
         self._buffer = np.empty((len(base), room), order="F")
         self._waiting: list[NDArray[np.float64]] = []

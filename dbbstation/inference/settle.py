@@ -418,7 +418,7 @@ def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], me
         columns = np.concatenate([one.columns for one in others])
         values = beside.comparison(target).values([member, *others])[len(member.columns) :]
         target = target - bank.fitted(columns) @ values
-    axes = np.linalg.qr(bank.base)[0]
+    axes = bank.axes
     target = target - axes @ (axes.T @ target)
     used = amplitudes_of(member.variant)
 
@@ -439,7 +439,9 @@ def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], me
 
 
 PLACES = 17
-"""Values between the neighbours of a point of a grid that are tried, and again between the neighbours of the best of these."""
+"""Values between the neighbours of a point of a grid that are tried, and again between the neighbours of the best of these: a place is
+known to a sixty-fourth of the way to the next point, less than a row where points lie sixty rows apart. With 9 and 33 the dead times
+of `tests/inference/test_memory.py` are within 3 u of the truth as well."""
 
 
 def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.0) -> tuple[float, ...]:

@@ -13,7 +13,7 @@ from dbbstation.diagnosis.simulator.held import PredictedPartsError, parts, pred
 from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
 from dbbstation.diagnosis.simulator.search import compared, moves, search
 from dbbstation.diagnosis.simulator.separate import separations
-from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns
+from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns, rms
 from dbbstation.inference.chosen_anew import LEAST_PARTS
 from dbbstation.inference.folds import Fold
 from dbbstation.inference.jackknife import refits_without
@@ -283,7 +283,7 @@ def _parameters(base: Node, found: SearchOutcome) -> tuple[Moved, ...]:
     alone = _uncertainties(rows[:, :count], known)
     both = _uncertainties(rows, np.concatenate([known, np.zeros(rows.shape[1] - count)]))[:count]
     white = weigh(base.fitted.columns) / sigma
-    before = _uncertainties(white, known) * max(_rms(weigh(base.fitted.residual)) / sigma, 1.0)
+    before = _uncertainties(white, known) * max(rms(weigh(base.fitted.residual)) / sigma, 1.0)
     names = [p.name for p in model.parameters]
     alike = dict(not_told_apart(names, white))
     return tuple(
@@ -305,7 +305,3 @@ def _uncertainties(rows: NDArray[np.float64], known: NDArray[np.float64]) -> NDA
     norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal / np.outer(norm, norm), rcond=1e-14, hermitian=True)
     return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)) / norm)
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from dbbstation.diagnosis.simulator.terms import IN_PLACE
-from dbbstation.diagnosis.simulator.work import AGREE, FittedState, PerturbedParameter
+from dbbstation.diagnosis.simulator.work import AGREE, FittedState, PerturbedParameter, rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -120,13 +120,13 @@ def fit(
         most_steps: at the most.
     """
     begun = work.residuals([start])[0]
-    sigma = sigma or _rms(weigh(begun)) or 1.0
+    sigma = sigma or rms(weigh(begun)) or 1.0
     starts = [start, *(_elsewhere(work, start, partial(_squares, work, weigh, sigma)) if several else ())]
     ended = [_from(work, one, weigh, sigma, most_steps) for one in starts]
     squares = [float(np.sum(_weighed(work, state, residual, weigh, sigma) ** 2)) for state, residual in ended]
     best = int(np.argmin(squares))
     state, residual = ended[best]
-    answers = work.answers(state, directions_of(work, state), _rms(residual))
+    answers = work.answers(state, directions_of(work, state), rms(residual))
     return SimulatorFit(
         state, residual, answers.columns, answers.curved, squares[best], tuple(np.delete(squares, best).tolist())
     )
@@ -163,7 +163,7 @@ def _from(
             if _norm(rows - rows_before - said) < AGREE * _norm(said):
                 return there
         state = start.with_numbers(numbers)
-        found = work.answers(state, directions_of(work, state), _rms(residual(numbers)))
+        found = work.answers(state, directions_of(work, state), rms(residual(numbers)))
         there = np.vstack([-weigh(found.columns) / sigma, _known(work.model.parameters, len(numbers))[0]])
         about[:] = [(numbers.copy(), rows, there)]
         return there
@@ -302,7 +302,3 @@ def not_told_apart(names: Sequence[str], columns: NDArray[np.float64]) -> list[t
 
 def _norm(values: NDArray[np.float64]) -> float:
     return float(np.linalg.norm(values))
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -15,6 +15,7 @@ from dbbstation.diagnosis.simulator.density import log_density
 from dbbstation.diagnosis.simulator.fit import near
 from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
+from dbbstation.diagnosis.simulator.work import rms
 from dbbstation.diagnosis.table.mismatch import FOLD_ROWS
 from dbbstation.inference.folds import ENOUGH_BLOCKS, FOLDS, Fold, HeldOutError, beside
 from dbbstation.inference.verdict import DensityGains
@@ -97,14 +98,10 @@ def predicted_parts(
             less = nodes.without(one.node, term)
             _, left = near(work, less.fitted, weigh, sigma)
             gains[(term,)] = with_all - log_density(work, others, rows, left, less.fitted.columns)
-        before, middle, after = (_rms(values[rows]) for values in (as_simulated, refitted, one.residual))
+        before, middle, after = (rms(values[rows]) for values in (as_simulated, refitted, one.residual))
         yield Fold(name, int(rows.sum()), before, middle, after, gains)
 
 
 def _without(channel: Channel, out: NDArray[np.bool_], found: SearchOutcome) -> Settled:
     """Comparison without some rows, shape (n,)."""
     return compared_quickly(channel.without(out).thinned(FOLD_ROWS), found.settled.beginning)
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -13,7 +13,7 @@ from dbbstation.diagnosis.simulator.fit import near
 from dbbstation.diagnosis.simulator.laws import form_uncertainty
 from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.trials import beside
-from dbbstation.diagnosis.simulator.work import BudgetSpentError
+from dbbstation.diagnosis.simulator.work import BudgetSpentError, rms
 from dbbstation.inference.named_values import named_values
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
@@ -21,8 +21,6 @@ from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
-
-    from numpy.typing import NDArray
 
     from dbbstation.diagnosis.simulator.candidates import Candidate
     from dbbstation.diagnosis.simulator.nodes import Challenge, Node, Nodes
@@ -190,7 +188,7 @@ def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str
 
     def size(of: Sequence[str]) -> float:
         effect = settled.effect(of)
-        return _rms(effect + channel.base.samples @ (bank.base_values(effect) - alone))
+        return rms(effect + channel.base.samples @ (bank.base_values(effect) - alone))
 
     return _less(members, size, names)
 
@@ -202,7 +200,7 @@ def _within_forms_refitted(node: Node, but_for: Collection[str]) -> list[str]:
 
     def size(of: Sequence[str]) -> float:
         effect = np.sum([node.answers_of(name) @ np.array(terms[name].amplitudes) for name in of], axis=0)
-        return _rms(beside(base, effect))
+        return rms(beside(base, effect))
 
     return _less(node.inside, size, [name for name in terms if name not in but_for])
 
@@ -227,10 +225,6 @@ def _less(members: Sequence[Candidate], size: Callable[[Sequence[str]], float], 
         own = [name for name in names if ports[name] == port]
         found += own if within(own) else [name for name in own if within([name])]
     return found
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidate]:

@@ -199,7 +199,7 @@ class SimulationRuns:
             once = self.residuals([directions[k].at(state, doses[k]) for k in open_], strict=False)
             again, good = [], []
             for k, after in zip(open_, once, strict=True):
-                moved = _rms(before - after) if np.isfinite(after).all() else np.inf
+                moved = rms(before - after) if np.isfinite(after).all() else np.inf
                 if wanted / ROOM <= moved <= wanted * ROOM:
                     good.append((k, before - after))
                 else:
@@ -214,7 +214,7 @@ class SimulationRuns:
                     doses[k] *= 0.1
                     again.append(k)
                     continue
-                apart = _rms(second / 2.0 - first) / max(abs(doses[k]) * _rms(column), 1e-300)
+                apart = rms(second / 2.0 - first) / max(abs(doses[k]) * rms(column), 1e-300)
                 if apart < curved[k]:
                     columns[:, k], curved[k], seen[k] = column, apart, True
                     self.doses[directions[k].key] = float(doses[k])
@@ -266,5 +266,6 @@ def sizes(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, float]:
     return {name: float(np.abs(values).max(initial=0.0)) or 1.0 for name, values in columns.items()}
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def rms(values: NDArray[np.float64]) -> float:
+    """Root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))

@@ -43,7 +43,7 @@ class Outcome:
         plan: what kind was measured.
         rate_hz: samples per second.
         angles: the recording has commanded angles.
-        kind: `clean`, `single`, `pair`, `triple`, `faint`, `outside`, `concealed` or `not-a-candidate`.
+        kind: `clean`, `single`, `pair`, `triple`, `faint`, `disturbed`, `outside`, `concealed` or `not-a-candidate`.
         perturbed: what is hidden follows its law only roughly.
         truth: names of what is hidden, listed or not.
         sizes: of each, in testable limits.
@@ -213,6 +213,8 @@ def numbers(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         ("triple", ("wrongly named", "<= 2 %", lambda o: bool(o.wrong))),
         ("faint", ("named or within a declared ambiguity", "", lambda o: o.within)),
         ("faint", ("wrongly named", "<= 2 %", lambda o: bool(o.wrong))),
+        ("disturbed", ("what is listed named or within a declared ambiguity", "", lambda o: o.within)),
+        ("disturbed", ("wrongly named", "<= 2 %", lambda o: bool(o.wrong))),
         ("outside", ("detected", "", lambda o: o.detected)),
         ("outside", ("given a name", "<= 5 %", lambda o: o.given_a_name)),
         ("outside", ("located", ">= 80 %", lambda o: bool(o.located))),

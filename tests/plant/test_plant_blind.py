@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.plant.blind.circumstances import drawn
+from tests.plant.blind.disturbances import DISTURBANCES, NAME_ON_THE_LIST
 from tests.plant.blind.families import families
 from tests.plant.blind.hide import Hidden, Hider
 from tests.plant.blind.limits import BAR_UM, FREE_MM, Limits
@@ -109,14 +110,24 @@ def test_sizes_are_what_was_asked_for(session: LinearSession) -> None:
 
 
 def test_counts_and_names_in_turn() -> None:
-    counts = {"clean": 3, "single": 50, "pair": 2, "outside": 12, "concealed": 7, "triple": 4, "faint": 26}
+    counts = {
+        "clean": 3,
+        "single": 50,
+        "pair": 2,
+        "outside": 12,
+        "concealed": 7,
+        "triple": 4,
+        "faint": 26,
+        "disturbed": 12,
+    }
     planned = tasks(counts, 1)
-    assert [task.number for task in planned] == list(range(1, 105))
+    assert [task.number for task in planned] == list(range(1, 117))
     kinds = [task.kind for task in planned]
     assert {kind: kinds.count(kind) for kind in KINDS} == counts
     assert {task.name for task in planned if task.kind == "single"} == set(SINGLE)
     assert {task.name for task in planned if task.kind == "faint"} == set(SINGLE)
     assert {task.name for task in planned if task.kind == "outside"} == set(UNLISTED)
+    assert {task.name for task in planned if task.kind == "disturbed"} == set(DISTURBANCES)
     # The order says nothing.
     assert kinds != sorted(kinds, key=KINDS.index)
 
@@ -169,6 +180,22 @@ def test_faint_effects_are_three_to_seven_standard_deviations_out(name: str) -> 
         assert all(loud.answer["testable"] for loud in beside)
         counts.append(len(beside))
     assert set(counts) == {0, 1}
+
+
+@pytest.mark.parametrize("name", DISTURBANCES)
+def test_a_disturbance_is_hidden_beside_an_effect_of_the_list(name: str) -> None:
+    """The answer says by which name of the list a disturbance may be called, or that it is on no list."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        listed, beside = Hider(rng, drawn(rng, seed)).disturbed(name)
+        assert listed.answer["listed"]
+        assert listed.answer["size"] >= 1.0 - 1e-9
+        if beside.answer["disturbance"] == name:
+            assert beside.answer["size"] >= 1.0 - 1e-9
+            assert beside.answer["name"] == NAME_ON_THE_LIST.get(name, name)
+            assert beside.answer["listed"] == (name in NAME_ON_THE_LIST)
+            return
+    raise AssertionError(f"no {name} shows in six sessions")
 
 
 def test_a_perturbed_session_says_how_far_it_is_off_the_laws(tmp_path: FilePath) -> None:

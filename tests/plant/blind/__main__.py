@@ -20,6 +20,9 @@ def main() -> None:
     parser.add_argument("--concealed", type=int, default=7, help="one of the list that nobody can see")
     parser.add_argument("--triples", type=int, default=0, help="three of the list, each separable from the other two")
     parser.add_argument("--faint", type=int, default=0, help="one of the list at 3 to 7 sigma, half beside a loud one")
+    parser.add_argument(
+        "--disturbed", type=int, default=0, help="one of the list beside a bump, a kink, a bent scale ..."
+    )
     parser.add_argument("--perturbed", type=float, default=0.0, help="share of sessions off the laws of their effects")
     parser.add_argument("--seed", type=int, default=1, help="of everything")
     parser.add_argument("--jobs", type=int, help="processes; all cores if left out")
@@ -36,6 +39,7 @@ def main() -> None:
         "concealed": given.concealed,
         "triple": given.triples,
         "faint": given.faint,
+        "disturbed": given.disturbed,
     }
     total = sum(counts.values())
 

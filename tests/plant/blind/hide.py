@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tests.plant.blind.disturbances import DISTURBANCES, NAME_ON_THE_LIST
 from tests.plant.blind.families import families
 from tests.plant.blind.limits import TESTABLE_SIGMA, Limits
 from tests.plant.blind.listed import CONCEALED, LISTED, SINGLE
@@ -112,6 +113,18 @@ class Hider:
                 hidden.answer.update(listed=False, nearest=nearest)
                 return [hidden]
         raise ArithmeticError("nothing outside the list shows on this plan")
+
+    def disturbed(self, name: str) -> list[Hidden]:
+        """One effect of the list, and a disturbance beside it; each shows with the other fitted too."""
+        for draw in range(DRAWS):
+            kind = name if draw < DRAWS // 2 else str(self._rng.choice(list(DISTURBANCES)))
+            known = NAME_ON_THE_LIST.get(kind)
+            listed = self._drawn(str(self._rng.choice([one for one in SINGLE if one != known])))
+            found = self._together([listed, DISTURBANCES[kind](self._rng, self._scene)])
+            if found:
+                found[1].answer.update({"disturbance": kind, "name": known or kind, "listed": known is not None})
+                return found
+        raise ArithmeticError("no disturbance shows on this plan")
 
     def concealed(self, name: str) -> list[Hidden]:
         """One effect that the kinematic parameters swallow so far that nobody can see it."""

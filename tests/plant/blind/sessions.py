@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tests.plant.blind.circumstances import drawn, recorded_currents
+from tests.plant.blind.disturbances import DISTURBANCES
 from tests.plant.blind.hide import Hidden, Hider
 from tests.plant.blind.listed import CONCEALED, SINGLE
 from tests.plant.blind.unlisted import UNLISTED
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 FORMAT = "blind-answers/1"
-KINDS = ("clean", "single", "pair", "outside", "concealed", "triple", "faint")
+KINDS = ("clean", "single", "pair", "outside", "concealed", "triple", "faint", "disturbed")
 
 TOGETHER = {"pair": 2, "triple": 3}
 """Kinds in which several effects of the list are hidden, and how many."""
@@ -55,6 +56,7 @@ def tasks(counts: dict[str, int], seed: int, perturbed_share: float = 0.0) -> li
         rng.shuffle(of_kind)
     # Streams of their own, so that a study without these is the one that its seed has always made.
     names["faint"] = np.random.default_rng([seed, 4]).permutation(SINGLE).tolist()
+    names["disturbed"] = np.random.default_rng([seed, 6]).permutation(list(DISTURBANCES)).tolist()
     wanted = [
         (kind, names[kind][k % len(names[kind])] if kind in names else None)
         for kind in KINDS
@@ -116,6 +118,7 @@ def _hidden(hider: Hider, task: Task) -> list[Hidden]:
         "faint": hider.faint,
         "outside": hider.outside,
         "concealed": hider.concealed,
+        "disturbed": hider.disturbed,
     }
     return by_name[task.kind](task.name)
 

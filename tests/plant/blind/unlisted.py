@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 ONE = np.ones(1)
 
 
-def _strut_and_length(rng: np.random.Generator, scene: Scene) -> tuple[int, float]:
+def strut_and_length(rng: np.random.Generator, scene: Scene) -> tuple[int, float]:
     """A strut and a length that it passes in several of the tests."""
     from tests.plant.hexapod import strut_lengths  # noqa: PLC0415 - only here
 
@@ -84,7 +84,7 @@ def _hose_drag(rng: np.random.Generator, scene: Scene) -> Effect:
 
 
 def _dented_screw(rng: np.random.Generator, scene: Scene) -> Effect:
-    (strut, at_mm), width_mm = _strut_and_length(rng, scene), float(rng.uniform(4.0, 12.0))
+    (strut, at_mm), width_mm = strut_and_length(rng, scene), float(rng.uniform(4.0, 12.0))
     return Effect(
         "dented-screw",
         lambda a: DentedScrew(strut, at_mm, width_mm, float(a[0])),
@@ -111,7 +111,7 @@ def _building_sway(rng: np.random.Generator, scene: Scene) -> Effect:
 
 
 def _bent_cover(rng: np.random.Generator, scene: Scene) -> Effect:
-    (strut, at_mm), width_mm = _strut_and_length(rng, scene), float(rng.uniform(15.0, 40.0))
+    (strut, at_mm), width_mm = strut_and_length(rng, scene), float(rng.uniform(15.0, 40.0))
     return Effect(
         "bent-cover",
         lambda a: BentCover(strut, at_mm, width_mm, float(a[0])),

@@ -32,7 +32,9 @@ class WanderingBar(Mechanism):
     walk_um: tuple[float, ...] = ()
 
     def drawn(self, rng: np.random.Generator, scene: Scene) -> Mechanism:
-        """One walk for the session."""
+        """One walk for the session, where none is given."""
+        if self.walk_um:
+            return self
         steps = int(np.ceil(scene.end_s / WALK_STEP_S)) + 2
         walk_um = self.step_um_root_s * np.sqrt(WALK_STEP_S) * np.cumsum(rng.standard_normal(steps))
         return replace(self, walk_um=tuple(walk_um.tolist()))

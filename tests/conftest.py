@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
 # As the command line does, before NumPy looks: several workers with threads each wait for one another most of the time.
@@ -35,19 +35,21 @@ def pytest_xdist_auto_num_workers() -> int:
 
 @pytest.hookimpl(trylast=True)  # behind what leaves tests out
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Slow tests first, those of a file together and files shared out: one that begins last is waited for by all workers.
+    """Files with slow tests first, whole and shared out: a slow test that begins last is waited for by all workers.
 
     Workers begin with equal parts of the list, one behind the other, and take from the ends of each other's parts. Files that lie
-    highest test the most at once, and take longest.
+    highest test the most at once, and take longest. A file stays in one piece, so that what its tests share is made once.
     """
-    slow = defaultdict(list)
+    of_slow = Counter(item.path for item in items if item.get_closest_marker("slow") is not None)
+    whole, quick = defaultdict(list), []
     for item in items:
-        if item.get_closest_marker("slow") is not None:
-            slow[item.path].append(item)
-    quick = [item for item in items if item.path not in slow or item not in slow[item.path]]
+        (whole[item.path] if item.path in of_slow else quick).append(item)
     queues: list[list[pytest.Item]] = [[] for _ in range(getattr(config, "workerinput", {}).get("workercount", 1))]
-    for path in sorted(slow, key=lambda path: len(path.parts)):
-        min(queues, key=len).extend(slow[path])
+    slow_in = [0] * len(queues)
+    for path in sorted(of_slow, key=lambda path: len(path.parts)):
+        least = slow_in.index(min(slow_in))
+        queues[least] += whole[path]
+        slow_in[least] += of_slow[path]
     left, begun = len(items), 0
     items.clear()
     for number, queue in enumerate(queues):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dbbstation.quality.finding import FindingVerdict, Name
-from dbbstation.quality.judge import Judgement
+from dbbstation.quality.judge import Judgement, SessionRuns
 from dbbstation.quality.knowledge import HIGHEST_HARMONIC, Seen, seen
 from dbbstation.trace.recording import Recording
 from tests.quality.sessions import Sound, finding_of
@@ -30,13 +30,13 @@ class Spoilt:
     also: tuple[str, ...]
 
 
-def spoil(whole: Sound, run: int, name: Name) -> Iterator[Spoilt]:
+def spoil(whole: Sound, run: int, name: Name, shares: Sequence[float] = SHARES) -> Iterator[Spoilt]:
     """Spoil a run so that its value comes to each share of its limit, as far as it can be brought there."""
-    before = finding_of(whole.judged()[run], name)
+    before = finding_of(SessionRuns(whole.runs).judge(whole.runs[run]), name)
     assert before is not None
     assert before.limit is not None, before.text
     limit = _limit_of_fault(whole, run, name, before.limit)
-    for share in SHARES:
+    for share in shares:
         judged = _spoilt(whole, run, name, _size(whole, run, name, share * limit))
         after = finding_of(judged, name)
         others = tuple(f"{f.name}" for f in judged.wrong if f.name is not name)

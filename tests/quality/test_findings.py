@@ -45,7 +45,7 @@ def test_sound_runs_have_no_findings(machine_session):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(SPOILERS))
 def test_half_of_a_limit_is_kept_and_twice_is_found(machine_session, name):
-    found = {one.share: one for one in spoil(machine_session, label(machine_session, "h ccw 2"), name)}
+    found = {one.share: one for one in spoil(machine_session, label(machine_session, "h ccw 2"), name, (0.5, 2.0))}
     assert found[0.5].verdict is not FindingVerdict.WRONG
     assert found[2.0].verdict is FindingVerdict.WRONG
     assert found[2.0].value == pytest.approx(2.0 * found[2.0].limit, rel=0.05)

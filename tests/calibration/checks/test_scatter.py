@@ -44,8 +44,15 @@ def sessions(machine, stated):
         yield calibrate(machine, said)
 
 
-def test_sizes_that_are_right_are_said_to_fit(machine):
-    checks = [check_scatter(seats_of(calibration)) for calibration in sessions(machine, 1.0)]
+@pytest.fixture(scope="module")
+def as_stated(machine):
+    """Seats of sessions whose plan states the truth, session by session."""
+    return [seats_of(calibration) for calibration in sessions(machine, 1.0)]
+
+
+@pytest.mark.slow
+def test_sizes_that_are_right_are_said_to_fit(as_stated):
+    checks = [check_scatter(seats) for seats in as_stated]
     assert {len(check) for check in checks} == {2}
     fits = [check.fits for both in checks for check in both]
     # 95 of 100, so that fewer than 68 of 80 have a chance of 1 in 1000.
@@ -66,9 +73,9 @@ def test_sizes_that_are_a_third_of_the_truth_are_found_out(machine):
 
 
 @pytest.mark.slow
-def test_the_squares_of_seats_are_chi_square(machine):
+def test_the_squares_of_seats_are_chi_square(as_stated):
     """Mean of chi-square is its degrees of freedom, its variance twice that."""
-    seats = [seat for calibration in sessions(machine, 1.0) for seat in seats_of(calibration)]
+    seats = [seat for session in as_stated for seat in session]
     freedom = sum(seat.freedom for seat in seats)
     assert freedom > 0.7 * 2 * len(seats)  # a level bar sees two coordinates of every ball, and the fit takes some
     total = sum(seat.square for seat in seats)

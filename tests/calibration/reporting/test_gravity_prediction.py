@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -55,6 +56,17 @@ def recorded_machine(folder, seed, *, rubs=True, drives=(), rate_hz=RATE_HZ):
     return folder
 
 
+@pytest.fixture(scope="module")
+def machines(tmp_path_factory):
+    """Folder of the machine of a seed, recorded once."""
+
+    @cache
+    def folder_of(seed, *, rubs=True):
+        return recorded_machine(tmp_path_factory.mktemp("machine"), seed, rubs=rubs)
+
+    return folder_of
+
+
 def joint(folder, names):
     seen = load_sessions([folder / "jig", folder / "conditions"], HELD_OUT)
     return calibrate(seen.machine, seen.observations, sources_named(names + MEASUREMENT_SOURCES))
@@ -72,9 +84,9 @@ def off(folder, calibration):
 
 
 # 7 and 11 are among the machines whose two directions differ so much that gravity alone does not predict them.
-@pytest.mark.parametrize("seed", [7, pytest.param(4, marks=pytest.mark.slow), pytest.param(11, marks=pytest.mark.slow)])
-def test_held_out_conditions_are_predicted(tmp_path, seed):
-    folder = recorded_machine(tmp_path, seed)
+@pytest.mark.parametrize("seed", [7, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (4, 11))])
+def test_held_out_conditions_are_predicted(machines, seed):
+    folder = machines(seed)
     assert max(off(folder, joint(folder, GRAVITY + FRICTION)).values()) < 1.0
 
 
@@ -87,9 +99,9 @@ def test_held_out_conditions_are_predicted_on_many_machines(tmp_path, seed):
 
 
 @pytest.mark.slow
-def test_without_friction_among_the_sources_the_mean_of_both_directions_is_predicted(tmp_path):
+def test_without_friction_among_the_sources_the_mean_of_both_directions_is_predicted(machines):
     """What friction does has the other sign in the other direction."""
-    folder = recorded_machine(tmp_path, 7)
+    folder = machines(7)
     calibration = joint(folder, GRAVITY)
     held_out = load_sessions([folder / "conditions"], ["A", "B"]).observations
     circles = predicted_circles(calibration.model, held_out)
@@ -99,9 +111,9 @@ def test_without_friction_among_the_sources_the_mean_of_both_directions_is_predi
 
 
 @pytest.mark.slow
-def test_a_weight_that_is_a_fifth_too_large_predicts_the_same(tmp_path):
+def test_a_weight_that_is_a_fifth_too_large_predicts_the_same(machines):
     """The compliance takes it up; without any weight the error says so."""
-    folder = recorded_machine(tmp_path, 3, rubs=False)
+    folder = machines(3, rubs=False)
     seen = load_sessions([folder / "jig", folder / "conditions"], HELD_OUT)
     held_out = load_sessions([folder / "conditions"], ["A", "B"]).observations
     names = sources_named(GRAVITY + MEASUREMENT_SOURCES)
@@ -150,9 +162,9 @@ def test_programs_compensated_with_the_joint_model_cut_round_on_the_machine_itse
         assert left_um < (2.0 if run.slot.test.name == "D" else 1.0), run.slot.stem
 
 
-def test_the_commands_calibrate_on_two_sessions_and_predict_the_rest(tmp_path):
-    folder = recorded_machine(tmp_path, 3, rubs=False)
-    jig, conditions, model = (str(folder / name) for name in ("jig", "conditions", "model.yaml"))
+def test_the_commands_calibrate_on_two_sessions_and_predict_the_rest(machines, tmp_path):
+    jig, conditions = (str(machines(3, rubs=False) / name) for name in ("jig", "conditions"))
+    model = str(tmp_path / "model.yaml")
     left_out = [word for name in HELD_OUT for word in ("--exclude", name)]
     fit = ["calibrate", jig, conditions, "--sources", ",".join(GRAVITY), *left_out, "--out", model]
     said = CliRunner().invoke(cli, fit)

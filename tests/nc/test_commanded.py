@@ -37,8 +37,11 @@ def test_a_nominal_program_commands_the_nominal_circle(linuxcnc, all_runs):
 
 
 @pytest.mark.slow
-def test_a_compensated_program_commands_what_takes_the_machine_round_the_nominal_circle(linuxcnc, table2, crooked):
-    for program in circle_programs(table2, crooked.machine, linuxcnc, inverse=Inverse(crooked)):
+@pytest.mark.parametrize("tests", ["ago", pytest.param("abcdefghijklmno", marks=pytest.mark.nightly)])
+def test_a_compensated_program_commands_what_takes_the_machine_round_the_nominal_circle(
+    linuxcnc, table2, crooked, tests
+):
+    for program in circle_programs(table2, crooked.machine, linuxcnc, inverse=Inverse(crooked), tests=list(tests)):
         name, direction = program.name.removesuffix(".ngc").split("-")
         test = table2.tests[name]
         circle = next(test.run(each) for each in test.directions if each == direction)

@@ -38,7 +38,10 @@ def test_centre_and_radius_scatter_as_their_noise_term_says():
     assert np.std([one.radius_error_um for one in runs]) == pytest.approx(terms[BudgetQuantity.RADIUS], rel=0.35)
 
 
-@pytest.mark.parametrize("chosen", [Filter.NONE, Filter.UPR_15, Filter.UPR_30, Filter.UPR_50])
+@pytest.mark.parametrize(
+    "chosen",
+    [Filter.NONE, Filter.UPR_15, *(pytest.param(f, marks=pytest.mark.nightly) for f in (Filter.UPR_30, Filter.UPR_50))],
+)
 def test_g_is_that_of_the_path_without_its_noise(chosen):
     """Of an ellipse of 20 µm with 0.5 µm of noise G reads up to 2 µm more; the stated u is the scatter of what is printed."""
     runs = drawn(chosen, count=30)
@@ -126,9 +129,9 @@ def test_a_raised_bar_does_not_tell_the_radius_from_the_height():
 @pytest.mark.parametrize(
     ("noise", "most"),
     [
-        ("uniform", 0.25),
+        pytest.param("uniform", 0.25, marks=pytest.mark.nightly),
         ("laplace", 1.6),
-        ("louder in one half", 1.2),
+        pytest.param("louder in one half", 1.2, marks=pytest.mark.nightly),
         ("remembers nineteen twentieths", 2.2),
     ],
 )

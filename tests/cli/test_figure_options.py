@@ -53,9 +53,9 @@ BEGINS = {".png": b"\x89PNG\r\n\x1a\n", ".pdf": b"%PDF-1."}
     [
         (("calibrate",), ".png"),
         (("calibrate",), ".pdf"),
-        (("calibrate",), ".PNG"),
+        pytest.param(("calibrate",), ".PNG", marks=pytest.mark.nightly),
         (("diagnose", "--sources", "backlash"), ".png"),
-        (("diagnose", "--sources", "backlash"), ".pdf"),
+        pytest.param(("diagnose", "--sources", "backlash"), ".pdf", marks=pytest.mark.nightly),
     ],
 )
 def test_the_ending_says_the_format(run, elsewhere, tmp_path, command, ending):

@@ -62,14 +62,14 @@ def test_three_causes_at_once_are_all_named(tmp_path):
     assert all(s["probability"] >= SURE for s in summary["sources"] if s["verdict"] == "identified")
 
 
-@pytest.mark.nightly  # a warm-up in two stages asks for more of the same
+@pytest.mark.nightly
 def test_a_warm_up_needs_no_second_name_for_its_time_constant(tmp_path):
     found, _ = _diagnosed(warm_up_of_unknown_time_constant, tmp_path / "s")
     assert _named(found.summary()) == {"thermal-struts"}
     assert not _doubtful(found.summary())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # three causes at once are in CI; what follows a thermometer is in tests/diagnosis/test_thermometers.py
 def test_a_second_stage_of_a_warm_up_is_no_second_cause(tmp_path):
     found, _ = _diagnosed(warm_up_in_two_stages, tmp_path / "s")
     assert _named(found.summary()) == {"thermal-struts"}
@@ -77,7 +77,7 @@ def test_a_second_stage_of_a_warm_up_is_no_second_cause(tmp_path):
     assert "formula of thermal-struts" in found.summary()["unexplained"]["text"]
 
 
-@pytest.mark.nightly  # a second stage alone is in CI
+@pytest.mark.nightly
 def test_a_frame_that_warms_beside_a_warm_up_in_two_stages_is_one(tmp_path):
     found, _ = _diagnosed(warm_up_in_two_stages_and_warm_frame, tmp_path / "s")
     assert _named(found.summary()) == {"thermal-struts", "thermal-frame"}

@@ -72,7 +72,7 @@ def test_what_follows_a_thermometer_is_named_with_its_growth_per_kelvin(tmp_path
     assert {location.variable for location in found.locations} == {"temperature"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # a bar that follows a finer thermometer is in CI
 def test_tenths_of_a_kelvin_do(tmp_path):
     mechanism, parameter, per_kelvin = PARTS["thermal-frame"]
     _, named = diagnosed(tmp_path / "s", ThermalFrame(SHOP), Coarse(of=mechanism))

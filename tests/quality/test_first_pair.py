@@ -108,7 +108,13 @@ def modelled(tmp_path_factory):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("spoiler", "size"), [(larger, 12.0), (elsewhere, 20.0), (mirrored, 1.0), (begun_elsewhere, 5.0)]
+    ("spoiler", "size"),
+    [
+        (larger, 12.0),
+        pytest.param(elsewhere, 20.0, marks=pytest.mark.nightly),
+        (mirrored, 1.0),
+        pytest.param(begun_elsewhere, 5.0, marks=pytest.mark.nightly),
+    ],
 )
 def test_a_machine_with_a_model_finds_what_one_without_finds(modelled, spoiler, size):
     """Both directions of a test with one fault, beside all other tests; and the second direction alone."""

@@ -11,7 +11,9 @@ from studies.coverage import coverage, wilson
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "level"), [("table2-elevated", False), ("table2", True)])
+@pytest.mark.parametrize(
+    ("name", "level"), [("table2-elevated", False), pytest.param("table2", True, marks=pytest.mark.nightly)]
+)
 def test_intervals_hold_the_truth_as_often_as_they_say(reference, name, level):
     plan = read_plan(shipped_folder("protocols") / "plans" / f"{name}.yaml")
     told = []

@@ -77,7 +77,14 @@ def test_sound_runs_are_left_alone(recorded, sound):
     assert 1e3 * fine_noise_mm(sound) == pytest.approx(0.5, rel=0.05)
 
 
-@pytest.mark.parametrize(("test", "x_mm", "y_mm"), [("h", 0.03, 0.01), ("b", 0.0, -0.02), ("a", -0.015, 0.0)])
+@pytest.mark.parametrize(
+    ("test", "x_mm", "y_mm"),
+    [
+        ("h", 0.03, 0.01),
+        pytest.param("b", 0.0, -0.02, marks=pytest.mark.nightly),
+        pytest.param("a", -0.015, 0.0, marks=pytest.mark.nightly),
+    ],
+)
 def test_a_badly_seated_holder_is_named_with_where_the_ball_stands(recorded, sound, test, x_mm, y_mm):
     runs = [moved(o, x_mm, y_mm) if o.test == test else o for o in recorded.observations]
     bent = calibrate(recorded.machine, runs)

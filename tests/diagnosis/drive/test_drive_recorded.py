@@ -146,6 +146,7 @@ def test_a_motor_to_and_fro(recorded):
         assert 0.81 - reach < number["value"] < 0.81 + viscous_n + reach
 
 
+@pytest.mark.nightly  # a motor, a screw and a drive that others recorded are in CI
 def test_a_damper_with_play_is_not_taken_for_a_wrong_sign(recorded):
     summary = answered(recorded("drives/friction-damper.csv"))
     found = sources(summary)

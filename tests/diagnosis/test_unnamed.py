@@ -69,15 +69,17 @@ def test_a_narrow_dent_is_a_bump_of_its_height(tmp_path):
     ("mechanism", "variable", "strut"),
     [
         (CyclingChiller(strut=6, height_um=1.0, period_s=43.0), "time wave", 6),
-        (RockingTable(tip_um=(3.0, 1.0, 1.0)), "position of the platform step", None),
+        pytest.param(
+            RockingTable(tip_um=(3.0, 1.0, 1.0)), "position of the platform step", None, marks=pytest.mark.nightly
+        ),
         pytest.param(
             SoftFloor(lean_urad_mm=0.05), "position of the platform of the table", None, marks=pytest.mark.nightly
         ),  # a fainter one is in tests/diagnosis/test_unexplained.py
         (HoseDrag(stiffness_n_mm=1.0), "position of the platform towards a place that pulls on it", None),
         pytest.param(
             CreepingSpindle(runout_um=0.4, share=3.3), "angle since the start", None, marks=pytest.mark.nightly
-        ),  # as the cable
-        (WindingCable(pull_um=1.0), "angle since the start", None),
+        ),
+        pytest.param(WindingCable(pull_um=1.0), "angle since the start", None, marks=pytest.mark.nightly),
     ],
     ids=lambda value: getattr(value, "name", ""),
 )

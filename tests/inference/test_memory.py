@@ -95,7 +95,7 @@ def _told(seed, effect_of, size):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize("seed", [0, pytest.param(3, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("at_once", [False, True], ids=["lacking", "at once"])
 def test_a_first_order_memory_is_named_with_its_time_constant(seed, at_once):
     def creeping(axis):
@@ -127,7 +127,7 @@ def test_a_dead_time_of_some_rows_is_one_of_what_comes_late():
     assert abs(value.value - delay) < 3.0 * value.uncertainty
 
 
-@pytest.mark.parametrize("rows_late", [5, 11, 23])
+@pytest.mark.parametrize("rows_late", [11, *(pytest.param(rows, marks=pytest.mark.nightly) for rows in (5, 23))])
 def test_a_dead_time_of_a_variable_that_jumps_is_found_to_a_fraction_of_a_row(rng, rows_late):
     # Tangents end at the next row: what jumps changes by a whole jump there.
     jumps = np.zeros(600)

@@ -15,24 +15,21 @@ ROWS = {
 """Every figure of circles that is printed with U."""
 
 
-DRAWS = 6
-"""For each of six noises: half a minute of one core."""
-
-
 @pytest.mark.slow
-def test_intervals_of_circles_hold_the_truth(tmp_path):
+@pytest.mark.parametrize("draws", [3, pytest.param(6, marks=pytest.mark.nightly)])
+def test_intervals_of_circles_hold_the_truth(tmp_path, draws):
     """No row is below 93 % by more than chance, by all noises and kinds of circles, by one noise, or by one kind."""
     told = []
-    found = coverage_of_circles(DRAWS, 5000, told.append, keep=tmp_path / "draws.jsonl")
-    assert told == list(range(1, DRAWS * len(CELLS) + 1))
+    found = coverage_of_circles(draws, 5000, told.append, keep=tmp_path / "draws.jsonl")
+    assert told == list(range(1, draws * len(CELLS) + 1))
     rows = found["rows"]
     assert set(rows) >= ROWS
     assert found["faults"] == []
     for name, row in rows.items():
         for noise, kind in (*((cell.name, "") for cell in CELLS), *(("", kind) for kind in KINDS)):
-            inside, draws = pooled(row, noise, kind)
-            assert inside >= binom.ppf(CHANCE, draws, 0.93), f"{name} {noise} {kind}: {inside} of {draws}"
-    again = coverage_of_circles(DRAWS, 5000, lambda _done: None, keep=tmp_path / "draws.jsonl")
+            inside, count = pooled(row, noise, kind)
+            assert inside >= binom.ppf(CHANCE, count, 0.93), f"{name} {noise} {kind}: {inside} of {count}"
+    again = coverage_of_circles(draws, 5000, lambda _done: None, keep=tmp_path / "draws.jsonl")
     assert again == found
 
 

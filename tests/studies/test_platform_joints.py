@@ -9,7 +9,7 @@ from dbbstation.files.shipped import shipped_folder
 from studies.platform_joints import platform_joints
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # that a proposed test halves an uncertainty is in CI: tests/cli/test_next_test.py
 def test_from_a_faint_sign_to_a_name_that_is_certain(reference):
     jig = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
     first, *more = platform_joints(reference, jig, 1, 0.005, lambda _: None, most_rounds=1)

@@ -78,7 +78,7 @@ def value(calibration, name):
 def small(tmp_path_factory):
     """Five circles, quick to fit."""
     folder = tmp_path_factory.mktemp("plant") / "small"
-    return folder, session(folder, 21, tests="abcde", rate_hz=10.0)
+    return folder, session(folder, 21, tests="abcde", rate_hz=5.0)
 
 
 @pytest.fixture(scope="module")
@@ -162,8 +162,8 @@ def test_without_drive_friction_currents_change_nothing(small):
 @pytest.mark.slow
 def test_long_runs_say_as_much_as_their_means(tmp_path, fitted):
     """Fifty times the samples: seen through nodes and quarter degrees, still right and sharper."""
-    recorded = session(tmp_path / "s", 21, tests="ab", rate_hz=500.0)
-    more = session(tmp_path / "t", 21, tests="cde", rate_hz=10.0)
+    recorded = session(tmp_path / "s", 21, tests="ab", rate_hz=250.0)
+    more = session(tmp_path / "t", 21, tests="cde", rate_hz=5.0)
     calibration = calibrate(recorded.machine, recorded.observations + more.observations, sources())
     names, values, covariance = numbers(calibration, ("cog-shift",))
     error = values - np.array([true_values()[name] for name in names])
@@ -191,7 +191,7 @@ def column_set(motor, entry):
     ("change", "motor", "said"),
     [
         (column_set(4, 0.0), 4, "motor 4: its current stands still at 0 A throughout, a channel that is dead"),
-        (column_set(6, np.nan), 6, "motor 6: its current was not logged"),
+        pytest.param(column_set(6, np.nan), 6, "motor 6: its current was not logged", marks=pytest.mark.nightly),
     ],
     ids=["dead", "not-logged"],
 )

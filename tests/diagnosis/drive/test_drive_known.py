@@ -97,11 +97,11 @@ def test_a_misfit_is_stated_before_and_after_with_its_places():
     ("truth", "name", "expected"),
     [
         (Truth(coulomb=20.0, load=lambda *_: 60.0), "constant-load", {"load_n": 60.0}),
-        (Truth(coulomb=20.0, load=lambda _t, x, _v: 100.0 * x), "stiffness", {"stiffness_n_mm": 0.1}),
+        pytest.param(Truth(coulomb=20.0, load=lambda _t, x, _v: 100.0 * x), "stiffness", {"stiffness_n_mm": 0.1}, marks=pytest.mark.nightly),
         (Truth(coulomb=20.0, load=lambda _t, x, _v: 3.0 * cos(2 * pi * x / 0.005)), "cogging", {"period_mm": 5.0, "cosine_n": 3.0}),
-        (Truth(coulomb=20.0, sliding=lambda _t, x, _v, _d: 50.0 * (x - 0.1)), "position-friction", {"slope_n": 5.0}),
+        pytest.param(Truth(coulomb=20.0, sliding=lambda _t, x, _v, _d: 50.0 * (x - 0.1)), "position-friction", {"slope_n": 5.0}, marks=pytest.mark.nightly),
         (Truth(coulomb=20.0, sliding=lambda _t, _x, v, _d: 8.0 * exp(-abs(v) / 0.006)), "stribeck-friction", {"static_excess_n": 8.0, "stribeck_speed_m_s": 0.006}),
-        (Truth(coulomb=20.0, sliding=lambda _t, _x, v, _d: 800.0 * v * v), "power-law-friction", {"power": 2.0}),
+        pytest.param(Truth(coulomb=20.0, sliding=lambda _t, _x, v, _d: 800.0 * v * v), "power-law-friction", {"power": 2.0}, marks=pytest.mark.nightly),
         (Truth(coulomb=20.0, sliding=lambda _t, _x, _v, d: -40.0 * exp(-d / 0.0006)), "presliding", {"presliding_n": 20.0, "length_mm": 0.6}),
         (Truth(coulomb=20.0, sliding=lambda t, _x, _v, _d: -6.0 * (1 - exp(-t / 7.0))), "friction-drift", {"coulomb_change_n": -6.0 * (1 - exp(-24.0 / 7.0)), "time_constant_s": 7.0}),
     ],
@@ -144,7 +144,9 @@ def test_asymmetric_coulomb_friction_and_a_load_look_the_same():
         # A tight spot: position-friction knows slopes and bows only.
         (Truth(load=lambda _t, x, _v: 15.0 * exp(-(((x - 0.13) / 0.012) ** 2))), "position"),
         # A brake that drags for some seconds.
-        (Truth(sliding=lambda t, _x, _v, _d: 15.0 * (6.0 < t < 13.0)), "time by direction"),
+        pytest.param(
+            Truth(sliding=lambda t, _x, _v, _d: 15.0 * (6.0 < t < 13.0)), "time by direction", marks=pytest.mark.nightly
+        ),
     ],
 )
 def test_what_no_name_describes_is_called_unexplained(truth, variable):

@@ -13,7 +13,7 @@ def test_what_the_parameters_hide_is_found(case):
         assert float(said["hidden"]) > 0.4
 
 
-@pytest.mark.parametrize("case", ["payload", "creep"])
+@pytest.mark.parametrize("case", [pytest.param("payload", marks=pytest.mark.nightly), "creep"])
 def test_nothing_is_found_in_its_clean_twin(case):
     said = answer(case, 3, "averaged", 0.0)
     assert said["answer"] == "nothing", said

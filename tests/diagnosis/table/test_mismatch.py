@@ -52,8 +52,10 @@ def found_in(tmp_path: Path, *truths: Truth, asked: TableOptions = ASKED, deriva
     return find_mismatch(load_tables(paths, asked).table, hold_out=False)
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.8])
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("seed", "correlation"),
+    [(1, 0.0), (2, 0.8), *(pytest.param(*case, marks=pytest.mark.nightly) for case in ((1, 0.8), (2, 0.0)))],
+)
 def test_a_clean_table_has_no_mismatch(tmp_path, seed, correlation):
     path = record(Truth(correlation=correlation), seed).write(tmp_path / "clean.csv")
     found = find_mismatch(load_tables([path], ASKED).table, hold_out=False)
@@ -64,7 +66,9 @@ def test_a_clean_table_has_no_mismatch(tmp_path, seed, correlation):
     assert found.settled.noise.sigma == pytest.approx(2e-3, rel=0.15)
 
 
-@pytest.mark.parametrize("name", FOUND)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.nightly if n in {"lag", "twice"} else ()) for n in FOUND]
+)
 def test_a_form_is_found_by_its_name_with_its_size(tmp_path, name):
     truth, names, value = FOUND[name]
     found = found_in(tmp_path, truth)

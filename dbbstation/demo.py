@@ -58,7 +58,13 @@ tolerances:
 """Tolerances that the compensated machine keeps and the nominal one does not: holders put balls back to a few micrometres."""
 
 
-def run_demo(folder: Path, seed: int, tell: Callable[[str], None], progress: Callable[[str], None]) -> DemoResult:
+def run_demo(
+    folder: Path,
+    seed: int,
+    tell: Callable[[str], None],
+    progress: Callable[[str], None],
+    plan_file: Path | None = None,
+) -> DemoResult:
     """Do the whole job into a folder.
 
     Args:
@@ -66,13 +72,14 @@ def run_demo(folder: Path, seed: int, tell: Callable[[str], None], progress: Cal
         seed: of the virtual machine's errors.
         tell: told each command before it runs.
         progress: told how far a measurement is; each text replaces the one before.
+        plan_file: of the circles, of which the reference machine's travel has room; None for the fifteen of [CAL Table II].
 
     Raises:
         StationError: a step failed; what the steps before it wrote stays.
     """
     folder.mkdir(parents=True)
     machine_file = shipped_folder("fixtures") / "machines" / "reference.yaml"
-    plan_file = shipped_folder("protocols") / "plans" / "table2.yaml"
+    plan_file = plan_file or shipped_folder("protocols") / "plans" / "table2.yaml"
     _write_truth(folder / "truth.yaml", machine_file, seed)
     write_text(folder / "dbbstation-settings.yaml", SETTINGS)
     job = _Job(folder, ["--plan", str(plan_file), "--machine", str(machine_file)], tell, progress)

@@ -25,6 +25,17 @@ def sessions(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module")
+def few(tmp_path_factory):
+    """Four tests of it, enough for what is said and drawn."""
+    folder = tmp_path_factory.mktemp("few")
+    for name in ("logged", "bare"):
+        frame = ThermalFrame(SHOP, logged=name == "logged")
+        plan = subset(table_ii_plan(19), "aghl")
+        record(folder / name, seed=19, plan=plan, mechanisms=[RandomKinematics(), frame], rate_hz=5.0)
+    return folder
+
+
 def test_calibrate_follows_the_thermometer_and_keeps_its_form(run, sessions, tmp_path):
     model, poses = tmp_path / "model.yaml", tmp_path / "poses.csv"
     called = run("calibrate", sessions / "logged", "--sources", SOURCES, "--out", model, "--json")
@@ -62,21 +73,17 @@ def test_the_law_can_be_asked_for(run, sessions):
     assert "time_constant_s" in frame["parameters"]
 
 
-def test_sessions_with_and_without_a_thermometer_go_together(run, tmp_path):
-    for name in ("logged", "bare"):
-        frame = ThermalFrame(SHOP, logged=name == "logged")
-        few = subset(table_ii_plan(19), "aghl")
-        record(tmp_path / name, seed=19, plan=few, mechanisms=[RandomKinematics(), frame], rate_hz=5.0)
-    both = (tmp_path / "logged", tmp_path / "bare")
+def test_sessions_with_and_without_a_thermometer_go_together(run, few):
+    both = (few / "logged", few / "bare")
     together = run("diagnose", *both, "--sources", "thermal-frame,gravity", "--json")
     assert together.code == 0, together.err
     named = {s["name"]: s for s in together.data["sources"]}
     assert "growth_um_m_k" not in named["thermal-frame"]["parameters"]
 
 
-def test_the_figure_is_drawn_over_the_thermometer(run, sessions, tmp_path):
+def test_the_figure_is_drawn_over_the_thermometer(run, few, tmp_path):
     figure = tmp_path / "diagnosis.svg"
-    found = run("diagnose", sessions / "logged", "--sources", "thermal-frame,gravity", "--figure", figure, "--json")
+    found = run("diagnose", few / "logged", "--sources", "thermal-frame,gravity", "--figure", figure, "--json")
     assert found.code == 0, found.err
     assert found.data["sources"][0]["name"] == "thermal-frame"
     assert "over temperature" in figure.read_text()

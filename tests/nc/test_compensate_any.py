@@ -164,7 +164,7 @@ class Ageing(Wound):
 
 def test_time_is_refused_by_name_unless_it_is_given(linuxcnc, reference):
     model = MachineModel(reference, (Fitted(Ageing(), np.array([1e-4])),))
-    wanted = linuxcnc.read(PART, "part.ngc")
+    wanted = linuxcnc.read("G21 G90\nG0 X-100 Y0 Z-1000 A0 B0 C0\nG1 X100 F1000\nG4 P2\nG1 X90\nM2\n", "line.ngc")
     with pytest.raises(ModelError, match="ageing needs time"):
         compensate_toolpath(wanted, model)
     done = compensate_toolpath(wanted, model, started_s=100.0).toolpath

@@ -60,7 +60,7 @@ def unchanged(*_):
 class Workshop:
     """Makes sessions of readings: a machine's shape, balls that sit anew, noise."""
 
-    def __init__(self, seed, tests="abcdefghijklmno", samples=720):
+    def __init__(self, seed, tests="abcdefghijklmno", samples=360):
         self.rng = np.random.default_rng(seed)
         self.tests, self.samples, self.start_deg = tests, samples, 0.0
         self.shape = {test: self.rng.normal(0, 0.02, 12) for test in tests}
@@ -98,14 +98,14 @@ def test_noise_and_mountings_alone_are_no_difference(reference, draws):
     """One truth, new noise and balls put up anew: of what is said with 0.95, one in twenty may be wrong."""
     found = []
     for seed in range(draws):
-        shop = Workshop(seed, tests="abgl", samples=360)
+        shop = Workshop(seed, tests="abgl")
         found.append(compare(reference, shop.session("A"), shop.session("B")))
     assert np.count_nonzero([one.differ for one in found]) <= binom.isf(1e-3, draws, 0.05)
     assert np.count_nonzero([any(run.differs for run in one.runs) for one in found]) <= binom.isf(1e-3, draws, 0.05)
 
 
 def test_a_strut_that_became_longer_is_told(reference):
-    shop = Workshop(1)
+    shop = Workshop(1, samples=720)
     a = shop.session("A")
     b = shop.session("B", lambda circle, theta, _: strut_gain(reference, circle, theta)[:, 2] * 0.0015)
     found = compare(reference, a, b)
@@ -299,7 +299,7 @@ def test_nothing_in_common():
 
 
 def test_removed_centres_are_refused(reference):
-    shop = Workshop(15, tests="abc", samples=360)
+    shop = Workshop(15, tests="abc")
     a, b = shop.session("A"), shop.session("B")
     removed = []
     for run in b:
@@ -312,7 +312,7 @@ def test_removed_centres_are_refused(reference):
 
 
 def test_two_simulations_without_noise_are_the_same_to_what_a_bar_shows(reference):
-    shop = Workshop(16, tests="abc", samples=360)
+    shop = Workshop(16, tests="abc")
     a = shop.session("A")
     found = compare(reference, a, a)
     assert (found.rms_mm, found.there, found.differ) == (0.0, (), False)

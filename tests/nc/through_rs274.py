@@ -183,9 +183,9 @@ class _Walk:
 
     @staticmethod
     def _check_on(there: np.ndarray, pose: np.ndarray, slack_mm: float, what: str) -> None:
-        off = np.abs(pose - there)
-        tilt_mm = LEVER_MM * math.radians(float(np.linalg.norm(off[3:])))
-        if np.linalg.norm(off[:3]) > 2.0 * slack_mm or tilt_mm > 2.0 * slack_mm + LEVER_MM * math.radians(2 * PRINTED):
+        x, y, z, *angles = (pose - there).tolist()
+        tilt_mm = LEVER_MM * math.radians(math.hypot(*angles))
+        if math.hypot(x, y, z) > 2.0 * slack_mm or tilt_mm > 2.0 * slack_mm + LEVER_MM * math.radians(2 * PRINTED):
             raise DiffersError(f"{what}: {pose} in place of {there}")
 
     def _check_time(self, index: int, place: int, end: int) -> None:
@@ -218,15 +218,16 @@ class _Line:
         self.start, self.end = before.pose, event.pose
         self.way = self.end - self.start
         self.unit_mm = max(before.unit_mm, event.unit_mm)
+        self.weighed = SCALE**2 * self.way
+        self.length = float(self.weighed @ self.way)
 
     def nearest(self, pose: np.ndarray) -> np.ndarray:
-        length = float(np.sum((SCALE * self.way) ** 2))
-        share = 0.0 if length == 0.0 else float(np.sum(SCALE**2 * (pose - self.start) * self.way)) / length
+        share = 0.0 if self.length == 0.0 else float((pose - self.start) @ self.weighed) / self.length
         return self.start + min(max(share, 0.0), 1.0) * self.way
 
     def is_at_end(self, pose: np.ndarray, slack: float) -> bool:
-        off = np.abs(pose - self.end)
-        return bool(off[:3].max() < slack and off[3:].max() < 4.0 * PRINTED)
+        off = [abs(away) for away in (pose - self.end).tolist()]
+        return max(off[:3]) < slack and max(off[3:]) < 4.0 * PRINTED
 
     def minutes(self, event: Event) -> float | None:
         """Time at the feed; None where the printed decimals do not tell it."""

@@ -82,7 +82,7 @@ class CircleChannel:
         ends = np.cumsum([0, *(len(reading.length_mm) for reading in self.readings)])
         self.runs = [slice(int(a), int(b)) for a, b in pairwise(ends)]
         self.columns = CauseColumns(self._base(), room=ROOM)
-        self.sources = {(source.name, source.varies_with): source for source in sources}
+        self.sources = {(source.name, source.law): source for source in sources}
         self.set_up = self._outsize()
         self._laid: dict[tuple[str, str], tuple[Variant, ...]] = {}
         for key, source in self.sources.items():
@@ -291,7 +291,7 @@ class CircleChannel:
 
     def _amplitudes_in(self, fit: Calibration, key: tuple[str, str]) -> NDArray[np.float64] | None:
         """Amplitudes of a cause in a fit; None where that fit is without it."""
-        terms = [t for t in fit.layout.terms if (t.source.name, t.source.varies_with) == key]
+        terms = [t for t in fit.layout.terms if (t.source.name, t.source.law) == key]
         base = {term.source.name for term in self.calibration.layout.terms}
         if not terms or key[0] in base:
             return None
@@ -390,7 +390,7 @@ class CircleChannel:
             samples[rows, place : place + count] = derivative
         columns = self.columns.add(samples)
         plausible = np.tile([p.plausible for p in amplitudes], len(sets))
-        whole = Variant(columns, plausible, nonlinear, law=source.varies_with)
+        whole = Variant(columns, plausible, nonlinear, law=source.law)
         found = []
         for part in parts_of(amplitudes, len(sets)):
             form = replace(whole, label=part.label, log_weight=part.log_weight)

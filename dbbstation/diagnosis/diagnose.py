@@ -227,8 +227,7 @@ def usable_sources(
     lacking = {}
     motions = [observation.motion() for observation in observations]
     for source in sources:
-        logged = source.by_temperature()
-        forms = [source] if logged is None else [source, logged]
+        forms = [source, *source.other_laws()]
         missing = [_missing(form, machine, motions) for form in forms]
         usable += [form for form, what in zip(forms, missing, strict=True) if not what]
         if all(missing):

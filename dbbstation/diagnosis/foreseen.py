@@ -208,7 +208,7 @@ class ForeseenTests:
 
 def _form(proposal: Proposal, source: ErrorSource, variant: Variant) -> _Form:
     wait_s = proposal.wait_s if Need.TIME in source.needs else 0.0
-    return source.name, source.varies_with, variant.nonlinear, wait_s
+    return source.name, source.law, variant.nonlinear, wait_s
 
 
 def _without(ball: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:

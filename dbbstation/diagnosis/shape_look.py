@@ -28,7 +28,7 @@ from dbbstation.diagnosis.shapes import (
     Samples,
     Shape,
 )
-from dbbstation.inference.forms import Bump, Form, Lobes, PlaneStep, StepForm, Wave, WaveOfTurn
+from dbbstation.inference.forms import Bump, Form, Lobes, PlaneStep, Ringing, StepForm, Wave, WaveOfTurn
 from dbbstation.inference.square_root import free_directions
 from dbbstation.machine.geometry import STRUTS
 
@@ -77,6 +77,18 @@ WAVES_PER_TURN = np.arange(0.2, 20.0, 0.05)
 ACROSS_DEG = np.arange(0.0, 180.0, 15.0)
 LINE_WIDTHS_MM = (5.0, 20.0)
 """Lines in the plane that a table may tip over at: their directions [deg] and widths [mm]."""
+
+RINGING_PERIODS_S = np.geomspace(0.2, 2.5, 40)
+"""What a drive's position loop or its mounting oscillates with, in steps of 7 %: a ringing of three periods is then found but for a tenth."""
+
+RINGING_DECAYS_S = (0.4, 0.8, 1.6, 3.2)
+"""Times over which it fades."""
+
+RINGING_PIECE_S = 0.02
+"""A tenth of the shortest period."""
+
+RINGING_S = 12.0
+"""Time since a reversal beyond which nothing rings any more."""
 
 PLACE_MM = 5.0
 """Of the platform's position, either way [mm]."""
@@ -175,6 +187,13 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
             sums = look.sums("time", own, moves, partial(_piece, low=low, width=wide))
             found += _waves_of_time(own, moves, sums, low, wide, high - low)
             found += _best("time", "step", own, moves, sums, _steps(low, high, _TIMES), 1.0)
+    if "time since its reversal" in extent.low:
+        rings: list[Form] = [
+            Ringing(float(period_s), decay_s) for decay_s in RINGING_DECAYS_S for period_s in RINGING_PERIODS_S
+        ]
+        for strut in range(1, STRUTS + 1):
+            sums = look.sums("time since its reversal", strut, EVERY, _since)
+            found += _best("time since its reversal", "ringing", strut, EVERY, sums, rings, _RINGS_APART)
     if "angle" in extent.low:
         sums = look.sums("angle", None, READING, partial(_piece, low=0.0, width=1.0))
         found += _best("angle", "wave", None, READING, sums, [Lobes((k,)) for k in LOBES_ALONE], 1.0)
@@ -190,12 +209,17 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
 
 _FORCES, _TIMES, _STEPS = 200, 100, 40
 _TURN = 1.0 / 360.0
-_BUMPS_APART, _TURNS_APART, _LINES_APART = 3.0, 4.0, 6.0
+_BUMPS_APART, _TURNS_APART, _LINES_APART, _RINGS_APART = 3.0, 4.0, 6.0, 4.0
 """How many neighbours in a list of forms are about the same: only every so many-th counts as another try."""
 
 
 def _piece(values: NDArray[np.float64], low: float, width: float) -> NDArray[np.int64]:
     return np.floor((values - low) / width).astype(np.int64)
+
+
+def _since(values: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Time since a reversal in narrow pieces, long ago in one; the instant itself is in none of the later ones."""
+    return np.round(np.clip(values, -RINGING_S, RINGING_S) / RINGING_PIECE_S).astype(np.int64)
 
 
 def _place(values: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -57,6 +57,7 @@ UNITS = {
     "strut-speed-sign": "sign",
     "strut-speed": "mm/s",
     "strut-acceleration": "mm/s²",
+    "time since its reversal": "s",
     "time": "s",
     "strut-temperature": "degC",
     "machine-temperature": "degC",
@@ -79,6 +80,7 @@ OF_STRUTS = (
     "strut-speed-sign",
     "strut-speed",
     "strut-acceleration",
+    "time since its reversal",
     "strut-temperature",
 )
 """Those that each strut has its own of."""
@@ -220,6 +222,7 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
             # A spline, since differences are worst at the end of a run, and joints hide all of a smooth error but that.
             path = CubicSpline(motion.time_s, struts.length_mm)
             found["strut-speed"], found["strut-acceleration"] = path(motion.time_s, 1), path(motion.time_s, 2)
+            found["time since its reversal"] = _since_reversal_s(motion.time_s, found["strut-speed"])
     found |= _temperatures(motion)
     found["position of the platform"] = motion.poses[:, :2]
     found["tilt of the platform"] = motion.poses[:, 3:5]
@@ -230,6 +233,21 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
         found["angle"] = np.mod(np.degrees(angle), 360.0)
         found["angle since the start"] = (angle - angle[motion.kept][0]) / (2.0 * np.pi)
     return found
+
+
+def _since_reversal_s(time_s: NDArray[np.float64], speed_mm_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Time since each strut last turned round, with the sign of its new direction; zero before the first time, shape (n, 6) [s].
+
+    The instant lies between two samples, where the speed is zero on a straight line between both.
+    """
+    since = np.zeros_like(speed_mm_s)
+    for strut in range(speed_mm_s.shape[1]):
+        speed = speed_mm_s[:, strut]
+        turns = np.flatnonzero(speed[:-1] * speed[1:] < 0.0)
+        for k, stop in zip(turns, [*(turns[1:] + 1), len(speed)], strict=True):
+            turned_s = time_s[k] + (time_s[k + 1] - time_s[k]) * speed[k] / (speed[k] - speed[k + 1])
+            since[k + 1 : stop, strut] = np.sign(speed[k + 1]) * (time_s[k + 1 : stop] - turned_s)
+    return since
 
 
 def _temperatures(motion: Motion) -> dict[str, NDArray[np.float64]]:

@@ -322,3 +322,37 @@ class Spring(Form):
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         """Both ends and the middle."""
         return np.linspace(low, high, 3)
+
+
+RINGS_FOR = 4.0
+"""Decay times after which a ringing is printed no further: 2 % of it are left."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ringing(Form):
+    """A damped oscillation after a reversal, over the time since then, which has the sign of the new direction: cosine and sine."""
+
+    period: float
+    decay: float
+
+    @property
+    def count(self) -> int:
+        """Two."""
+        return 2
+
+    def text(self, unit: str) -> str:
+        """Period and decay."""
+        return f"period {self.period:.3g} {unit}, fading over {self.decay:.3g} {unit}"
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Both turn their sign with the direction; zero before the first reversal."""
+        since = np.abs(values)
+        phase = 2.0 * np.pi * since / self.period
+        fading = -np.sign(values) * np.exp(-since / self.decay)
+        return np.stack([fading * np.cos(phase), fading * np.sin(phase)], axis=-1)
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """From the reversal on."""
+        del low
+        last = min(high, RINGS_FOR * self.decay)
+        return np.linspace(1e-6, last, max(int(POINTS_PER_WAVE * last / self.period), 2) + 1)

@@ -520,6 +520,32 @@ class ErrorSource(ABC):
         """
         return None
 
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        """Return the same cause by other laws: the one that follows logged temperatures, if nothing else.
+
+        Each has the same name and owner, another `law` and other parameters; a model has one of them.
+        """
+        logged = self.by_temperature()
+        return () if logged is None else (logged,)
+
+    def left_open(
+        self,
+        motion: Motion,  # noqa: ARG002
+        machine: Machine,  # noqa: ARG002
+        values: NDArray[np.float64],  # noqa: ARG002
+    ) -> tuple[Effect, ...]:
+        """Return what other constants of the law would change in the effect, each less the effect; none if nothing is said.
+
+        For constants that are no parameters, since a recording seldom shows them, and that machines differ in: a diagnosis takes each
+        of these effects as possible in any share of up to about one.
+        """
+        return ()
+
+    @property
+    def law(self) -> str:
+        """Which of the laws of its cause it is: what it varies with, if nothing else is said."""
+        return self.varies_with
+
     @property
     def has_history(self) -> bool:
         """Whether its effect in a row hangs on the rows before."""

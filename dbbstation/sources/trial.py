@@ -152,7 +152,7 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
         or _of_proportion(source, motion, machine, parameters, values)
         or _of_needs(source, motion)
         or _of_history(source, motion, machine, values)
-        or _of_second_form(source, parameters, machine)
+        or _of_other_laws(source, parameters, machine)
     )
 
 
@@ -178,17 +178,28 @@ def _of_history(source: ErrorSource, motion: Motion, machine: Machine, values: N
     return []
 
 
-def _of_second_form(source: ErrorSource, parameters: Sequence[Parameter], machine: Machine) -> list[str]:
-    """The form by temperature, where there is one: model files and diagnoses tell the two apart."""
+def _of_other_laws(source: ErrorSource, parameters: Sequence[Parameter], machine: Machine) -> list[str]:
+    """Its forms by temperature and by other laws, where there are any: model files and diagnoses tell them apart."""
     form = source.by_temperature()
-    if form is None:
-        return []
-    if (form.name, form.belongs_to) != (source.name, source.belongs_to) or form.varies_with == source.varies_with:
-        return ["its form by temperature must have the same name and owner, and say that it varies with temperature"]
-    shared = {p.name for p in parameters} & {p.name for p in form.parameters(machine)}
-    if shared:
-        return [f"its form by temperature must have parameters of other names: {', '.join(sorted(shared))}"]
-    return [f"in its form by temperature, {fault}" for fault in tried(form, machine)]
+    if form is not None:
+        if (form.name, form.belongs_to) != (source.name, source.belongs_to) or form.varies_with == source.varies_with:
+            return [
+                "its form by temperature must have the same name and owner, and say that it varies with temperature"
+            ]
+        shared = {p.name for p in parameters} & {p.name for p in form.parameters(machine)}
+        if shared:
+            return [f"its form by temperature must have parameters of other names: {', '.join(sorted(shared))}"]
+    laws = [source, *source.other_laws()]
+    told = {(law.law, frozenset(p.name for p in law.parameters(machine))) for law in laws}
+    if {(law.name, law.belongs_to) for law in laws} != {(source.name, source.belongs_to)} or any(
+        len({one[k] for one in told}) < len(laws) for k in range(2)
+    ):
+        return ["its other laws must have the same name and owner, and each a `law` and parameters of its own"]
+    faults = [(law, fault) for law in laws[1:] for fault in tried(law, machine)]
+    return [
+        f"in its form by temperature, {fault}" if law.varies_with == "temperature" else f"in its law {law.law}, {fault}"
+        for law, fault in faults
+    ]
 
 
 def _of_parameters(parameters: Sequence[Parameter]) -> list[str]:

@@ -14,7 +14,7 @@ from dbbstation.sources.registry import known_sources
 from tests.sources.runs import random_machine, random_run
 
 SOURCES = list(known_sources().values())
-SOURCES += [form for source in SOURCES if (form := source.by_temperature()) is not None]
+SOURCES += [law for source in SOURCES for law in source.other_laws()]
 AHEAD = {"time-skew", "run-start", "drive-friction"}
 
 

@@ -60,6 +60,11 @@ class Change:
     sides: Sides
     share: float = 1.0
 
+    def _name(self) -> str:
+        """Of the cause, and of its law where that is not the usual one."""
+        usual = self.source.law == self.source.varies_with != "temperature"
+        return self.source.name if usual else f"{self.source.name} by {self.source.law}"
+
     def law(self, log_odds: float) -> Law:
         """Columns and forms for the channel; a form per part of the source and per way of being at work."""
         amplitudes, shapes = self._amplitudes, [p for p in self._parameters if p.grid]
@@ -87,7 +92,7 @@ class Change:
                 label = " ".join(text for text in (part.label, when.label) if text)
                 choices.append((own, part.log_weight - float(np.log(len(self._whens))), label))
         return Law(
-            name=self.source.name + (" by temperature" if self.source.varies_with == "temperature" else ""),
+            name=self._name(),
             columns=self.columns,
             plausible=np.array(plausible),
             parameters=(*names, *(p.name for p in shapes)),

@@ -140,9 +140,11 @@ class _Sources:
 
     def _with_values(self, location: Location, entry: SourceSchema, source: ErrorSource, shared: str) -> Fitted | None:
         try:
-            logged = source.by_temperature()
-            if logged is not None and entry.parameters.keys() == {p.name for p in logged.parameters(self._machine)}:
-                source = logged
+            laws = [source, *source.other_laws()]
+            named = [[p.name for p in law.parameters(self._machine)] for law in laws]
+            source = next(
+                (law for law, names in zip(laws, named, strict=True) if entry.parameters.keys() == set(names)), source
+            )
             parameters = source.parameters(self._machine)
         except ModelError as error:
             self._fault((*location, "name"), error.what, error.remedy)

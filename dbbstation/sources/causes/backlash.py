@@ -13,17 +13,19 @@ from dbbstation.sources.contract import (
     Motion,
     Need,
     Owner,
+    Parameter,
     SourceWithHistory,
     Texts,
     of_each_strut,
 )
+from dbbstation.sources.laws.dahl import WoundState, wound, wound_up
 from dbbstation.sources.laws.play_operator import PlayState, followed, leaning
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
-    from dbbstation.sources.contract import Parameter
+    from dbbstation.sources.contract import ErrorSource
 
 MM_PER_UM = 1e-3
 
@@ -33,8 +35,8 @@ class Backlash(SourceWithHistory):
 
     With x the commanded travel of a strut and w its play, the strut stands at y, which the drive takes along at
     either end of the play: y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2. The error y - x is -w/2 while the strut
-    grows and +w/2 while it shrinks, and passes from one to the other over a travel of w. The friction wind-up of an
-    elastic drive has the same form.
+    grows and +w/2 while it shrinks, and passes from one to the other over a travel of w. A drive that winds up against
+    friction before it slides has the same ends and may need a longer travel: a law of its own, `_WoundUp`.
 
     A run is taken to begin in a movement that was already under way. A negative w is a strut that overshoots at
     reversal; the effect is that of |w| with its sign turned, so that a fit may pass through zero.
@@ -54,9 +56,15 @@ class Backlash(SourceWithHistory):
         confirm="Put a dial gauge or a linear scale on that strut, move it by 0.1 mm to and fro and compare with its "
         "encoder.",
         cure="Tighten or exchange nut, bearing or joint of that strut; until then enter its backlash in the control.",
-        equation="actual minus driven length: y - x, y_k = min(max(y_k-1, x_k - w/2), x_k + w/2)",
-        origin="play operator (hysteresis of play, Krasnosel'skii and Pokrovskii 1983), of each strut's travel",
+        equation="actual minus driven length: y - x, y_k = min(max(y_k-1, x_k - w/2), x_k + w/2); or, where a drive winds "
+        "up over a length l, w z, dz = -(s/2 + z) |dx| / l, s the direction",
+        origin="play operator (hysteresis of play, Krasnosel'skii and Pokrovskii 1983), of each strut's travel; wind-up: Dahl, A "
+        "solid friction model, Aerospace Corporation TOR-158 (1968)",
     )
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        """The one of a drive that winds up."""
+        return (_WoundUp(),)
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         """Six plays, full width."""
@@ -93,3 +101,72 @@ class Backlash(SourceWithHistory):
         """Lag [mm] and its derivative by the width [mm/mm], shapes (n, 6), and the state behind the last row."""
         lag, by_width, behind = followed(motion.struts(machine).length_mm, MM_PER_UM * np.abs(values), state)
         return np.where(values < 0.0, -lag, lag), by_width, behind
+
+
+LENGTHS_MM = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
+"""Lengths of a wind-up worth trying: presliding of screws, seals and joints takes some hundredths to some tenths of a millimetre [mm]."""
+
+AHEAD = 1.1
+"""Least length of a wind-up, of its width. With 1 a strut that turns round would not move at first, with less it would move against its
+drive; with 1.1 both grow together, so that the error can be compensated."""
+
+
+class _WoundUp(SourceWithHistory):
+    """The friction of a strut's drive turns round over a travel, not at once: presliding, by the law of Dahl.
+
+    With s the direction, x the commanded travel and w the whole width the error is w z, dz = -(s/2 + z) |dx| / l: behind a reversal
+    it is -s w (1/2 - exp(-d / l)), d the travel since then, where the strut had been wound up wholly before.
+    """
+
+    name, belongs_to, texts = Backlash.name, Backlash.belongs_to, Backlash.texts
+    detail_mm = Backlash.detail_mm
+    needs = Backlash.needs
+    varies_with = Backlash.varies_with
+    form_uncertainty = Backlash.form_uncertainty
+
+    @property
+    def law(self) -> str:
+        """Of the two of backlash."""
+        return "wind-up"
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Six widths and one length."""
+        widths = of_each_strut("strut_{}_um", "µm", 3.0, "wind-up of strut {}, whole width; positive: it stays behind")
+        meaning = "travel of a strut over which 37 % of a turn-round are left, all struts alike"
+        return (*widths, Parameter("wind_up_length_mm", "mm", 0.05, meaning, LENGTHS_MM))
+
+    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> WoundState:  # noqa: ARG002
+        """Wound up by the movement that each strut is in.
+
+        Raises:
+            ModelError: the motion is no path.
+        """
+        self.require(motion)
+        return wound(motion.struts(machine).length_mm)
+
+    def advance(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: WoundState
+    ) -> tuple[Effect, WoundState]:
+        """Wind-up of each strut."""
+        side, _, behind = wound_up(motion.struts(machine).length_mm, _lengths(values)[0], state)
+        return Effect(strut_mm=side * MM_PER_UM * values[:STRUTS]), behind
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """By the widths, each strut its own, and by the length.
+
+        Raises:
+            ModelError: the motion is no path.
+        """
+        length, is_stated = _lengths(values)
+        width = MM_PER_UM * values[:STRUTS]
+        start = self.begin(motion, machine, values)
+        side, by_length, _ = wound_up(motion.struts(machine).length_mm, length, start)
+        longer = np.where(is_stated, 0.0, AHEAD * np.sign(width))
+        own = MM_PER_UM * (side + width * longer * by_length)[:, :, None] * np.eye(STRUTS)
+        return Effect(strut_mm=np.concatenate([own, (width * is_stated * by_length)[:, :, None]], axis=2))
+
+
+def _lengths(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Length of each strut's wind-up [mm], and where it is the stated one, shape (6,)."""
+    least = np.maximum(AHEAD * MM_PER_UM * np.abs(values[:STRUTS]), 1e-9)
+    return np.maximum(values[STRUTS], least), values[STRUTS] >= least

@@ -36,6 +36,9 @@ WIND_UP_RAD = 1e-4
 """Angle over which a joint's friction changes from one direction to the other: that of preloaded rolling bearings, a
 tenth of a millimetre at the platform. The step of friction spreads over about two degrees of a circle of 150 mm."""
 
+OTHERS = 3.0
+"""Times as large or small an angle, which joints of another make and preload may have."""
+
 
 class JointFriction(SourceWithHistory):
     """A base joint resists being turned, so that its strut drags at the platform, and all six struts stretch for it.
@@ -99,6 +102,32 @@ class JointFriction(SourceWithHistory):
         drag, behind = friction_drag(struts, outer_axes(machine.hexapod), state)
         tension = strut_tensions(struts, transverse_load(struts, values[:, None] * drag))
         return Effect(strut_mm=stretch_mm(struts, strut_compliance(machine), tension)), behind
+
+    def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> tuple[Effect, ...]:
+        """Friction of a joint's outer axis alone, of either axis as the strut leans over, and other angles of wind-up.
+
+        The two bearings of a cross are not alike, and what they carry changes with the strut's inclination. How far a joint winds up
+        shows where it hardly swings over a part of a circle.
+        """
+        struts, axes = motion.struts(machine), outer_axes(machine.hexapod)
+        joints = joint_angles(struts, axes)
+        acting = resistance(joints.angle_rad, leaning(joints.angle_rad))[0]
+        outer, inner = drags(joints, acting)
+        leans = np.sin(joints.angle_rad[:, STRUTS:, None]) ** 2
+        parts = [
+            self.form_uncertainty * np.where(np.arange(STRUTS)[:, None] == joint, drag, 0.0)
+            for joint in np.flatnonzero(values)
+            for drag in (outer, outer * leans, inner * leans)
+        ]
+        for angle in (OTHERS * WIND_UP_RAD, WIND_UP_RAD / OTHERS):
+            other = resistance(joints.angle_rad, leaning(joints.angle_rad), angle)[0] - acting
+            outer, inner = drags(joints, other)
+            parts.append(outer + inner)
+        compliance = strut_compliance(machine)
+        return tuple(
+            Effect(strut_mm=stretch_mm(struts, compliance, strut_tensions(struts, transverse_load(struts, part))))
+            for part in (values[:, None] * part for part in parts)
+        )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Stretch of all struts per friction of each joint.
@@ -179,21 +208,35 @@ def friction_drag(
     """
     joints = joint_angles(struts, axes)
     acting, behind = resistance(joints.angle_rad, leaning(joints.angle_rad) if state is None else state)
-    drag: NDArray[np.float64] = LEVER_MM * (
-        acting[:, :STRUTS, None] * joints.by_first + acting[:, STRUTS:, None] * joints.by_second
+    outer, inner = drags(joints, acting)
+    return outer + inner, behind
+
+
+def drags(joints: JointAngles, acting: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Forces on the platform's joints for 1 N m about the outer axes and about the inner ones, of which a share acts, (n, 6, 3) [N].
+
+    Args:
+        joints: how they stand.
+        acting: of the outer axes, then of the inner ones, shape (n, 12).
+    """
+    return (
+        LEVER_MM * acting[:, :STRUTS, None] * joints.by_first,
+        LEVER_MM * acting[:, STRUTS:, None] * joints.by_second,
     )
-    return drag, behind
 
 
-def resistance(angle_rad: NDArray[np.float64], state: PlayState) -> tuple[NDArray[np.float64], PlayState]:
+def resistance(
+    angle_rad: NDArray[np.float64], state: PlayState, wind_up_rad: float = WIND_UP_RAD
+) -> tuple[NDArray[np.float64], PlayState]:
     """Share of a joint's friction that acts, against its movement, from -1 to 1, shape as the angles (n, m).
 
     Args:
         angle_rad: in time order [rad].
         state: before the first row.
+        wind_up_rad: angle over which it changes from one direction to the other [rad].
 
     Returns:
         The shares, and the state behind the last row.
     """
-    lag, _, behind = followed(angle_rad, np.full(angle_rad.shape[1], WIND_UP_RAD), state)
-    return 2.0 * lag / WIND_UP_RAD, behind
+    lag, _, behind = followed(angle_rad, np.full(angle_rad.shape[1], wind_up_rad), state)
+    return 2.0 * lag / wind_up_rad, behind

@@ -121,3 +121,35 @@ def test_history_before_the_rows_that_count_matters(reference):
 def test_single_poses_are_refused(reference, rng):
     with pytest.raises(ModelError, match=r"backlash needs path, .* give a program or a recording instead"):
         BACKLASH.effect(replace(random_run(rng), is_path=False), reference, np.ones(6))
+
+
+WOUND_UP = BACKLASH.other_laws()[0]
+
+
+def test_a_wound_up_strut_has_the_ends_of_backlash_and_needs_its_length_between_them(reference):
+    motion = run((100, 100, -1150), (-10, 10), step_deg=0.5)
+    travel = strut_travel(reference, motion)
+    for i in range(6):
+        values = np.concatenate([8.0 * np.eye(6)[i], [0.1]])
+        error_um = 1e3 * WOUND_UP.effect(motion, reference, values).strut_mm
+        backlash_um = 1e3 * BACKLASH.effect(motion, reference, values[:6]).strut_mm
+        assert np.allclose(np.delete(error_um, i, axis=1), 0, atol=1e-12)
+        turns = np.flatnonzero(np.diff(np.sign(np.diff(travel[:, i]))))
+        since = np.full(len(travel), np.inf)
+        for turn in turns:
+            since[turn + 1 :] = np.abs(travel[turn + 1 :, i] - travel[turn + 1, i])
+        far = since > 1.0
+        assert np.allclose(error_um[far, i], backlash_um[far, i], atol=1e-3)
+        near = (since > 0.02) & (since < 0.05)
+        assert np.all(np.abs(error_um[near, i] - backlash_um[near, i]) > 1.0)
+
+
+def test_no_strut_moves_against_its_drive(reference):
+    """A width of 30 µm that winds up over 10 µm would: the wind-up is taken for as long as its width then."""
+    motion = run((100, 100, -1150), (-10, 10), step_deg=0.02)
+    values = np.array([30.0] * 6 + [0.01])
+    travel = strut_travel(reference, motion)
+    reached = travel + WOUND_UP.effect(motion, reference, values).strut_mm
+    driven, moved = np.diff(travel, axis=0), np.diff(reached, axis=0)
+    assert np.all(driven * moved >= 0.0)
+    assert np.all(np.abs(moved) <= 2.0 * np.abs(driven) + 1e-12)

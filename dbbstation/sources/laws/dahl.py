@@ -1,0 +1,88 @@
+"""What winds up elastically against friction before it slides: the law of Dahl, and what it remembers.
+
+[Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1 (1968), eq 1 with exponent 1]
+
+The kernel is part of a source; the compiler keeps its code on disk under this file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.compiled import compiled
+from dbbstation.sources.laws.play_operator import leaning
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class WoundState:
+    """How far each of m columns is wound up.
+
+    Attributes:
+        travel: where it was, in the unit of the travel, shape (m,); NaN before the first row.
+        side: wind-up as a share of its whole width, from -1/2 to 1/2, shape (m,).
+        by_length: derivative of that by the column's length, shape (m,).
+    """
+
+    travel: NDArray[np.float64]
+    side: NDArray[np.float64]
+    by_length: NDArray[np.float64]
+
+
+def wound(travel: NDArray[np.float64]) -> WoundState:
+    """Return the state before a run that begins in a movement which was already under way.
+
+    Args:
+        travel: of the run, or of its beginning, shape (n, m).
+    """
+    start = leaning(travel)
+    return WoundState(start.place, start.side, np.zeros_like(start.side))
+
+
+def wound_up(
+    travel: NDArray[np.float64], length: NDArray[np.float64], state: WoundState
+) -> tuple[NDArray[np.float64], NDArray[np.float64], WoundState]:
+    """Wind-up z of each column: dz = -(s/2 + z) |dx| / l, s the sign of dx.
+
+    Args:
+        travel: x, in time order, shape (n, m).
+        length: l, over which a wind-up falls to 37 % of what it has still to go, positive, shape (m,).
+        state: before the first row.
+
+    Returns:
+        z and its derivative by l, shapes (n, m), and the state behind the last row.
+    """
+    side, by_length = np.empty_like(travel), np.empty_like(travel)
+    at, now, slope = state.travel.copy(), state.side.copy(), state.by_length.copy()
+    _wind(np.ascontiguousarray(travel), length, at, now, slope, side, by_length)
+    return side, by_length, WoundState(at, now, slope)
+
+
+@compiled
+def _wind(
+    travel: NDArray[np.float64],
+    length: NDArray[np.float64],
+    at: NDArray[np.float64],
+    now: NDArray[np.float64],
+    slope: NDArray[np.float64],
+    side: NDArray[np.float64],
+    by_length: NDArray[np.float64],
+) -> None:
+    count, columns = travel.shape
+    for i in range(columns):
+        x, z, dz, own = at[i], now[i], slope[i], length[i]
+        for k in range(count):
+            way = 0.0 if np.isnan(x) else travel[k, i] - x
+            if way != 0.0:
+                end = -0.5 if way > 0.0 else 0.5
+                kept = np.exp(-abs(way) / own)
+                dz = kept * (dz + (z - end) * abs(way) / (own * own))
+                z = end + (z - end) * kept
+            x = travel[k, i]
+            side[k, i], by_length[k, i] = z, dz
+        at[i], now[i], slope[i] = x, z, dz

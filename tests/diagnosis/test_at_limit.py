@@ -20,7 +20,10 @@ KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "strut", "variable"),
-    [(KinkedStrut(strut=3), 3, "strut-length"), (WanderingBar(), None, "time of the reading")],
+    [
+        (KinkedStrut(strut=3), 3, "strut-length"),
+        pytest.param(WanderingBar(), None, "time of the reading", marks=pytest.mark.nightly),
+    ],
 )
 def test_what_grows_without_end_gets_no_name_and_a_place(tmp_path, hidden, strut, variable):
     record(tmp_path / "s", seed=1508, mechanisms=[KINEMATICS, hidden], rate_hz=10.0)

@@ -128,7 +128,7 @@ def test_warming_struts_are_named(tmp_path):
     assert diagnosis.held_out[1].rms < diagnosis.held_out[0].rms / 3
 
 
-@pytest.mark.nightly  # beside backlash it is found by default
+@pytest.mark.nightly  # one that follows a thermometer is in CI: tests/diagnosis/test_thermometers.py
 def test_a_warming_bar_is_named(tmp_path):
     _, diagnosis = diagnosed(tmp_path / "s", 24, BarDrift())
     assert "bar-drift" in named(diagnosis) | set(_ambiguous(diagnosis))
@@ -139,12 +139,10 @@ def _ambiguous(diagnosis):
     return [f.name for f in diagnosis.sources if f.verdict is Verdict.AMBIGUOUS]
 
 
+@pytest.mark.nightly  # three causes at once are in CI: tests/diagnosis/test_recipes.py
 @pytest.mark.parametrize(
     ("pair", "names"),
-    [
-        pytest.param((Gravity(), Backlash()), {"gravity", "backlash"}, marks=pytest.mark.nightly),
-        pytest.param((Backlash(), BarDrift()), {"backlash", "bar-drift"}, marks=pytest.mark.slow),
-    ],
+    [((Gravity(), Backlash()), {"gravity", "backlash"}), ((Backlash(), BarDrift()), {"backlash", "bar-drift"})],
 )
 def test_pairs_are_both_named(tmp_path, pair, names):
     _, diagnosis = diagnosed(tmp_path / "s", 25, *pair)
@@ -155,7 +153,7 @@ def test_pairs_are_both_named(tmp_path, pair, names):
     assert diagnosis.left.probability > 1e-3
 
 
-@pytest.mark.nightly  # pairs are in CI
+@pytest.mark.nightly  # three causes at once are in CI: tests/diagnosis/test_recipes.py
 def test_drifts_of_struts_and_bar_together_keep_their_concealed_shares(tmp_path):
     """The direction that the tests cannot see is held; at the fitted geometry it would swallow another fifth."""
     _, diagnosis = diagnosed(tmp_path / "s", 3003, ThermalStruts(), BarDrift())

@@ -57,6 +57,7 @@ def test_a_socket_with_seven_lobes_is_their_wave(tmp_path):
     assert np.sqrt(np.mean(((value - 0.3 * np.cos(np.radians(7 * at - 15.0))) / sigma) ** 2)) < 2.0
 
 
+@pytest.mark.nightly  # a wide one is in tests/diagnosis/test_unexplained.py
 def test_a_narrow_dent_is_a_bump_of_its_height(tmp_path):
     found = left(tmp_path / "s", 34, DentedScrew(strut=5, at_mm=775.0, width_mm=6.0, height_um=3.0))
     assert (found.variable, found.strut) == ("strut-length bump", 5)

@@ -13,8 +13,8 @@ from tests.fuzz.__main__ import cases_of, report
 from tests.fuzz.seeds import SEEDS
 from tests.fuzz.worker import Reached, place, run
 
-CASES, SEED = 250, 1
-"""About ten seconds of processor time."""
+CASES, SEED = 150, 1
+"""About six seconds of processor time."""
 
 
 def worked(folder: Path, cases: int) -> dict[int, dict]:

@@ -188,6 +188,7 @@ def test_a_law_that_would_have_to_be_negative_is_refused() -> None:
     assert "negative" in findings["weight"].text
 
 
+@pytest.mark.nightly  # that of a table is in CI: tests/diagnosis/table/test_mismatch.py
 def test_held_out_error_comes_down_to_the_noise() -> None:
     data = channel(table(2, EFFECTS["hysteresis of q"]))
     error = held_out_error(data, lambda channel, rows: settle(channel.without(rows)))

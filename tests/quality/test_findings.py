@@ -27,6 +27,9 @@ from tests.quality.sessions import calibrated, finding_of, read, sound
 from tests.quality.shares import spoil
 from tests.quality.spoilers import SPOILERS, mirrored
 
+USUAL = {Name.NOISE, Name.DRIFT, Name.SPIKE, Name.DIRECTION, Name.RADIUS, Name.OTHER_DIRECTION}
+"""Findings whose limits are tried by default: of one run, of its place, and beside another run. The others are nightly."""
+
 
 @pytest.fixture(scope="module")
 def machine_session(tmp_path_factory):
@@ -43,7 +46,7 @@ def test_sound_runs_have_no_findings(machine_session):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", list(SPOILERS))
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in USUAL else pytest.mark.nightly) for n in SPOILERS])
 def test_half_of_a_limit_is_kept_and_twice_is_found(machine_session, name):
     found = {one.share: one for one in spoil(machine_session, label(machine_session, "h ccw 2"), name, (0.5, 2.0))}
     assert found[0.5].verdict is not FindingVerdict.WRONG

@@ -9,7 +9,7 @@ from dbbstation.files.shipped import shipped_folder
 from studies.table_iii import PUBLISHED, table_iii
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["rigid", "gravity"])
+@pytest.fixture(scope="module", params=[pytest.param(False, marks=pytest.mark.nightly), True], ids=["rigid", "gravity"])
 def numbers(request, reference):
     plans = shipped_folder("protocols") / "plans"
     conventional, jig = read_plan(plans / "conventional.yaml"), read_plan(plans / "table2.yaml")

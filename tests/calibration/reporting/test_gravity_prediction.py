@@ -128,7 +128,7 @@ def test_a_weight_that_is_a_fifth_too_large_predicts_the_same(machines):
         calibrate(replace(seen.machine, masses=None), seen.observations, names)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # that currents find it is in CI: tests/calibration/currents/test_currents.py
 def test_currents_find_the_centre_of_gravity_and_predict_as_well(tmp_path):
     folder = recorded_machine(tmp_path, 4, drives=[DriveCurrents(moving_kg=0.0)])
     calibration = joint(folder, GRAVITY + FRICTION + ("drive-friction",))

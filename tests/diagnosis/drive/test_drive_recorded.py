@@ -44,7 +44,7 @@ def sources(summary):
     return {source["name"]: source for source in summary["sources"]}
 
 
-@pytest.mark.nightly  # three pulses are in CI
+@pytest.mark.nightly
 def test_25_pulses_that_were_left_out_are_found_with_their_times(recorded):
     summary = answered(recorded("drives/emps-pulses-left-out.csv"))
     transient = sources(summary)["transient-force"]
@@ -61,9 +61,8 @@ def test_25_pulses_that_were_left_out_are_found_with_their_times(recorded):
     assert mass["value"] == pytest.approx(95.1, abs=1.0)
 
 
-@pytest.mark.parametrize(
-    "starts", [pytest.param((11.0,), marks=pytest.mark.nightly), (4.2, 11.0, 20.3)], ids=["one", "three"]
-)
+@pytest.mark.nightly  # a force that jumps in a simulated drive is in CI: test_drive_known.py
+@pytest.mark.parametrize("starts", [(11.0,), (4.2, 11.0, 20.3)], ids=["one", "three"])
 def test_pulses_taken_out_of_the_known_force_are_found(recorded, starts):
     raw = read_drive(recorded("emps/emps.csv")).recording()
     force = raw.force_n.copy()

@@ -18,6 +18,7 @@ def expect_right(name, seed=1):
     return answer
 
 
+@pytest.mark.nightly  # by the command it is in CI, with its value: tests/cli/test_mismatch_simulator.py
 def test_quadratic_drag_is_found_behind_the_damping_that_hid_it():
     answer = expect_right("pendulum drag")
     damping = next(one for one in answer.parameters if one.name == "damping")

@@ -319,12 +319,13 @@ class Bank:
 
     def _taking_part(self, beside: BesideBase) -> NDArray[np.float64]:
         """Prior standard deviations of all columns that noise is measured beside, zero for the others."""
-        scan = beside.comparison(self.target).scan((), self.causes)
+        found = [self._of_patterns[name] for name in self._of_patterns if name in self.looked_for]
+        idle: set[str] = set()
+        if found:
+            scan = beside.comparison(self.target).scan((), found)
+            idle = {c.name for c, worth in zip(found, scan.log_factor, strict=True) if worth + c.log_prior_odds <= 0.0}
         sd = np.zeros(self._columns.count)
-        for cause, worth in zip(scan.causes, scan.log_factor, strict=True):
-            pattern = self.patterns.get(cause.name)
-            if pattern is not None and pattern.family in LOOKED_FOR and worth + cause.log_prior_odds <= 0.0:
-                continue
+        for cause in self.but_for(idle):
             for variant in cause.variants:
                 sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
         return sd

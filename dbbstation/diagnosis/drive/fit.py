@@ -11,6 +11,7 @@ from scipy.special import log_ndtr
 
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.inference.settle import growth, moved
+from dbbstation.inference.triangle import triangle_of
 from dbbstation.inference.verdict import OUT, Value
 
 if TYPE_CHECKING:
@@ -153,13 +154,32 @@ def fit(
     return DriveFit(drive, tuple(members), samples, values, covariance)
 
 
-def solved_on(
-    drive: DriveChannel, settled: Settled, members: Sequence[Member]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values of base and members, shape (k,), fitted to the rows that a comparison kept, and all columns over all rows, shape (m, k)."""
-    samples = np.hstack([drive.channel.base.samples, *(settled.bank.samples(member.columns) for member in members)])
-    white = settled.bank.whitened(np.column_stack([samples, drive.channel.residual]))
-    return _solved(white, _prior_sd(drive, members), settled.noise.innovation)[0], samples
+class Kept:
+    """Base and members of a hypothesis over the rows that a comparison kept, of which some are fitted at a time.
+
+    Args:
+        drive: what is fitted.
+        settled: where the columns of the members are.
+        members: of the hypothesis.
+    """
+
+    def __init__(self, drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> None:
+        channel, bank = drive.channel, settled.bank
+        self._drive, self._members, self._noise = drive, tuple(members), settled.noise.innovation
+        self._samples = np.hstack([channel.base.samples, *(bank.samples(member.columns) for member in members)])
+        self._triangle = triangle_of(bank.whitened(np.column_stack([self._samples, channel.residual])))
+
+    def solved(self, members: Sequence[Member]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Values of base and some of the members, shape (k,), and their columns over all rows, shape (m, k)."""
+        width = len(self._drive.channel.base.names)
+        own, names = [np.arange(width)], {member.cause.name for member in members}
+        for member in self._members:
+            if member.cause.name in names:
+                own.append(width + np.arange(len(member.columns)))
+            width += len(member.columns)
+        used = np.concatenate(own)
+        values, _ = _solved(self._triangle[:, [*used, -1]], _prior_sd(self._drive, members), self._noise)
+        return values, self._samples[:, used]
 
 
 def _prior_sd(drive: DriveChannel, members: Sequence[Member]) -> NDArray[np.float64]:
@@ -171,6 +191,7 @@ def _solved(
     rows: NDArray[np.float64], sd: NDArray[np.float64], noise: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Values and their covariance, from rows of columns with the target last, under priors."""
+    rows = triangle_of(rows)  # which says the same in as many rows as columns
     norm = np.linalg.norm(rows[:, :-1], axis=0)
     norm = np.where(norm > 0.0, norm, 1.0)  # a pulse elsewhere: its prior alone says what it is
     stacked = np.vstack([rows[:, :-1] / norm, np.diag(noise / sd / norm)])
@@ -228,7 +249,9 @@ def _widened(
     The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq. 1.5]
     """
     stretch = np.arange(len(rows)) * STRETCHES // len(rows)
-    every = np.array([_solved(rows[stretch != k], sd, noise)[0] for k in range(STRETCHES)])
+    each = [triangle_of(rows[stretch == k]) for k in range(STRETCHES)]
+    others = (np.vstack([*each[:k], *each[k + 1 :]]) for k in range(STRETCHES))
+    every = np.array([_solved(one, sd, noise)[0] for one in others])
     moves = (STRETCHES - 1.0) / STRETCHES * np.sum((every - every.mean(axis=0)) ** 2, axis=0)
     # Where a stretch alone shows a pulse, leaving it out says nothing.
     everywhere = np.array([np.any(fitted.samples[stretch != k] != 0.0, axis=0) for k in range(STRETCHES)]).all(axis=0)

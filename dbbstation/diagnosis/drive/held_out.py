@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.fit import solved_on
+from dbbstation.diagnosis.drive.fit import Kept
 from dbbstation.diagnosis.drive.moving import within
 from dbbstation.diagnosis.drive.naming import COULOMB, source_of
 from dbbstation.inference.folds import parts_of
@@ -65,9 +65,15 @@ def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> DriveHeldO
         kept = channel.without(within(rows, gap))
         settled = settle(kept, most_expanded=0, most_looks=1, thorough=False, rivals=False)
         chosen = settled.best.members
+        of_chosen = Kept(drive, settled, chosen)
 
-        def error(members: Sequence[Member], settled: Settled = settled, rows: NDArray[np.bool_] = rows) -> float:
-            return float(np.sum(_left(drive, settled, members)[rows] ** 2))
+        def error(
+            members: Sequence[Member],
+            settled: Settled = settled,
+            of_chosen: Kept = of_chosen,
+            rows: NDArray[np.bool_] = rows,
+        ) -> float:
+            return float(np.sum(_left(drive, settled, of_chosen, members)[rows] ** 2))
 
         whole = error(chosen)
         corrected += whole
@@ -84,12 +90,12 @@ GAP_PERIODS = 0.5
 """Periods of the cut-off about a part that are left out beside it: the impulse response of the low-pass is a tenth beyond."""
 
 
-def _left(drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> NDArray[np.float64]:
+def _left(drive: DriveChannel, settled: Settled, of_chosen: Kept, members: Sequence[Member]) -> NDArray[np.float64]:
     """What predictions leave of all samples, fitted to those that were kept, shape (m,) [N].
 
     What members do in time they were fitted for, and predict nothing with: it says nothing of other times.
     """
-    values, columns = solved_on(drive, settled, members)
+    values, columns = of_chosen.solved(members)
     first = drive.channel.base.samples.shape[1]
     used = np.ones(len(values), dtype=bool)
     for member in members:

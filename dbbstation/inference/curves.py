@@ -74,15 +74,17 @@ class Clock:
     Attributes:
         rows: of each row, its time in rows from one to the next, rising, shape (n,); rows that were left out count too.
         response: what is seen of a step from zero to one, by rows since it, 0 long before and 1 long after.
+        reach: rows before and after it beyond which the response is the same for all that follow.
     """
 
     rows: NDArray[np.float64]
     response: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    reach: float
 
     @classmethod
     def plain(cls, count: int) -> Clock:
         """Rows without a gap that show a step at once."""
-        return cls(np.arange(count, dtype=np.float64), lambda since: (since >= 0.0).astype(np.float64))
+        return cls(np.arange(count, dtype=np.float64), lambda since: (since >= 0.0).astype(np.float64), 0.0)
 
 
 @dataclass(frozen=True, eq=False)

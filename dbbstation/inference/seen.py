@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.inference.looks import PLACED, looked_for, placed_better
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.pieces import Fitting, Left
+from dbbstation.inference.pieces import Fitting, Left, LeftBesideOthers
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.stretches import refined, stretches
 from dbbstation.inference.variables import Kind, Variable
@@ -77,7 +76,9 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
             better = refined(
                 pattern,
                 count,
-                partial(_left_beside, bank, Fitting.of(others, sd, bank.noise, bank.whitening), member.sd[:-1]),
+                LeftBesideOthers(
+                    Fitting.of(others, sd, bank.noise, bank.whitening), member.sd[:count], bank.target, bank.whitened
+                ),
                 channel.blocks,
                 channel.kept,
                 size,
@@ -92,11 +93,6 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
         variant = max(cause.variants, key=lambda one: len(one.columns))
         members[number] = replace(member, cause=cause, variant=variant)
     return tuple(members)
-
-
-def _left_beside(bank: Bank, others: Fitting, sd: NDArray[np.float64], but_for: int, own: NDArray[np.float64]) -> Left:
-    """The residual beside others and all but one of some columns that are not whitened."""
-    return others.beside(np.delete(bank.whitened(own), but_for, axis=1), sd).left(bank.target)
 
 
 def _in_time(left: Left, channel: Channel, size: float) -> list[Pattern]:

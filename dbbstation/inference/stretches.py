@@ -130,7 +130,7 @@ def refined(
         look.tried = pattern.tried
         best = look.best()
         if best is not None and (k not in doubtful or best.worth > 0.0):
-            found[k] = look.take(best)
+            found[k] = look.edges_of(best)
             columns[:, k] = Stretches(found[k][:1], found[k][1:], clock.response).columns(clock.rows)[:, 0] * factor
     found = [edges for edges, column in zip(found, columns.T, strict=True) if column.any()]
     return _pattern(pattern.family, pattern.variables, found, clock, factor, pattern.tried)
@@ -200,10 +200,11 @@ class _Look:
         self._rows, self._at = np.flatnonzero(kept), clock.rows[kept]
         ends = np.searchsorted(self._rows, [[b.start, b.stop] for b in blocks])
         self._blocks = [(int(a), int(b)) for a, b in ends if b - a >= 2 * SHORTEST]
-        self._axes, self._rest = left.axes, left.rest
+        self._axes, self._rest = _Growing(left.axes), left.rest
         self._whole = _cumulative(left.whitened(factor) ** 2)
         self._edges = _squares_of_edges(left.coloured, len(self._rows))
-        self._along_axes = _cumulative(factor[:, None] * left.beside)
+        self._along_axes = _Growing(_cumulative(factor[:, None] * left.beside))
+        self._lengths = _squares(self._along_axes.columns)
         self._total = _cumulative(factor * left.towards)
         self._windows = self._all_windows() if windows is None else windows
         self._own = self._information(self._windows[:, 0], self._windows[:, 1])
@@ -223,15 +224,17 @@ class _Look:
             # To the end of the block, and to the end of all: a step.
             begin = np.arange(first, last - SHORTEST + 1, per)
             found += [np.column_stack([begin, np.full(len(begin), end)]) for end in (last, len(self._rows))]
-        every = np.unique(np.vstack(found), axis=0)
-        return every[every[:, 1] - every[:, 0] < len(self._rows)]
+        # One number for each pair is put in order far sooner than the pairs.
+        per_row = len(self._rows) + 1
+        starts, ends = np.divmod(np.unique(np.vstack(found) @ np.array([per_row, 1])), per_row)
+        return np.column_stack([starts, ends])[ends - starts < len(self._rows)]
 
     def _information(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
         """Sums of squares of whitened windows beside what was fitted."""
-        own = self._whole[ends] - self._whole[starts] + self._edges[ends - starts]
+        own, along = self._whole[ends] - self._whole[starts] + self._edges[ends - starts], self._along_axes.columns
         for many in range(0, len(starts), AT_ONCE):
             rows = slice(many, many + AT_ONCE)
-            own[rows] -= np.sum((self._along_axes[ends[rows]] - self._along_axes[starts[rows]]) ** 2, axis=1)
+            own[rows] -= _squares(along[ends[rows]] - along[starts[rows]])
         return np.asarray(own)
 
     def best(self) -> _Window | None:
@@ -240,16 +243,18 @@ class _Look:
             return None
         along = self._total[self._windows[:, 1]] - self._total[self._windows[:, 0]]
         first, last = (int(edge) for edge in self._windows[int(self._worth(along, self._own).argmax())])
+        sought = None
         for _ in range(ENDS_MOVED):
             low, high = self._within(first, last)
             if high - low < SHORTEST:
                 return None
             first = min(first, high - SHORTEST)
-            ends = np.arange(first + SHORTEST, high + 1)
-            last = int(ends[int(self._worth_of(np.full(len(ends), first), ends).argmax())])
-            starts = np.arange(low, last - SHORTEST + 1)
-            first = int(starts[int(self._worth_of(starts, np.full(len(starts), last)).argmax())])
-        return _Window(first, last, float(self._worth_of(np.array([first]), np.array([last]))[0]))
+            last = first + SHORTEST + int(self._worth_between(first, slice(first + SHORTEST, high + 1)).argmax())
+            if sought == (low, high, last):
+                break  # its beginning is the best one for this end
+            first = low + int(self._worth_between(last, slice(low, last - SHORTEST + 1)).argmax())
+            sought = low, high, last
+        return _Window(first, last, float(self._worth_between(first, slice(last, last + 1))[0]))
 
     def _within(self, first: int, last: int) -> tuple[int, int]:
         """Rows that a stretch may have: those of its block, or of all where it goes on into another one."""
@@ -258,8 +263,13 @@ class _Look:
                 return low, high
         return 0, len(self._rows)
 
-    def _worth_of(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
-        return self._worth(self._total[ends] - self._total[starts], self._information(starts, ends))
+    def _worth_between(self, edge: int, others: slice) -> NDArray[np.float64]:
+        """Log Bayes factor of each window between one edge and others that follow one another, all before it or all behind it."""
+        way, along = 1.0 if others.start > edge else -1.0, self._along_axes.columns
+        own = way * (self._whole[others] - self._whole[edge])
+        own += self._edges[np.abs(np.arange(others.start, others.stop) - edge)]
+        own -= self._lengths[others] - 2.0 * (along[others] @ along[edge]) + self._lengths[edge]
+        return self._worth(self._total[others] - self._total[edge], own)
 
     def _worth(self, along: NDArray[np.float64], own: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log Bayes factor of each window, less what it costs to be picked from all of them."""
@@ -267,8 +277,8 @@ class _Look:
         occam = 0.5 * np.log(information * self._size**2)
         return np.asarray(0.5 * along**2 / information - occam - np.log(self.tried))
 
-    def take(self, window: _Window) -> tuple[float, float]:
-        """Go on beside a stretch, and return the times in rows between which it explains most."""
+    def edges_of(self, window: _Window) -> tuple[float, float]:
+        """Times in rows between which a stretch explains most."""
         first, last = window.first, window.last
         begins = float(0.5 * (self._at[first - 1] + self._at[first])) if first > 0 else -np.inf
         ends = float(0.5 * (self._at[last - 1] + self._at[last])) if last < len(self._at) else np.inf
@@ -277,40 +287,81 @@ class _Look:
             # Edges between rows must leave the rows that a stretch has at the least.
             begins, _ = self._best_edges(np.minimum(begins + moves, ends - SHORTEST), np.full(len(moves), ends))
             _, ends = self._best_edges(np.full(len(moves), begins), np.maximum(ends + moves, begins + SHORTEST))
+        return begins, ends
+
+    def take(self, window: _Window) -> tuple[float, float]:
+        """Go on beside a stretch, and return the times in rows between which it explains most."""
+        begins, ends = self.edges_of(window)
         column = self._left.whitened(self._columns(np.array([begins]), np.array([ends])))[:, 0]
-        beside = column - self._axes @ (self._axes.T @ column)
+        axes = self._axes.columns
+        beside = column - axes @ (axes.T @ column)
         # Of what it explains its prior leaves a little; then all of it is as if it had been fitted with the rest [Woodbury].
         information = max(float(column @ beside), 0.0) + 1.0 / self._size**2
         self._rest = self._rest - beside * (float(column @ self._rest) / information)
         axis = beside / np.sqrt(information)
-        self._axes = np.column_stack([self._axes, axis])
+        self._axes.add(axis)
         self._total = _cumulative(self._factor * self._left.transposed(self._rest))
         total = _cumulative(self._factor * self._left.transposed(axis))
-        self._along_axes = np.column_stack([self._along_axes, total])
+        self._along_axes.add(total)
+        self._lengths = self._lengths + total**2
         self._own = self._own - (total[self._windows[:, 1]] - total[self._windows[:, 0]]) ** 2
         return begins, ends
 
     def _best_edges(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> tuple[float, float]:
         """Those edges of some between which one value explains most; the middle ones where they are alike."""
-        columns = self._columns(begins, ends)
-        # Stretches differ about the edge that moves only, and what is alike in them is whitened and multiplied once.
-        one = self._left.whitened(columns[:, :1])
-        differs = np.flatnonzero((columns != columns[:, :1]).any(axis=1))
-        near = slice(int(differs[0]), int(differs[-1]) + 1) if len(differs) else slice(0, 0)
-        reach = slice(near.start, min(near.stop + self._left.coloured.order, len(columns)))
-        away = self._left.whitened_part(columns[near] - columns[near, :1], near, reach)
-        along = one.T @ self._rest + away.T @ self._rest[reach]
-        taken = self._axes.T @ one + self._axes[reach].T @ away
-        own = np.sum(one**2) + 2.0 * (one[reach].T @ away)[0] + np.sum(away**2, axis=0) - np.sum(taken**2, axis=0)
+        # Stretches differ about the edge that moves only, and what is alike in them is whitened and multiplied once, where it is not zero.
+        rings, reach = self._left.coloured.order, self._clock.reach
+        moving = begins if begins[0] < begins[-1] else ends
+        here = self._within_times(begins[0] - reach, ends[-1] + reach)
+        about = self._within_times(moving[0] - reach, moving[-1] + reach) if moving[0] < moving[-1] else slice(0, 0)
+        there = slice(here.start, min(here.stop + rings, len(self._at)))
+        one = self._left.whitened_part(self._columns(begins[:1], ends[:1], here), here, there)
+        columns = self._columns(begins, ends, about)
+        columns = columns - columns[:, :1]
+        near = slice(about.start, min(about.stop + rings, len(self._at)) if len(columns) else about.start)
+        away = self._left.whitened_part(columns, about, near)
+        axes, inside = self._axes.columns, slice(near.start - there.start, near.stop - there.start)
+        along = one.T @ self._rest[there] + away.T @ self._rest[near]
+        taken = axes[there].T @ one + axes[near].T @ away
+        own = np.sum(one**2) + np.sum(away**2, axis=0) - np.sum(taken**2, axis=0)
+        if len(away):
+            own += 2.0 * (one[inside].T @ away)[0]
         explained = along**2 / (np.maximum(own, 0.0) + 1.0 / self._size**2)
         order = np.argsort(np.abs(np.arange(len(begins)) - len(begins) // 2), kind="stable")
         k = int(order[int(np.argmax(explained[order] * (1.0 - ALIKE * np.arange(len(order)))))])
         return float(begins[k]), float(ends[k])
 
-    def _columns(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _within_times(self, first: float, last: float) -> slice:
+        """Rows from one time to another."""
+        begin, end = np.searchsorted(self._at, [first, last + 1.0]).tolist()
+        return slice(begin, end)
+
+    def _columns(
+        self, begins: NDArray[np.float64], ends: NDArray[np.float64], rows: slice = slice(None)
+    ) -> NDArray[np.float64]:
         """Columns of stretches, shape (m, p)."""
-        form = Stretches(tuple(begins.tolist()), tuple(ends.tolist()), self._clock.response)
-        return form.columns(self._at) * self._factor[:, None]
+        at = self._at[rows, None]
+        return (self._clock.response(at - begins) - self._clock.response(at - ends)) * self._factor[rows, None]
+
+
+class _Growing:
+    """Columns, shape (n, k), that become more, one after the other, without a copy of all each time.
+
+    Attributes:
+        columns: that there are.
+    """
+
+    def __init__(self, columns: NDArray[np.float64]) -> None:
+        self.columns, self._room = columns, columns
+
+    def add(self, column: NDArray[np.float64]) -> None:
+        """Add one, shape (n,)."""
+        count = self.columns.shape[1]
+        if count == self._room.shape[1]:
+            self._room = np.empty((len(column), count + MOST))
+            self._room[:, :count] = self.columns
+        self._room[:, count] = column
+        self.columns = self._room[:, : count + 1]
 
 
 INDEPENDENT = 4.0
@@ -329,9 +380,16 @@ ALIKE = 1e-12
 """Relative difference that is none."""
 
 
+def _squares(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sum of squares of each row, shape (w,)."""
+    return np.asarray(np.einsum("wk,wk->w", rows, rows), dtype=np.float64)
+
+
 def _cumulative(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Sums of all rows before each, and of all of them, shape (n + 1, ...)."""
-    return np.concatenate([np.zeros((1, *rows.shape[1:])), np.cumsum(rows, axis=0)])
+    found = np.zeros((len(rows) + 1, *rows.shape[1:]))
+    np.cumsum(rows, axis=0, out=found[1:])
+    return found
 
 
 def _squares_of_edges(noise: Coloured, longest: int) -> NDArray[np.float64]:

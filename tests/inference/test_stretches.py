@@ -13,7 +13,7 @@ from dbbstation.inference.channel import Base, Channel
 from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.curves import Clock, Stretches
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.pieces import Fitting, Left
+from dbbstation.inference.pieces import Fitting, Left, LeftBesideOthers
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.stretches import SHORTEST, _pattern, _squares_of_edges, refined
@@ -49,7 +49,7 @@ def test_a_stretch_is_the_difference_of_two_steps():
 
 def test_a_round_edge_is_found_between_two_rows(rng):
     """Rows that blur a step over two of them show where it was to some hundredths of one, and it is one stretch."""
-    clock = Clock(np.arange(ROWS, dtype=np.float64), lambda since: ndtr(since / 1.5))
+    clock = Clock(np.arange(ROWS, dtype=np.float64), lambda since: ndtr(since / 1.5), 60.0)
     pulse = ndtr((clock.rows - 400.3) / 1.5) - ndtr((clock.rows - 631.8) / 1.5)
     settled = settle(made(3.0 * pulse + rng.normal(0.0, 0.05, ROWS), clock=clock))
     ((family, first, last),) = forms(settled)
@@ -148,6 +148,42 @@ def test_what_is_left_beside_columns_in_two_parts_is_ridge_regression(rng):
     precision = np.diag(np.where(np.isfinite(sd), 1.0 / sd**2, 0.0))
     values = np.linalg.solve(columns.T @ columns / noise**2 + precision, columns.T @ target / noise**2)
     np.testing.assert_allclose(left.rest, (target - columns @ values) / noise, atol=1e-12)
+
+
+def test_what_is_left_beside_all_columns_but_one_is_ridge_regression(rng):
+    """As above, for each column left out in turn, in noise that remembers; each then changes, as a stretch whose edges moved."""
+    rows, noise = 60, Coloured.first_order(0.7, 0.6, 0.8)
+    whitening = noise.whitening([slice(0, rows)])
+    dense, level = whitening.toarray(), noise.innovation
+    base, columns, target = rng.normal(size=(rows, 2)), rng.normal(size=(rows, 4)), dense @ rng.normal(size=rows)
+    columns[:, 3] = 0.0
+    sd = np.array([np.inf, np.inf, 0.3, 1.0, 1.0, 0.5])
+    fitting = Fitting.of(dense @ base, sd[:2], noise, whitening)
+    lefts = LeftBesideOthers(fitting, sd[2:], target, lambda own: dense @ own)
+    for but_for in range(4):
+        left = lefts(but_for, columns)
+        used = np.delete(np.arange(6), 2 + but_for)
+        whole = dense @ np.hstack([base, columns])[:, used]
+        inverse = np.linalg.inv(
+            whole.T @ whole / level**2 + np.diag(np.where(np.isfinite(sd[used]), 1.0 / sd[used] ** 2, 0.0))
+        )
+        taken = whole @ inverse @ whole.T / level**2
+        np.testing.assert_allclose(left.rest, (target - taken @ target) / level, atol=1e-11)
+        np.testing.assert_allclose(left.axes @ left.axes.T, taken, atol=1e-11)
+        np.testing.assert_allclose(left.beside, dense.T @ left.axes, atol=1e-11)
+        columns[:, but_for] = rng.normal(size=rows)
+
+
+@pytest.mark.parametrize(
+    ("here", "there"), [((5, 9), (5, 30)), ((0, 40), (0, 40)), ((36, 40), (36, 40)), ((7, 7), (7, 7))]
+)
+def test_a_part_of_whitened_rows_is_that_of_the_whole_matrix(rng, here, there):
+    whitening = Coloured.first_order(0.7, 0.6, 0.8).whitening([slice(0, 15), slice(15, 40)])
+    left = Left(np.zeros(40), np.zeros((40, 0)), 1.0, Coloured(1.0), whitening)
+    rows = np.zeros((40, 3))
+    rows[slice(*here)] = rng.normal(size=(here[1] - here[0], 3))
+    found = left.whitened_part(rows[slice(*here)], slice(*here), slice(*there))
+    np.testing.assert_allclose(found, (whitening.toarray() @ rows)[slice(*there)], atol=1e-14)
 
 
 def test_a_single_row_is_no_stretch(rng):

@@ -123,7 +123,9 @@ def drive_channel(
         surely=SURE,
         grows=np.abs(recordings.motion[:, 0]),
         known_noise=recordings.edge_noise_n,
-        clock=Clock(recordings.time_s / recordings.samples_apart_s, recordings.step_response),
+        clock=Clock(
+            recordings.time_s / recordings.samples_apart_s, recordings.step_response, recordings.response_reach
+        ),
         direction=recordings.compared(lambda s: s.direction),
     )
     return DriveChannel(recordings, channel, scale, {s.name: s for s in sources}, of_law, shortest)

@@ -138,6 +138,12 @@ class Recordings:
         return np.interp(since * self.samples_apart_s, *self._response)
 
     @cached_property
+    def response_reach(self) -> float:
+        """Samples of the comparison before and after a step beyond which its response goes on as it is."""
+        since, _ = self._response
+        return float(np.abs(since[[0, -1]]).max()) / self.samples_apart_s
+
+    @cached_property
     def _response(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         one = self.signals[0]
         step = np.cumsum(impulse_response(one.rate_hz, one.cutoff_hz))

@@ -49,6 +49,7 @@ def test_a_belt_that_gives_way_follows_the_acceleration_of_its_strut(tmp_path):
     assert value == pytest.approx(-0.5 * at, abs=5 * sigma.max() + 0.02 * np.abs(0.5 * at).max())
 
 
+@pytest.mark.nightly  # waves of time are in CI
 def test_a_socket_with_seven_lobes_is_their_wave(tmp_path):
     socket = LobedSocket(amplitude_um=0.3, lobes=7, phase_deg=15.0)
     found = left(tmp_path / "s", 33, socket)

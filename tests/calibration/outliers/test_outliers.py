@@ -97,6 +97,7 @@ def test_a_badly_seated_holder_is_named_with_where_the_ball_stands(recorded, sou
     assert pull(calibration, sound) < 2.0
 
 
+@pytest.mark.nightly  # one is in CI
 def test_two_badly_seated_holders_are_both_named(recorded, sound):
     runs = [
         moved(o, 0.03, 0.0) if o.test == "h" else moved(o, 0.0, 0.025) if o.test == "c" else o
@@ -164,6 +165,7 @@ def test_one_run_filed_under_another_test_is_recognised(recorded, sound):
     assert 1e3 * fine_noise_mm(calibration) == pytest.approx(0.5, rel=0.05)
 
 
+@pytest.mark.nightly  # one run of another test is in CI
 def test_a_test_done_in_the_wrong_bore_is_recognised(recorded, sound):
     """Ball and programs of test g where the plan says b, in both directions."""
     runs = list(recorded.observations)

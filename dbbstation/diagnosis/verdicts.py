@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, claim
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.model_comparison import Cause, Member, Variant
     from dbbstation.inference.verdict import Gains
+    from dbbstation.sources.contract import ErrorSource
 
 TESTABLE_SHARE = 0.5
 """Share of the combinations of a cause's amplitudes that must be seen for the cause to be ruled out."""
@@ -55,12 +57,13 @@ class _Judge:
         self._settled: SettledCircles = explained.settled
         self._best = explained.settled.best
         self._named = {cause.name: cause for cause in explained.settled.causes if cause.named}
+        # A method of this would keep it, and all columns, alive in a ring.
         self._alternatives = Alternatives(
             self._settled.comparison,
             self._settled.causes,
             self._settled.posterior,
             self._best,
-            self._form_uncertainty,
+            partial(_form_uncertainty, self._channel.sources),
             self._settled.members,
         )
         self._classes, self._probability = self._alternatives.classes, self._alternatives.probability
@@ -196,11 +199,6 @@ class _Judge:
         shapes = self._settled.unmodelled.shapes
         return tuple(f"an unmodelled effect over {shapes[n].follows}" if n in shapes else n for n in names)
 
-    def _form_uncertainty(self, member: Member) -> float:
-        """By how much the formula of a cause may be off, as a share of its effect; one without a name has none."""
-        source = self._channel.sources.get((member.cause.name, member.variant.law))
-        return 0.0 if source is None else source.form_uncertainty
-
     def _testable(self, name: str) -> bool:
         """Whether plausible amplitudes would be seen beside base and causes; half of their combinations at least."""
         whole = max(self._named[name].variants, key=lambda v: len(v.columns))
@@ -293,6 +291,12 @@ class _Judge:
             p.name: Value(float(values[k]), float(np.sqrt(max(covariance[k, k], 0.0))), p.unit)
             for k, p in enumerate(amplitudes)
         }
+
+
+def _form_uncertainty(sources: Mapping[tuple[str, str], ErrorSource], member: Member) -> float:
+    """By how much the formula of a cause may be off, as a share of its effect; one without a name has none."""
+    source = sources.get((member.cause.name, member.variant.law))
+    return 0.0 if source is None else source.form_uncertainty
 
 
 def _why(verdict: Verdict, gains: Gains | None) -> str:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import gc
+
 import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.diagnosis.after_reversals import after_reversals
+from dbbstation.diagnosis.channel import CircleChannel
+from dbbstation.diagnosis.explained import SettledCircles
 from dbbstation.diagnosis.shapes import samples_of
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.tasks.diagnose import diagnose_sessions
@@ -50,7 +54,11 @@ def test_noise_alone_follows_no_reversal(tmp_path):
 @pytest.mark.slow
 def test_nothing_is_left_is_not_said_of_a_strut_that_rings(tmp_path):
     record(tmp_path / "s", seed=33, mechanisms=[KINEMATICS, RingingStrut(strut=2)], rate_hz=10.0)
+    gc.disable()
     summary = diagnose_sessions([tmp_path / "s"], ["gravity"], (), lambda _: None).summary()
+    # Hundreds of megabytes of columns must not wait for the collector of rings.
+    assert not any(isinstance(one, SettledCircles | CircleChannel) for one in gc.get_objects())
+    gc.enable()
     assert summary["mismatch"] is True
     left = summary["unexplained"]
     assert (left["strut"], left["variable"]) == (2, "time since its reversal ringing")

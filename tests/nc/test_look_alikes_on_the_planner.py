@@ -150,7 +150,12 @@ def test_short_chords_take_the_time_that_is_reckoned(count, chord_mm, kink_deg, 
     text = f"G21 G90 G94\nG61\nG0 X0 Y0 Z-1000 A0 B0 C0\nG64 P0.01 Q0\n{lines}\nG61\nG1 Z-1001\nM2\n"
     path = read_program(text, "chords.ngc")
     reckoned_s = Planner(mm_s2, linuxcnc.look_ahead).seconds(path).sum()
-    assert abs(feed_s(run(text, mm_s2=mm_s2, faster=FASTER), path) - reckoned_s) < 3 * PERIOD_NS / 1e9
+    # On a busy computer the interpreter falls behind a quick clock for an instant; a wrong reckoning is wrong at any clock.
+    for faster in (FASTER, 1):
+        off_s = abs(feed_s(run(text, mm_s2=mm_s2, faster=faster), path) - reckoned_s)
+        if off_s < 3 * PERIOD_NS / 1e9:
+            break
+    assert off_s < 3 * PERIOD_NS / 1e9
 
 
 def _over_a_circle(each: Callable[[int, complex], str]) -> str:

@@ -154,7 +154,7 @@ def fit(
     return DriveFit(drive, tuple(members), samples, values, covariance)
 
 
-class Kept:
+class RowsKept:
     """Base and members of a hypothesis over the rows that a comparison kept, of which some are fitted at a time.
 
     Args:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.fit import Kept
+from dbbstation.diagnosis.drive.fit import RowsKept
 from dbbstation.diagnosis.drive.moving import within
 from dbbstation.diagnosis.drive.naming import COULOMB, source_of
 from dbbstation.inference.folds import parts_of
@@ -65,12 +65,12 @@ def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> DriveHeldO
         kept = channel.without(within(rows, gap))
         settled = settle(kept, most_expanded=0, most_looks=1, thorough=False, rivals=False)
         chosen = settled.best.members
-        of_chosen = Kept(drive, settled, chosen)
+        of_chosen = RowsKept(drive, settled, chosen)
 
         def error(
             members: Sequence[Member],
             settled: Settled = settled,
-            of_chosen: Kept = of_chosen,
+            of_chosen: RowsKept = of_chosen,
             rows: NDArray[np.bool_] = rows,
         ) -> float:
             return float(np.sum(_left(drive, settled, of_chosen, members)[rows] ** 2))
@@ -90,7 +90,7 @@ GAP_PERIODS = 0.5
 """Periods of the cut-off about a part that are left out beside it: the impulse response of the low-pass is a tenth beyond."""
 
 
-def _left(drive: DriveChannel, settled: Settled, of_chosen: Kept, members: Sequence[Member]) -> NDArray[np.float64]:
+def _left(drive: DriveChannel, settled: Settled, of_chosen: RowsKept, members: Sequence[Member]) -> NDArray[np.float64]:
     """What predictions leave of all samples, fitted to those that were kept, shape (m,) [N].
 
     What members do in time they were fitted for, and predict nothing with: it says nothing of other times.

@@ -82,7 +82,7 @@ RINGING_PERIODS_S = np.geomspace(0.2, 2.5, 40)
 """What a drive's position loop or its mounting oscillates with, in steps of 7 %: a ringing of three periods is then found but for a tenth."""
 
 RINGING_DECAYS_S = (0.4, 0.8, 1.6, 3.2)
-"""Times over which it fades."""
+"""Times over which it fades, a period at the least: what is gone before it has swung back once is a spike, which has a name."""
 
 RINGING_PIECE_S = 0.02
 """A tenth of the shortest period."""
@@ -189,7 +189,10 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
             found += _best("time", "step", own, moves, sums, _steps(low, high, _TIMES), 1.0)
     if "time since its reversal" in extent.low:
         rings: list[Form] = [
-            Ringing(float(period_s), decay_s) for decay_s in RINGING_DECAYS_S for period_s in RINGING_PERIODS_S
+            Ringing(float(period_s), decay_s)
+            for decay_s in RINGING_DECAYS_S
+            for period_s in RINGING_PERIODS_S
+            if period_s <= decay_s
         ]
         for strut in range(1, STRUTS + 1):
             sums = look.sums("time since its reversal", strut, EVERY, _since)

@@ -7,7 +7,7 @@ variable stands for all of this [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (200
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -87,15 +87,8 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
 
 def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
     """What other constants of the law would change, shape (n, q): each in a share of one, where others are one of what a formula is off by."""
-    pieces = []
-    for run in runs:
-        changes = [
-            run.reading.by_parameters(replace(effect, strut_mm=effect.strut_mm[:, :, None]))
-            for effect in source.left_open(run.motion, machine, run.values)
-            if effect.strut_mm is not None
-        ]
-        pieces.append(np.hstack([np.zeros((len(run.derivative), 0)), *changes]) / source.form_uncertainty)
-    return np.vstack(pieces)
+    changes = [run.reading.by_parameters(source.left_open(run.motion, machine, run.values)) for run in runs]
+    return np.vstack(changes) / source.form_uncertainty
 
 
 def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:

@@ -528,18 +528,13 @@ class ErrorSource(ABC):
         logged = self.by_temperature()
         return () if logged is None else (logged,)
 
-    def left_open(
-        self,
-        motion: Motion,  # noqa: ARG002
-        machine: Machine,  # noqa: ARG002
-        values: NDArray[np.float64],  # noqa: ARG002
-    ) -> tuple[Effect, ...]:
-        """Return what other constants of the law would change in the effect, each less the effect; none if nothing is said.
+    def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Return what other constants of the law would change in the effect, each less the effect: arrays with one further axis, last.
 
         For constants that are no parameters, since a recording seldom shows them, and that machines differ in: a diagnosis takes each
-        of these effects as possible in any share of up to about one.
+        of these changes as possible in any share of up to about one. Nothing if nothing is said.
         """
-        return ()
+        return Effect()
 
     @property
     def law(self) -> str:

@@ -190,10 +190,9 @@ def _of_other_laws(source: ErrorSource, parameters: Sequence[Parameter], machine
         if shared:
             return [f"its form by temperature must have parameters of other names: {', '.join(sorted(shared))}"]
     laws = [source, *source.other_laws()]
-    told = {(law.law, frozenset(p.name for p in law.parameters(machine))) for law in laws}
-    if {(law.name, law.belongs_to) for law in laws} != {(source.name, source.belongs_to)} or any(
-        len({one[k] for one in told}) < len(laws) for k in range(2)
-    ):
+    owners = {(law.name, law.belongs_to) for law in laws}
+    named, given = {law.law for law in laws}, {frozenset(p.name for p in law.parameters(machine)) for law in laws}
+    if len(owners) > 1 or min(len(named), len(given)) < len(laws):
         return ["its other laws must have the same name and owner, and each a `law` and parameters of its own"]
     faults = [(law, fault) for law in laws[1:] for fault in tried(law, machine)]
     return [

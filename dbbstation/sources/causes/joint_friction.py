@@ -104,7 +104,7 @@ class JointFriction(SourceWithHistory):
         tension = strut_tensions(struts, transverse_load(struts, values[:, None] * drag))
         return Effect(strut_mm=stretch_mm(struts, strut_compliance(machine), tension)), behind
 
-    def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> tuple[Effect, ...]:
+    def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Friction of a joint's outer axis alone, of either axis as the strut leans over, and other angles of wind-up.
 
         The two bearings of a cross are not alike, and what they carry changes with the strut's inclination. How far a joint winds up
@@ -125,10 +125,8 @@ class JointFriction(SourceWithHistory):
             outer, inner = drags(joints, other)
             parts.append(outer + inner)
         compliance = strut_compliance(machine)
-        return tuple(
-            Effect(strut_mm=stretch_mm(struts, compliance, strut_tensions(struts, transverse_load(struts, part))))
-            for part in (values[:, None] * part for part in parts)
-        )
+        tensions = [strut_tensions(struts, transverse_load(struts, values[:, None] * part)) for part in parts]
+        return Effect(strut_mm=np.stack([stretch_mm(struts, compliance, tension) for tension in tensions], axis=-1))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Stretch of all struts per friction of each joint.

@@ -6,7 +6,7 @@ Without a session the simulated machine of the tests records one into a temporar
 [CAL Table II] in both directions at 1 kHz, 2.2 million samples of which 1.7 million lie on the circles, joints off by
 0.1 mm, noise 0.5 µm. The peer is the reading of its files: bytes to circles, with checksums and cutting. The fit is
 everything from circles to parameters, covariance and residuals; the evaluation is the table of circles before and
-after. As a second peer the same fit is run sample by sample, which long runs are spared (docs/decisions/0002).
+after. As a second peer the same fit is run sample by sample, which long runs are spared (docs/decisions.md, 2).
 
 Starting times are of whole processes: `dbbstation --help`; and `dbbstation calibrate` on a small session with an empty
 folder for compiled code, so that everything is compiled, and again with what the first one left there.

@@ -56,7 +56,7 @@ def diagnose(
     *,
     hold_out: bool = True,
 ) -> Diagnosis:
-    """Find what a kinematic calibration leaves out, by the probabilities of sets of causes; see docs/decisions/0019.
+    """Find what a kinematic calibration leaves out, by the probabilities of sets of causes; see docs/decisions.md, 19.
 
     Args:
         machine: nominal machine.

@@ -46,7 +46,7 @@ ball; the table as a body with the ball on it; struts by a pull on the platform,
 
 WAYS_DEG = tuple(30.0 * k for k in range(12))
 """Where the place may be that pulls. Its height, its distance and where on the platform it pulls are not searched: the nearest
-form leaves 14 to 40 % of what joints do not conceal of a hose (rms, seven hoses of 0.7 to 2 m; docs/decisions/0020)."""
+form leaves 14 to 40 % of what joints do not conceal of a hose (rms, seven hoses of 0.7 to 2 m; docs/decisions.md, 20)."""
 
 AWAY_MM = 1000.0
 """How far it is from the Z axis: beyond the machine's frame."""

@@ -4,7 +4,7 @@ Where a reading depends on the pose and the time alone, it is as smooth along th
 sector of six degrees it and its derivatives are polynomials of degree five to parts in 1e8, given by their values at
 six nodes. The model is asked at the nodes only. With W the matrix that leads from nodes to samples, J = W Jn, and with
 W = Q R in each sector the samples' J^T J and J^T residual are those of R Jn and Q^T residual: the estimates, their
-covariance and the sum of squares are the samples' own, nothing is averaged. See docs/decisions/0002.
+covariance and the sum of squares are the samples' own, nothing is averaged. See docs/decisions.md, 2.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ KEPT = 1.01
 """A program keeps its feed while it takes no longer than this share of the time of the program that it was made from."""
 
 PLANNED_WITHIN = 0.0015
-"""Share of the time by which LinuxCNC may be slower than it is reckoned to be here: 0.0012 where it was reckoned more coarsely [docs/nc.md]."""
+"""Share of the time by which LinuxCNC may be slower than it is reckoned to be here: 0.0012 where it was reckoned more coarsely [docs/validation.md]."""
 
 STOPS = (RowKind.RAPID, *STANDS)
 """What a stretch at feed ends at: LinuxCNC stops between a rapid and a move at feed [`handleModeChange` in `src/emc/tp/tp.c`]."""

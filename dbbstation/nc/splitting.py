@@ -30,7 +30,7 @@ FIRST_CELL_MM, FIRST_CELL_DEG = 50.0, 5.0
 OF_A_PERIOD = 0.25
 """Before any is halved, cells are at most this share of the shortest period in the model: start, middle and end of a longer
 one can all lie on the zeros of a wave. On 150 lines with drawn screw errors the worst place was 2.0 µm off without this,
-0.11 µm with the whole period or half of it, 0.10 µm with a quarter or a tenth [docs/nc.md]."""
+0.11 µm with the whole period or half of it, 0.10 µm with a quarter or a tenth [docs/validation.md]."""
 
 LOOKED_AT = np.array([0.19, 0.5, 0.73, 1.0])
 """Shares of a cell at which the curve is taken: not evenly spaced, so that no wave is met at its zeros each time."""

@@ -54,7 +54,7 @@ def test_a_machine_that_did_not_change_is_not_said_to(tmp_path):
     assert sum(alarms) <= binom.isf(1e-3, len(alarms), 0.05)
 
 
-@pytest.mark.nightly  # one change at a time is in CI: test_compare.py, and by the command docs/compare.md
+@pytest.mark.nightly  # one change at a time is in CI: test_compare.py, and by the command docs/validation.md
 def test_new_play_and_weight_are_both_named(tmp_path):
     """Struts that give way under the platform, and all with new play: two causes at once, each with its size."""
     rng = np.random.default_rng(3)

@@ -31,11 +31,15 @@ DOCUMENTS = [
         for path in (HERE / "docs" / place).glob("*.md")
     ),
 ]
+MACHINE = HERE / "docs" / "shop-floor" / "1-prepare.md"
+"""Page with the machine file of the examples."""
+
 ANYTHING = "…"
 
 EXEMPT = {
     ("README.md", "dbbstation demo"): "measures thirty circles twice, a minute or two; see tests/test_demo.py",
     ("README.md", "dbbstation diagnose measured"): "the session of the demonstration, which takes a minute to record",
+    ("README.md", "dbbstation measure"): "a machine, thirty circles; see docs/getting-started.md",
     ("docs/calibration.md", "dbbstation calibrate standard-test"): "thirty circles that are in no repository",
     ("docs/currents.md", "dbbstation calibrate recorded"): "thirty circles at 50 Hz with currents, a minute to record",
     ("docs/diagnosis.md", "dbbstation diagnose measured"): "the session of the demonstration, as in the README",
@@ -52,6 +56,7 @@ EXEMPT = {
 """Commands whose output is shown and not compared, by document and beginning of the line, with the reason."""
 
 SLOW = {
+    ("README.md", "dbbstation mismatch fixtures/tables/axis.csv"),
     ("docs/compare.md", "dbbstation compare before after"),
     ("docs/diagnosis.md", "dbbstation study concealed-gravity"),
     ("docs/mismatch.md", "dbbstation mismatch fixtures/tables/axis.csv"),
@@ -164,7 +169,7 @@ def workshop(tmp_path_factory):
         (folder / name).symlink_to(shipped_folder(name))
     (folder / "docs" / "images").mkdir(parents=True)
     machine = re.search(
-        r"^```yaml\n(format: dbb-machine/1\n.*?)^```", (HERE / "README.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
+        r"^```yaml\n(format: dbb-machine/1\n.*?)^```", MACHINE.read_text("utf-8"), re.MULTILINE | re.DOTALL
     )
     assert machine
     (folder / "our-machine.yaml").write_text(machine[1], encoding="utf-8")

@@ -1,6 +1,6 @@
 """Sound sessions of the plant, and single runs of them spoilt by a known amount.
 
-`python -m tests.quality.sabotage` prints the table of docs/circles.md: how often each finding is made of runs that are spoilt by
+`python -m tests.quality.sabotage` prints the table of docs/validation.md: how often each finding is made of runs that are spoilt by
 half its limit, by its limit and by twice its limit, and how often of runs that are sound. `--equipment 3` prints the table of what goes
 wrong with balls, programs and gauges, `--strange` that of faults of other kinds, `--shared 4` of faults that all runs share, `--limits 5` the limits of sound runs, and `--drifting 1000` how often good circles on drifting days have a finding, with `--model` of
 machines with a model.

@@ -1,4 +1,4 @@
-"""Runs spoilt so that a finding comes to shares of its limit: the table of docs/circles.md."""
+"""Runs spoilt so that a finding comes to shares of its limit: the table of docs/validation.md."""
 
 from __future__ import annotations
 

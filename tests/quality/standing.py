@@ -1,6 +1,6 @@
 """In how many seconds of motion a length that sticks, or a gauge at its stop, is recognised; and how often sound turns are taken for one.
 
-`python -m tests.quality.standing` prints the table of docs/circles.md.
+`python -m tests.quality.standing` prints the table of docs/validation.md.
 """
 
 from __future__ import annotations

@@ -388,7 +388,7 @@ def print_later(folder: Path, seed: int, only: str = "") -> None:
 
 
 def print_strange(folder: Path, seed: int, only: str = "") -> None:
-    """The table of docs/circles.md: GOOD, CANNOT TELL and REPEAT of each fault."""
+    """The table of docs/validation.md: GOOD, CANNOT TELL and REPEAT of each fault."""
     words, harm = strange(folder, seed, only)
     heads = [(when, with_model) for with_model in (False, True) for when in (When.FIRST, When.LATER)]
     titles = [f"{when}{', model' if with_model else ''}" for when, with_model in heads]

@@ -71,7 +71,7 @@ def test_two_machines_tell_nothing_and_what_is_not_known_is_left_out():
 
 
 def test_false_alarms_are_no_more_than_stated():
-    """Of 100 fleets of 40 like machines with some twenty quantities each; 500 by hand, in docs/fleet.md."""
+    """Of 100 fleets of 40 like machines with some twenty quantities each; 500 by hand, in docs/validation.md."""
     one = counted(100, 0.0, 36)
     assert one.alarmed <= binom.ppf(0.999, one.draws, FALSE_ALARMS)
 

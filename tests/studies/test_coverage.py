@@ -1,4 +1,4 @@
-"""The study of stated intervals, small; its whole size is a command whose last figures stand in docs/measured.md."""
+"""The study of stated intervals, small; its whole size is a command whose last figures stand in docs/validation.md."""
 
 from __future__ import annotations
 

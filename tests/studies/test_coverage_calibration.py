@@ -1,4 +1,4 @@
-"""Coverage of calibration and prediction in little; its whole size is a command whose figures stand in docs/calibration.md."""
+"""Coverage of calibration and prediction in little; its whole size is a command whose figures stand in docs/validation.md."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from studies.coverage_calibration import CASES, coverage_of_calibration, drawn_f
 from studies.coverage_rows import LEAST, WITHIN, row_of
 
 DRAWS = 8
-"""Too few to show what the whole study does: that u lacks a part of correlated noise (docs/calibration.md)."""
+"""Too few to show what the whole study does: that u lacks a part of correlated noise (docs/validation.md)."""
 
 
 @pytest.fixture(scope="module")

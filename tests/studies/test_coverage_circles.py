@@ -1,4 +1,4 @@
-"""The study of figures of circles, small; its whole size is a command whose last figures stand in docs/circles.md."""
+"""The study of figures of circles, small; its whole size is a command whose last figures stand in docs/validation.md."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Drives in which nothing is missing, under noise that is not white.
 
-Run by hand: `pytest -m nightly tests/diagnosis/drive/test_drive_nulls.py`, some minutes; figures in docs/drive.md.
+Run by hand: `pytest -m nightly tests/diagnosis/drive/test_drive_nulls.py`, some minutes; figures in docs/validation.md.
 """
 
 from __future__ import annotations

@@ -14,9 +14,46 @@ SESSION = FIXTURES / "sessions" / "small"
 MODEL = FIXTURES / "models" / "small.yaml"
 POSES = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1000,0,0,0\n"
 SOURCES = "strut-reference-length,base-joints,backlash,reversal-spike,servo-lag,platform-joints"
+COMMANDS = [
+    ["calibrate", SESSION, "--sources", SOURCES],
+    ["predict", "--model", MODEL, "--poses", "poses.csv", "--out", "out.csv"],
+    ["diagnose", SESSION],
+]
+
+SIGNATURES = """
+import gc, sys
+from numba.core.dispatcher import Dispatcher
+from dbbstation.cli import main
+from dbbstation.prepare import prepare
+
+def signatures():
+    loops = [one for one in gc.get_objects() if isinstance(one, Dispatcher) and one.py_func.__module__.startswith("dbbstation")]
+    return {(loop.py_func.__module__, loop.py_func.__name__, *map(str, loop.signatures)) for loop in loops if loop.signatures}
+
+prepare()
+print(sorted(signatures()))
+for words in COMMANDS:
+    try:
+        main(words)
+    except SystemExit as ended:
+        assert ended.code == 0, words
+    print(sorted(signatures()))
+"""
 
 
-@pytest.mark.slow
+def test_commands_call_loops_as_preparing_called_them(tmp_path):
+    """In a process of its own, on loops that were compiled before: each has the types of arguments that it had after preparing."""
+    (tmp_path / "poses.csv").write_text(POSES)
+    words = [[str(word) for word in command] for command in COMMANDS]
+    script = SIGNATURES.replace("COMMANDS", repr(words))
+    done = subprocess.run([sys.executable, "-c", script], check=False, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    prepared, *after = [line for line in done.stdout.splitlines() if line.startswith("[(")]
+    assert prepared.count("'dbbstation.") > 5
+    assert after == [prepared] * len(COMMANDS)
+
+
+@pytest.mark.nightly  # compiles all loops anew, into a folder of its own
 def test_nothing_is_left_to_compile(tmp_path):
     cache = tmp_path / "cache"
 
@@ -29,6 +66,5 @@ def test_nothing_is_left_to_compile(tmp_path):
     compiled = run("dbbstation.prepare")
     assert len(compiled) > 5
     (tmp_path / "poses.csv").write_text(POSES)
-    assert run("dbbstation", "calibrate", SESSION, "--sources", SOURCES) == compiled
-    assert run("dbbstation", "predict", "--model", MODEL, "--poses", "poses.csv", "--out", "out.csv") == compiled
-    assert run("dbbstation", "diagnose", SESSION) == compiled
+    for command in COMMANDS:
+        assert run("dbbstation", *command) == compiled

@@ -1,10 +1,11 @@
 """Programs with bytes changed, as a bad line or a bad disk leaves them: read, or refused by name; at once either way.
 
-What LinuxCNC refuses of them must be refused here too.
+What LinuxCNC refuses of them must be refused here too. `DBBSTATION_FUZZ=5000` changes as many as that.
 """
 
 from __future__ import annotations
 
+import os
 import random
 import time
 import tracemalloc
@@ -36,7 +37,7 @@ M0
 M30
 %
 """
-MUTANTS = 1500
+MUTANTS = int(os.environ.get("DBBSTATION_FUZZ", "500"))
 AMONG = bytes(range(256)) + b"0123456789.-+GMXYZABCFIJPRN %;()\n\r\t" * 8
 
 
@@ -100,7 +101,8 @@ def test_every_mutant_is_read_or_refused_at_once_and_in_little_memory(linuxcnc):
 
 def test_accepted_mutants_are_compensated_or_refused_by_name(linuxcnc, crooked):
     written = 0
-    for data in mutants(2, 150):
+    drawn = mutants(2, MUTANTS // 4)
+    for data in drawn:
         path = read(linuxcnc, data)
         if path is None:
             continue
@@ -110,12 +112,12 @@ def test_accepted_mutants_are_compensated_or_refused_by_name(linuxcnc, crooked):
             continue
         written += 1
         assert linuxcnc.read(text, "again.ngc").is_move.any()
-    assert written > 10
+    assert written > 0.05 * len(drawn)
 
 
 @pytest.mark.slow
 @needs_rs274
 def test_mutants_that_linuxcnc_refuses_are_refused(linuxcnc, tmp_path):
-    for data in mutants(3, 600):
+    for data in mutants(3, MUTANTS // 2):
         if read(linuxcnc, data) is not None:
             assert events(data, tmp_path) is not None, data.decode()

@@ -69,7 +69,9 @@ def _of_file(path: str, tree: ast.Module) -> Iterator[Assertion]:
     for function in ast.walk(tree):
         if not isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
             continue
-        marks = of_file + "".join(text for text in map(ast.unparse, function.decorator_list) if "parametrize" not in text)
+        marks = of_file + "".join(
+            text for text in map(ast.unparse, function.decorator_list) if "parametrize" not in text
+        )
         for node in [*_cases(function), *_asserted(function)]:
             text = ast.unparse(node)
             texts = tuple(

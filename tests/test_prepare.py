@@ -46,7 +46,9 @@ def test_commands_call_loops_as_preparing_called_them(tmp_path):
     (tmp_path / "poses.csv").write_text(POSES)
     words = [[str(word) for word in command] for command in COMMANDS]
     script = SIGNATURES.replace("COMMANDS", repr(words))
-    done = subprocess.run([sys.executable, "-c", script], check=False, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(
+        [sys.executable, "-c", script], check=False, cwd=tmp_path, capture_output=True, text=True, timeout=300
+    )
     assert done.returncode == 0, done.stderr
     prepared, *after = [line for line in done.stdout.splitlines() if line.startswith("[(")]
     assert prepared.count("'dbbstation.") > 5

@@ -17,12 +17,14 @@ from scipy.sparse import diags_array
 from scipy.stats import chi2
 
 from dbbstation.inference.coloured import (
+    FEWEST_INDEPENDENT,
     Bands,
     Coloured,
     akaike_cost,
     autoregressive,
     bands_of,
     first_order,
+    largest_decay,
     with_put_back,
 )
 from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
@@ -300,13 +302,16 @@ class Bank:
         seen = share > np.log(LEAST_LEFT)
         if not seen.any():
             return level
+        found = None
         if self.measures_beside_members:
             found = autoregressive(self.noise.unwhitened(left[:, 0], stretches), stretches)
             if share.min() < np.log(HARDLY_TAKEN):
                 found = with_put_back(found, bands.frequency[seen], share[seen], len(left))
-        else:
+        if found is None or found.independent_samples(stretches) < FEWEST_INDEPENDENT:
+            # What has few independent samples is no noise: it is left to causes.
             raw = bands.log_power - share + self.noise.log_power(bands.frequency) - 2.0 * np.log(self.noise.innovation)
-            found = first_order(Bands(bands.frequency[seen], raw[seen], bands.count[seen]))
+            spectrum = Bands(bands.frequency[seen], raw[seen], bands.count[seen])
+            found = first_order(spectrum, largest_decay(len(left)), oscillates=found is not None)
         # Squares say the level best once the colour is right.
         return level if alike(found.with_innovation(level.innovation), level) else found
 

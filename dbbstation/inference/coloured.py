@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,6 +43,11 @@ DECAYS = np.concatenate([np.arange(0.1, 0.9, 0.1), 1.0 - np.geomspace(0.1, 0.005
 """Correlations of a first-order process from one row to the next that are tried: neighbours resemble each other over 200 rows at the
 most. What is alike over more is structure that a model should name."""
 
+FEWEST_INDEPENDENT = 20.0
+"""Effective number of independent samples of noise, at the least: the size of noise that has so many is known to 1 / sqrt(2 * 20), a sixth
+[standard deviation of chi-square]. What has fewer is too slow, or too much of one frequency, to be told from an effect. At 10 the size is
+known to a quarter only; at 40 noise that resembles itself over a fortieth of the rows is already an effect."""
+
 SHARES = np.geomspace(0.01, 100.0, 33)
 """Variances of a first-order process that are tried, over that of the white noise under it."""
 
@@ -72,24 +78,26 @@ class Coloured:
     Attributes:
         sigma: standard deviation of one row, in the unit of the residual.
         partial: partial autocorrelations from lag 1 on; none for white noise.
-        of_first_order: whether it is white noise on top of a first-order process, which two numbers say.
+        told_by: numbers that say how neighbours resemble each other, where these are fewer than the partial autocorrelations.
     """
 
     sigma: float
     partial: tuple[float, ...] = ()
-    of_first_order: bool = False
+    told_by: int = LONGEST
 
     @classmethod
-    def first_order(cls, sigma: float, share: float, decay: float) -> Coloured:
-        """White noise on top of a first-order process.
+    def first_order(cls, sigma: float, share: float, decay: float, turn_rad: float = 0.0) -> Coloured:
+        """White noise on top of a first-order process, or of one that oscillates as it dies away.
 
         Args:
             sigma: standard deviation of one row.
             share: part of the variance that belongs to the process, from 0 to 1.
-            decay: correlation of that from one row to the next.
+            decay: correlation of that from one row to the next; of one that oscillates, of its envelope.
+            turn_rad: phase of the oscillation from one row to the next [rad].
         """
         lags = np.arange(LONGEST + 1)
-        return cls(sigma, partial_autocorrelations(np.where(lags == 0, 1.0, share * decay**lags)), of_first_order=True)
+        correlation = np.where(lags == 0, 1.0, share * decay**lags * np.cos(turn_rad * lags))
+        return cls(sigma, partial_autocorrelations(correlation), 3 if turn_rad else 2)
 
     @property
     def is_white(self) -> bool:
@@ -104,7 +112,7 @@ class Coloured:
     @property
     def parameters(self) -> int:
         """Numbers that say how neighbours resemble each other."""
-        return min(self.order, 2) if self.of_first_order else self.order
+        return min(self.order, self.told_by)
 
     @property
     def correlation_samples(self) -> float:
@@ -146,6 +154,26 @@ class Coloured:
         phase = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(taps))))
         gain = np.abs(phase @ taps) ** 2
         return np.asarray(2.0 * np.log(self.innovation) - np.log(gain), dtype=np.float64)
+
+    def independent_samples(self, stretches: Sequence[slice]) -> float:
+        """Effective number of independent samples that squares of rows of this noise make up, summed over stretches.
+
+        n / (1 + 2 sum of rho(k)²) = n mean(S)² / mean(S²), S being the spectrum averaged over 1 / n, since n rows show no more of it
+        [Bartlett, J. R. Stat. Soc. 98 (1935) 536; Priestley 1981, sec. 5.3.2]. Slow noise has few, and so has noise of one frequency.
+        Rows count as equally spaced.
+
+        Args:
+            stretches: rows that follow one another without a gap.
+        """
+        power = np.exp(
+            self.log_power((np.arange(FREQUENCIES) + 0.5) / (2.0 * FREQUENCIES)) - 2.0 * np.log(self.innovation)
+        )
+        total = 0.0
+        for count in (stretch.stop - stretch.start for stretch in stretches):
+            together = min(2 ** max(int(np.log2(2.0 * FREQUENCIES / count)), 0), FREQUENCIES)
+            averaged = power.reshape(-1, together).mean(axis=1)
+            total += count * float(averaged.mean() ** 2 / np.mean(averaged**2))
+        return total
 
     def whitening(self, stretches: Sequence[slice]) -> csr_array | None:
         """Matrix that makes noise of rows white with the standard deviation `innovation`; None where it is white.
@@ -304,14 +332,20 @@ def autoregressive(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Col
     return Coloured(float(np.sqrt(power)), tuple(partials[:kept]))
 
 
-def first_order(bands: Bands) -> Coloured:
+def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) -> Coloured:
     """White noise on top of a first-order process whose spectrum is nearest to bands; white where nothing more is worth it.
 
-    Its autocovariance is a for lag 0 and b phi^|k| on top of it for every lag; its spectrum
-    a + b (1 - phi²) / |1 - phi exp(-i w)|² [Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12]. With two parameters it
-    cannot follow lines that are waves nobody has found yet.
+    Its autocovariance is a for lag 0 and b phi^|k| cos(k t) on top of it for every lag; its spectrum
+    a + b / 2 times the sum over w + t and w - t of (1 - phi²) / |1 - phi exp(-i w)|² [Priestley, Spectral Analysis and Time Series,
+    1981, sec. 4.12]. With two parameters (t = 0), or three, it cannot follow lines that are waves nobody has found yet.
+
+    Args:
+        bands: spectrum.
+        most: largest phi.
+        oscillates: try phases t from row to row, too: those of the bands.
     """
     weight = bands.count / LOG_VARIANCE
+    worth = float(np.log(bands.count.sum()))
 
     def distance(shape: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         away = bands.log_power - np.log(shape)
@@ -319,17 +353,29 @@ def first_order(bands: Bands) -> Coloured:
         return np.square(away - level[..., None]) @ weight, level
 
     flat, level = distance(np.ones(len(bands.count)))
-    best, found = float(flat) - 2.0 * float(np.log(bands.count.sum())), Coloured(float(np.exp(0.5 * level)))
-    turned = 2.0 * np.cos(2.0 * np.pi * bands.frequency)
-    for decay in DECAYS:
-        process = (1.0 - decay**2) / (1.0 + decay**2 - decay * turned)
+    best, found = float(flat) - 2.0 * worth, Coloured(float(np.exp(0.5 * level)))
+    angle = 2.0 * np.pi * bands.frequency
+    turns = [0.0, *angle] if oscillates else [0.0]
+    for decay, turn in product(DECAYS[most >= DECAYS], turns):
+        away = np.stack([angle - turn, angle + turn])
+        process = np.mean((1.0 - decay**2) / (1.0 + decay**2 - 2.0 * decay * np.cos(away)), axis=0)
         squares, levels = distance(1.0 + SHARES[:, None] * process)
         k = int(squares.argmin())
-        if squares[k] < best:
-            best = float(squares[k])
+        cost = float(squares[k]) + (worth if turn else 0.0)
+        if cost < best:
+            best = cost
             sigma = float(np.exp(0.5 * levels[k]) * np.sqrt(1.0 + SHARES[k]))
-            found = Coloured.first_order(sigma, float(SHARES[k] / (1.0 + SHARES[k])), float(decay))
+            found = Coloured.first_order(sigma, float(SHARES[k] / (1.0 + SHARES[k])), float(decay), float(turn))
     return found
+
+
+def largest_decay(rows: int) -> float:
+    """Correlation of neighbours of first-order noise of which so many rows hold `FEWEST_INDEPENDENT` independent samples.
+
+    These are n (1 - phi²) / (1 + phi²); zero where there are no more rows than that: such noise is white.
+    """
+    ratio = max(rows / FEWEST_INDEPENDENT, 1.0)
+    return float(np.sqrt((ratio - 1.0) / (ratio + 1.0)))
 
 
 def akaike_cost(parameters: int, rows: int) -> float:

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 FOLDS = 10
-"""Stretches of rows that are held back in turn, where there are not enough blocks."""
+"""Parts that are held back in turn, at the most; as many where there are fewer than `ENOUGH_BLOCKS` blocks."""
 
 ENOUGH_BLOCKS = 5
-"""Blocks from which on whole blocks are held back."""
+"""Blocks from which on there are no more parts than blocks, so that blocks of like size are held back whole."""
 
 WIDEST_GAP = 0.5
 """Gap beside a part at the most, as a share of its rows: where neighbours resemble each other for longer, four fifths of the rows are
@@ -100,7 +100,8 @@ class HeldOutError:
 
     def gains_of(self, kinds: Collection[Kind]) -> Gains:
         """What effects of some kinds brought together in each part; nothing where none of them was chosen."""
-        return Gains(tuple(sum(fold.gains.get(kind, 0.0) for kind in set(kinds)) for fold in self.folds))
+        parts = tuple(sum(fold.gains.get(kind, 0.0) for kind in set(kinds)) for fold in self.folds)
+        return Gains(parts, tuple(fold.rows for fold in self.folds))
 
     def _all(self, errors: list[float]) -> float:
         counts = np.array([fold.rows for fold in self.folds], dtype=np.float64)
@@ -115,7 +116,7 @@ def held_out_error(
     alike: float = 1.0,
     reference: Callable[[NDArray[np.bool_]], NDArray[np.float64]] | None = None,
 ) -> HeldOutError:
-    """Hold back parts in turn: blocks where there are five or more, else ten stretches of consecutive rows.
+    """Hold back parts in turn [`part_numbers`]: blocks, pieces of long ones, and short ones together.
 
     Beside a stretch the rows that resemble it are held back from the choice, too: they know it. The reference may know them.
 
@@ -171,19 +172,36 @@ def beside(channel: Channel, rows: NDArray[np.bool_], alike: float) -> NDArray[n
 
 def parts_of(channel: Channel) -> list[tuple[str, NDArray[np.bool_]]]:
     """Parts that are held back, with a name each: rows, shape (n,)."""
-    number = np.zeros(len(channel.residual), dtype=np.int64)
-    if len(channel.blocks) >= ENOUGH_BLOCKS:
-        # More blocks than folds: neighbours go together.
-        for k, rows in enumerate(channel.blocks):
-            number[rows] = k * min(FOLDS, len(channel.blocks)) // len(channel.blocks)
-    else:
-        number = np.arange(len(number)) * FOLDS // len(number)
+    number = part_numbers([block.stop - block.start for block in channel.blocks])
     found = []
     for k in range(int(number.max()) + 1):
         rows = number == k
         ends = np.flatnonzero(rows)
         found.append((f"rows {ends[0] + 1} to {ends[-1] + 1}", rows))
     return found
+
+
+def part_numbers(lengths: Sequence[int]) -> NDArray[np.int64]:
+    """Part that each row of blocks of these lengths belongs to, parts being of like size and as whole as blocks are, shape (n,).
+
+    A block as long as two parts or nearly so is split evenly; neighbours that are shortest together are joined until there are `FOLDS` parts
+    at most, each of half an even share or more.
+    """
+    share = sum(lengths) / (min(FOLDS, len(lengths)) if len(lengths) >= ENOUGH_BLOCKS else FOLDS)
+    sizes: list[int] = []
+    for length in lengths:
+        pieces = max(min(round(length / share), length), 1)
+        sizes += np.diff(np.arange(pieces + 1) * length // pieces).tolist()
+    while len(sizes) > 1 and (len(sizes) > FOLDS or min(sizes) < 0.5 * share):
+        short = range(len(sizes) - 1) if len(sizes) > FOLDS else _beside(int(np.argmin(sizes)), len(sizes))
+        k = min(short, key=lambda k: sizes[k] + sizes[k + 1])
+        sizes[k : k + 2] = [sizes[k] + sizes[k + 1]]
+    return np.repeat(np.arange(len(sizes)), sizes)
+
+
+def _beside(k: int, count: int) -> list[int]:
+    """First of each pair of neighbours, of so many, that has this one."""
+    return [first for first in (k - 1, k) if 0 <= first < count - 1]
 
 
 def _rms(values: NDArray[np.float64]) -> float:

@@ -31,7 +31,7 @@ ABSENT = 1.0 - SURE
 named cause, so what the recording makes more probable than it was is never ruled out."""
 
 PARTS_WITH_GAIN = 0.7
-"""Share of the held-out parts in which an effect must bring something. An effect that brings nothing gains by chance in half of them:
+"""Share of the held-out parts, by rows, in which an effect must bring something. An effect that brings nothing gains by chance in half of them:
 in seven of ten or more once in six times, and then still has to gain in sum without its best part."""
 
 SEEN_WORSE = 1e-3
@@ -68,9 +68,11 @@ class Gains:
     Attributes:
         parts: sum of squares of the errors of prediction of a part without the effect, what else was chosen refitted, less that with it,
             in the squared unit of what is predicted. Zero where the effect was not chosen.
+        rows: of each part; none where all have as many.
     """
 
     parts: tuple[float, ...]
+    rows: tuple[int, ...] = ()
 
     @property
     def total(self) -> float:
@@ -83,6 +85,12 @@ class Gains:
         return sum(part > 0.0 for part in self.parts)
 
     @property
+    def share_with_gain(self) -> float:
+        """Share of the rows that are in such parts."""
+        rows = self.rows or (1,) * len(self.parts)
+        return sum(count for part, count in zip(self.parts, rows, strict=True) if part > 0.0) / max(sum(rows), 1)
+
+    @property
     def without_best(self) -> float:
         """Over all parts but the best."""
         return self.total - max(self.parts, default=0.0)
@@ -90,7 +98,7 @@ class Gains:
     @property
     def predicts(self) -> bool:
         """Whether it brought something in enough parts, and in sum without the best part."""
-        return bool(self.parts) and self.with_gain >= PARTS_WITH_GAIN * len(self.parts) and self.without_best > 0.0
+        return self.share_with_gain >= PARTS_WITH_GAIN and self.without_best > 0.0
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,15 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import norm, t
 
-from dbbstation.inference.coloured import Coloured, autoregressive, bands_of, first_order, with_put_back
+from dbbstation.inference.coloured import (
+    FEWEST_INDEPENDENT,
+    Coloured,
+    autoregressive,
+    bands_of,
+    first_order,
+    largest_decay,
+    with_put_back,
+)
 from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance
 
 RADIUS, TURN = 0.9, 2.0 * np.pi / 12.0
@@ -108,3 +116,69 @@ def test_short_runs_have_a_spectrum_too():
     # Correlations are tried in steps of a tenth: 0.7 counts as one in 5.7, 0.9 as one in 19.
     assert first_order(bands).correlation_samples == pytest.approx(9.0, rel=1.0 / 3.0)
     assert bands_of(rows[:150], [slice(15 * k, 15 * k + 15) for k in range(10)]) is None
+
+
+def one(rows):
+    return [slice(0, rows)]
+
+
+def test_white_noise_has_as_many_independent_samples_as_rows():
+    assert Coloured(2.0).independent_samples(one(600)) == pytest.approx(600.0)
+    assert Coloured(2.0).independent_samples([slice(0, 250), slice(250, 600)]) == pytest.approx(600.0)
+
+
+@pytest.mark.parametrize("rows", [100, 600, 3001])
+@pytest.mark.parametrize(
+    ("share", "decay", "turn"), [(1.0, 0.5, 0.0), (1.0, 0.9, 0.0), (0.7, 0.95, 0.0), (1.0, 0.9, 0.6)]
+)
+def test_independent_samples_are_those_of_the_autocorrelation(rows, share, decay, turn):
+    """n / (1 + 2 sum of rho(k)²) with rho(k) = share decay^k cos(k turn); of a first-order process n (1 - r²) / (1 + r²)."""
+    lags = np.arange(1, 2000)
+    correlation = share * decay**lags * np.cos(turn * lags)
+    expected = rows / (1.0 + 2.0 * np.sum(correlation**2))
+    noise = Coloured.first_order(3.0, share, decay, turn)
+    # Of few rows the spectrum is coarse.
+    assert noise.independent_samples(one(rows)) == pytest.approx(expected, rel=0.01 if rows > 500 else 0.05)
+    if share == 1.0 and not turn:
+        assert expected == pytest.approx(rows * (1.0 - decay**2) / (1.0 + decay**2))
+
+
+def test_runs_apart_have_the_independent_samples_of_each():
+    """A process that is alike over ten runs has one sample of its square in each of them, or a little more."""
+    noise = Coloured.first_order(1.0, 1.0, 0.995)
+    alone = noise.independent_samples(one(40))
+    assert 1.0 < alone < 3.0
+    assert noise.independent_samples([slice(40 * k, 40 * k + 40) for k in range(10)]) == pytest.approx(10.0 * alone)
+
+
+def test_a_narrow_line_has_few_independent_samples():
+    """Almost a wave: its phase is its own for a thousand rows, and 500 rows are one sample of it."""
+    narrow = Coloured.first_order(1.0, 1.0, 0.999, 0.8)
+    assert narrow.independent_samples(one(500)) < FEWEST_INDEPENDENT / 4.0
+
+
+@pytest.mark.parametrize("rows", [40, 100, 1000, 3000])
+def test_noise_as_slow_as_it_may_be_has_as_many_independent_samples_as_it_must(rows):
+    slowest = Coloured.first_order(1.0, 1.0, largest_decay(rows))
+    assert slowest.independent_samples(one(rows)) == pytest.approx(FEWEST_INDEPENDENT, rel=0.01)
+
+
+def test_few_rows_are_white():
+    assert largest_decay(20) == largest_decay(5) == 0.0
+
+
+def test_a_bounded_process_that_oscillates_is_found_with_its_phase(rng):
+    """Real part of z(k) = r exp(i t) z(k - 1) + e(k), whose autocorrelation is r^k cos(k t), with white noise on top."""
+    decay, turn = 0.93, 0.9
+    pushes = rng.standard_normal((2, 4500))
+    rows = lfilter([1.0], [1.0, -decay * np.exp(1j * turn)], pushes[0] + 1j * pushes[1])[500:].real
+    rows = rows / np.std(rows) + rng.standard_normal(4000)
+    bands = bands_of(rows, one(4000))
+    found = first_order(bands, 0.95, oscillates=True)
+    frequency = np.linspace(0.02, 0.48, 24)
+    apart = 2.0 * np.pi * frequency - np.array([[turn], [-turn]])
+    power = 1.0 + np.mean((1.0 - decay**2) / (1.0 + decay**2 - 2.0 * decay * np.cos(apart)), axis=0)
+    assert found.parameters == 3
+    assert found.log_power(frequency) == pytest.approx(np.log(power), abs=0.6)
+    flat = first_order(bands, 0.95)
+    assert np.abs(flat.log_power(frequency) - np.log(power)).max() > 1.0

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from dbbstation.inference.folds import Fold, HeldOutError, held_out_error, parts_of
+from dbbstation.inference.folds import Fold, HeldOutError, held_out_error, part_numbers, parts_of
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
@@ -43,7 +44,7 @@ def test_gains_are_what_a_refit_without_an_effect_loses(both):
             without = squares(data.residual, [c for k, own in columns.items() if k != kind for c in own], rows)
             assert gain == pytest.approx(without - with_all, rel=0.1, abs=0.02 * without)
     assert error.gains_of([("hysteresis of q",)]).predicts
-    assert error.gains_of([("hysteresis of load",)]) == Gains((0.0,) * 10)
+    assert error.gains_of([("hysteresis of load",)]) == Gains((0.0,) * 10, (60,) * 10)
     each = [error.gains_of([kind]).total for kind in columns]
     assert error.gains_of(list(columns)).total == pytest.approx(sum(each))
 
@@ -70,6 +71,56 @@ def test_neighbours_that_resemble_a_part_are_not_chosen_from(both, alike, gap):
     for k, rows in enumerate(seen):
         assert (rows[0], rows[-1]) == (max(60 * k - gap, 0), min(60 * k + 59 + gap, 599))
         assert len(rows) == rows[-1] - rows[0] + 1
+
+
+def sizes_of(lengths):
+    number = part_numbers(lengths)
+    assert len(number) == sum(lengths)
+    assert (np.diff(number) >= 0).all()
+    return np.bincount(number).tolist()
+
+
+@pytest.mark.parametrize(
+    ("lengths", "sizes"),
+    [
+        ([1000], [100] * 10),
+        ([300, 700], [100] * 10),
+        ([100] * 6, [100] * 6),
+        ([100] * 20, [200] * 10),
+        # One of eleven has 88 % of the rows: nine pieces of it, and the others together.
+        ([880, *[12] * 10], [97, 98, 98, 98, 97, 98, 98, 98, 98, 120]),
+        # One of five, a fifth of the rows being a part: short ones at the ends, under half of that, join their neighbours.
+        ([15, 14, 340, 16, 15], [114, 85, 85, 116]),
+        ([25, 25, 300, 25, 25], [50, 75, 75, 75, 75, 50]),
+        ([3], [1, 1, 1]),
+    ],
+)
+def test_parts_are_of_like_size(lengths, sizes):
+    assert sizes_of(lengths) == sizes
+
+
+def test_no_part_is_far_from_an_even_share(rng):
+    """Whatever blocks there are: between a third and 2.5 of the mean, ten at most, and no short block is cut."""
+    for _ in range(200):
+        lengths = np.ceil(np.exp(rng.uniform(0.0, 7.0, rng.integers(1, 40)))).astype(int).tolist()
+        if sum(lengths) < 200:
+            continue
+        sizes = sizes_of(lengths)
+        assert 2 <= len(sizes) <= 10
+        assert max(sizes) <= 2.5 * np.mean(sizes)
+        assert min(sizes) >= np.mean(sizes) / 3.0
+        number, ends = part_numbers(lengths), np.cumsum([0, *lengths])
+        for first, last in pairwise(ends):
+            if last - first < 1.5 * sum(lengths) / 10:
+                assert number[first] == number[last - 1]
+
+
+def test_what_counts_parts_weighs_their_rows():
+    """Six short parts of ten gain, and one long one: 70 % of the parts, 40 % of the rows."""
+    gains = Gains((1.0,) * 7 + (-0.1,) * 3, (10,) * 6 + (40,) + (50,) * 3)
+    assert gains.share_with_gain == pytest.approx(0.4)
+    assert not gains.predicts
+    assert Gains(gains.parts).predicts
 
 
 def test_whole_blocks_have_no_gap(both):

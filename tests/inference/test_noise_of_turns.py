@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from dbbstation.inference.harmonics import misfit
 from dbbstation.inference.noise import noise_of_turns
 
 TURNS, LEVEL = 40, 0.5
@@ -51,3 +52,14 @@ def test_few_samples_and_none_left_are_white(rng):
     assert noise_of_turns(turns(rng, 30, 0.6), 0.0).correlation_samples == 1.0
     found = noise_of_turns([np.zeros(100)], 0.0)
     assert (found.sigma, found.correlation_samples) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("harmonic", range(2, 31))
+def test_a_wave_that_a_model_reaches_is_never_noise(rng, harmonic):
+    """Four times the noise, the same in all turns: the noise is read above harmonic 30, and the wave is beyond it."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
+    left = [one + 4.0 * LEVEL * np.sqrt(2.0) * np.cos(harmonic * angle + 0.3) for one in turns(rng, 720, 0.0)]
+    found = misfit(left, [angle] * TURNS, range(TURNS), 0.0)
+    assert found.noise == pytest.approx(LEVEL, rel=0.1)
+    assert found.probability < 1e-9
+    assert found.rms == pytest.approx(4.0 * LEVEL, rel=0.05)

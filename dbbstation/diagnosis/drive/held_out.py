@@ -82,7 +82,8 @@ def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> DriveHeldO
             others = [m for m in chosen if source_of(drive, settled.bank.patterns, m.cause.name) != source]
             brought[source][number] = error(others) - whole
     count = len(channel.residual)
-    gains = {source: Gains(tuple(each)) for source, each in brought.items() if any(each)}
+    lengths = tuple(int(rows.sum()) for _, rows in parts)
+    gains = {source: Gains(tuple(each), lengths) for source, each in brought.items() if any(each)}
     return DriveHeldOut(gains, len(parts), float(np.sqrt(reference / count)), float(np.sqrt(corrected / count)))
 
 

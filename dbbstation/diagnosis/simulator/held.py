@@ -17,7 +17,7 @@ from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
 from dbbstation.diagnosis.simulator.work import rms
 from dbbstation.diagnosis.table.mismatch import FOLD_ROWS
-from dbbstation.inference.folds import ENOUGH_BLOCKS, FOLDS, Fold, HeldOutError, beside
+from dbbstation.inference.folds import Fold, HeldOutError, beside, part_numbers
 from dbbstation.inference.verdict import DensityGains
 
 if TYPE_CHECKING:
@@ -38,33 +38,27 @@ class PredictedPartsError(HeldOutError):
 
     def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
         """What terms brought together in each part; nothing where none of them was chosen."""
-        return DensityGains(tuple(sum(fold.gains.get(kind, 0.0) for kind in set(kinds)) for fold in self.folds))
+        gains = super().gains_of(kinds)
+        return DensityGains(gains.parts, gains.rows)
 
 
 def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Parts that are held back: whole runs where there are five or more, else ten stretches of time, all outputs together."""
+    """Parts that are held back [`part_numbers` of the runs], all outputs together."""
     runs, outputs = work.model.runs, len(work.model.outputs)
-    blocks = [work.blocks[k * outputs : (k + 1) * outputs] for k in range(len(runs))]
+    number = part_numbers([len(run) for run in runs])
+    of_run = np.split(number, np.cumsum([len(run) for run in runs])[:-1])
     found = []
-    if len(runs) >= ENOUGH_BLOCKS:
-        number = [k * min(FOLDS, len(runs)) // len(runs) for k in range(len(runs))]
-        for part in range(max(number) + 1):
-            rows = np.zeros(work.size, dtype=bool)
-            inside = [k for k in range(len(runs)) if number[k] == part]
-            for block in (block for k in inside for block in blocks[k]):
-                rows[block] = True
-            found.append((", ".join(runs[k].name for k in inside), rows))
-        return found
-    ends = np.cumsum([0, *(len(run) for run in runs)])
-    for part in range(FOLDS):
-        first, last = (round(share * ends[-1] / FOLDS) for share in (part, part + 1))
+    for part in range(int(number.max()) + 1):
         rows, said = np.zeros(work.size, dtype=bool), []
-        for k, run in enumerate(runs):
-            a, b = np.clip([first - ends[k], last - ends[k]], 0, len(run)).tolist()
-            if b > a:
-                said.append(f"{run.name} from {run.inputs['t'][a]:.4g} to {run.inputs['t'][b - 1]:.4g} s")
-            for block in blocks[k]:
-                rows[block.start + a : block.start + b] = True
+        for k, (run, own) in enumerate(zip(runs, of_run, strict=True)):
+            inside = np.flatnonzero(own == part)
+            if not len(inside):
+                continue
+            ends = run.inputs["t"][inside[[0, -1]]]
+            whole = len(inside) == len(own)
+            said.append(run.name if whole else f"{run.name} from {ends[0]:.4g} to {ends[1]:.4g} s")
+            for block in work.blocks[k * outputs : (k + 1) * outputs]:
+                rows[block.start + inside] = True
         found.append((", ".join(said), rows))
     return found
 

@@ -1,10 +1,11 @@
-"""Pages that are written from the code at every build: one per command, one per package."""
+"""Pages that are written at every build: one per command, one per package, and the stored results of studies."""
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
 import inspect
+import json
 import pkgutil
 import re
 from typing import TYPE_CHECKING
@@ -46,6 +47,7 @@ def write_pages(folder: Path) -> None:
     """Write all generated pages anew, touching only those that have changed."""
     pages = {f"commands/{name}.md": text for name, text in _commands()}
     pages |= {f"api/{name}.rst": text for name, text in _packages()}
+    pages |= {f"validation/{name}.inc": text for name, text in results(folder.parent / "validation")}
     pages["sources.md"] = _sources()
     pages["drive-sources.md"] = _drive_sources()
     for name, text in pages.items():
@@ -53,9 +55,23 @@ def write_pages(folder: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
-    for path in [*folder.rglob("*.md"), *folder.rglob("*.rst")]:
+    for path in [*folder.rglob("*.md"), *folder.rglob("*.rst"), *folder.rglob("*.inc")]:
         if str(path.relative_to(folder)) not in pages:
             path.unlink()
+
+
+def results(folder: Path) -> Iterator[tuple[str, str]]:
+    """Yield name and Markdown of every stored result: question, data, figures, limits, and the command that made them."""
+    for path in sorted(folder.glob("*.json")):
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        head = ["", *kept["columns"]]
+        rows = [head, ["---"] * len(head), *([label, *cells] for label, cells in kept["figures"].items())]
+        table = [f"| {' | '.join(map(str, row))} |" for row in rows]
+        origin = [f"{word} {kept[word]}" for word in ("seed", "commit") if word in kept]
+        ending = " ".join(
+            [*filter(None, [kept.get("limits")]), f"`{kept['command']}`,", ", ".join([*origin, kept["date"]])]
+        )
+        yield path.stem, "\n".join([f"**{kept['question']}** {kept['data']}", "", *table, "", f"{ending}.", ""])
 
 
 def escaped(line: str) -> str:

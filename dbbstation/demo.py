@@ -6,10 +6,11 @@ jig plate, calibrated, diagnosed; compensated programs are written, run on it an
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ from dbbstation.errors import StationError
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
+from dbbstation.files.formats.plan import plan_text, read_inline_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
@@ -37,8 +39,11 @@ from dbbstation.sources.registry import known_sources
 from dbbstation.virtual.truth import random_kinematics
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Collection, Iterator
     from pathlib import Path
+
+    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.tasks.telling import Progress
 
 INSTRUMENT = "streaming-encoder"
 SPEED = ["--time-scale", "160", "--rate-hz", "20"]
@@ -47,7 +52,13 @@ SPEED = ["--time-scale", "160", "--rate-hz", "20"]
 COMPLIANCE_UM_KN = 9.68
 """Strut compliance with which the reference machine's circles bend as [GRAV Table 4] reports."""
 
+QUICK = ("a", "h", "n")
+"""Tests of a quick demonstration: one at each height, two of them tilted."""
+
 PATIENCE_S = 60.0
+
+_CIRCLE = re.compile(r"(\d+) of (\d+): (test .*)")
+"""What `measure` says when a circle begins."""
 
 SETTINGS = """# The shop's settings of this demonstration: what its circles have to keep.
 format: dbb-settings/2
@@ -62,8 +73,8 @@ def run_demo(
     folder: Path,
     seed: int,
     tell: Callable[[str], None],
-    progress: Callable[[str], None],
-    plan_file: Path | None = None,
+    progress: Progress,
+    tests: Collection[str] | None = None,
 ) -> DemoResult:
     """Do the whole job into a folder.
 
@@ -71,18 +82,20 @@ def run_demo(
         folder: made anew.
         seed: of the virtual machine's errors.
         tell: told each command before it runs.
-        progress: told how far a measurement is; each text replaces the one before.
-        plan_file: of the circles, of which the reference machine's travel has room; None for the fifteen of [CAL Table II].
+        progress: told each circle as it begins, and how many of how many are done.
+        tests: names of those that are measured; None: all fifteen of [CAL Table II].
 
     Raises:
         StationError: a step failed; what the steps before it wrote stays.
     """
     folder.mkdir(parents=True)
     machine_file = shipped_folder("fixtures") / "machines" / "reference.yaml"
-    plan_file = plan_file or shipped_folder("protocols") / "plans" / "table2.yaml"
+    plan_file = shipped_folder("protocols") / "plans" / "table2.yaml"
+    if tests is not None:
+        plan_file = _write_plan(folder / "plan.yaml", read_inline_plan(plan_file), tests)
     _write_truth(folder / "truth.yaml", machine_file, seed)
     write_text(folder / "dbbstation-settings.yaml", SETTINGS)
-    job = _Job(folder, ["--plan", str(plan_file), "--machine", str(machine_file)], tell, progress)
+    job = _Job(folder, ["--plan", str(plan_file.resolve()), "--machine", str(machine_file)], tell, progress)
     # One virtual machine for both measurements: balls and bar stay, every holder is put up anew. It reads programs
     # when they are started, so that their folder may still be empty.
     (folder / "programs").mkdir()
@@ -117,6 +130,13 @@ def _write_truth(path: Path, machine_file: Path, seed: int) -> None:
     write_model(path, IdentifiedModel(MachineModel(machine, fitted), rows, exact))
 
 
+def _write_plan(path: Path, whole: InlinePlan, names: Collection[str]) -> Path:
+    """Write a plan of some of the tests of another one."""
+    tests = tuple(test for test in whole.plan.tests if test.name in names)
+    write_text(path, plan_text(replace(whole, plan=whole.plan.model_copy(update={"tests": tests}))))
+    return path
+
+
 @dataclass(frozen=True)
 class _Place:
     """Port of the virtual instrument, and control address of the virtual machine."""
@@ -132,7 +152,7 @@ class _Job:
     folder: Path
     what: list[str]
     tell: Callable[[str], None]
-    progress: Callable[[str], None]
+    progress: Progress
 
     def answer(self, arguments: list[str]) -> str:
         """Run a command and return what it printed as JSON."""
@@ -160,8 +180,8 @@ class _Job:
             said = []
             for text in process.stderr or ():
                 said.append(text.rstrip())
-                if " of " in text and ": test " in text:
-                    self.progress(text.strip())
+                if begins := _CIRCLE.fullmatch(text.strip()):
+                    self.progress(begins[3], int(begins[1]) - 1, int(begins[2]))
         if process.returncode != 0:
             raise StationError("\n".join(said[-5:]), where="dbbstation measure")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import sys
 import threading
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -200,10 +199,10 @@ def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> 
     from dbbstation.cli.output import print_result
     from dbbstation.station.autopilot import Autopilot
 
-    station, summary = workplace.station, Summary()
+    station, summary, talk = workplace.station, Summary(), Talk(asking=hands is None)
     station.subscribe(summary)
     station.subscribe(Log())
-    station.subscribe(Talk(asking=hands is None, terminal=sys.stderr.isatty()))
+    station.subscribe(talk)
     if hands is not None:
         station.subscribe(Autopilot(station.send, hands))
     else:
@@ -214,6 +213,7 @@ def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> 
         with _interruptible(station) as interrupted:
             station.run()
     finally:
+        talk.end()
         workplace.close()
         if as_json:
             print_result(summary.of(workplace))

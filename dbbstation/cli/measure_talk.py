@@ -8,6 +8,7 @@ import threading
 from typing import TYPE_CHECKING, TextIO
 
 from dbbstation.cli.output import echo, log_said
+from dbbstation.cli.progress import COUNTED, Bar
 from dbbstation.results.findings import finding_results
 from dbbstation.results.measured import CompletedRun, MeasuredSession, RecordedRun
 from dbbstation.service.shop_temperature import shop_degc
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
     from dbbstation.station.commands import Command
 
 _LOG = logging.getLogger(__name__)
-
-_BAR_WIDTH = 40
-_QUARTERS = 4
 
 _OF_MACHINE, _OF_SET_UP = "centre", "set-up"
 """Under the spindle the centre of a circle shows how the balls were put up, and nothing of the machine."""
@@ -60,14 +58,11 @@ class Talk:
 
     Args:
         asking: somebody answers, so say what can be answered.
-        terminal: draw a bar that is overwritten, instead of a line per quarter.
     """
 
-    def __init__(self, *, asking: bool, terminal: bool) -> None:
+    def __init__(self, *, asking: bool) -> None:
         self._asking = asking
-        self._terminal = terminal
-        self._quarter = 0
-        self._drawn = False
+        self._bar = Bar("  recording", COUNTED, unit="°", passing=True)
         self._wrong = False
         self._centre = _OF_MACHINE
 
@@ -76,34 +71,22 @@ class Talk:
         if isinstance(event, events.RunAnnounced):
             self._centre = _OF_MACHINE if event.ball.place_known else _OF_SET_UP
         if isinstance(event, events.RunProgress):
-            self._progress(event)
+            self._bar.show(min(event.swept_deg, event.of_deg), event.of_deg, at_once=False)
             return
-        for line in _lines(event, self._centre):
-            self._say(line)
+        lines = _lines(event, self._centre)
+        if lines:
+            self._bar.end()
+        for line in lines:
+            echo(line, err=True)
         if isinstance(event, events.RunCompleted):
             self._wrong = bool(event.wrong)
         if self._asking and isinstance(event, events.StateChanged) and event.state in _ASKED:
             doubtful = self._wrong and event.state is State.COMPLETE
-            self._say(f"  {_ASKED_OF_WRONG if doubtful else _ASKED[event.state]}")
+            echo(f"  {_ASKED_OF_WRONG if doubtful else _ASKED[event.state]}", err=True)
 
-    def _progress(self, event: events.RunProgress) -> None:
-        share = min(event.swept_deg / event.of_deg, 1.0)
-        if self._terminal:
-            done = round(share * _BAR_WIDTH)
-            text = f"\r  [{'#' * done}{'-' * (_BAR_WIDTH - done)}] {event.swept_deg:4.0f} of {event.of_deg:.0f}°"
-            echo(text, err=True, nl=False)
-            self._drawn = True
-            return
-        quarter = int(share * _QUARTERS)
-        if quarter > self._quarter:
-            echo(f"  {event.run.label}: {event.swept_deg:.0f} of {event.of_deg:.0f}°", err=True)
-        self._quarter = quarter
-
-    def _say(self, line: str) -> None:
-        if self._drawn:
-            echo(err=True)
-            self._drawn = False
-        echo(line, err=True)
+    def end(self) -> None:
+        """Take the bar away, whatever ended the measurement."""
+        self._bar.end()
 
 
 class Log:

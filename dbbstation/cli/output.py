@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import sys
 from typing import TYPE_CHECKING
 
 import click
@@ -33,7 +34,9 @@ def echo(text: object = "", *, err: bool = False, nl: bool = True) -> None:
         err: on standard error.
         nl: end it with a line end.
     """
-    click.echo(printable(str(text)), err=err, nl=nl)
+    # While a bar is drawn Rich stands in for standard error and puts lines above the bar; Click would look through it.
+    above = sys.stderr if err and hasattr(sys.stderr, "rich_proxied_file") else None
+    click.echo(printable(str(text)), above, err=err, nl=nl)
 
 
 def print_json(data: Mapping[str, object]) -> None:

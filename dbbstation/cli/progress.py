@@ -1,21 +1,26 @@
 """Progress of long work: a bar on a terminal with counts and the time that is left; nothing in a pipe.
 
+Rich draws it with the colours and lines that the terminal has. Lines that are printed meanwhile appear above the bar.
 Stages go into the log, which `--verbose` shows in place of the bar.
 """
 
 from __future__ import annotations
 
 import logging
-import shutil
+import os
 import sys
-import time
-from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING, Any, Protocol
+from contextlib import contextmanager
+from time import monotonic as now_s
+from typing import TYPE_CHECKING, Protocol
 
 import click
 
+from dbbstation.text.printable import on_one_line
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
+
+    from rich.progress import Progress
 
 _LOG = logging.getLogger(__name__)
 
@@ -25,10 +30,19 @@ _WIDTH = 24
 _SHORT_S = 0.5
 """Work that is over sooner shows no bar: it would only flicker [s]."""
 
+_INTERRUPT = len("^C ")
+"""Room that a terminal needs at the end of the line to show Ctrl-C."""
+
 _TRUSTED = 3.0, 0.02
 """Time [s] and share of the work after which what is left is stated: a guess from less is no help."""
 
 _MINUTE_S = 60.0
+
+_DUMB = {"dumb", "unknown"}
+"""Terminals whose lines cannot be drawn anew: they show a bar once, when its work is done."""
+
+COUNTED, SHARE, ENDLESS = "{task.completed:.0f} of {task.total:.0f}{task.fields[unit]}", "{task.percentage:3.0f}%", ""
+"""Forms of a bar: how many of how many; per cent; work whose end is unknown, which shows the time since it began."""
 
 
 class Tell(Protocol):
@@ -36,6 +50,74 @@ class Tell(Protocol):
 
     def __call__(self, text: str, done: int = 0, of: int = 0) -> None:
         """Take a stage, and how much of it is done where that can be counted."""
+
+
+class Bar:
+    """A bar on standard error, which begins when it is first shown to somebody.
+
+    Args:
+        label: what is being done.
+        form: what stands beside the bar: `COUNTED`, `SHARE` or `ENDLESS`.
+        unit: behind a count.
+        passing: the bar disappears when it ends.
+    """
+
+    def __init__(self, label: str, form: str, *, unit: str = "", passing: bool = False) -> None:
+        self.label = label
+        self._form = form
+        self._unit = unit
+        self._passing = passing
+        self._drawn: Progress | None = None
+        self._started_s = now_s()
+
+    def show(self, done: float = 0.0, of: float | None = None, text: str = "", *, at_once: bool = True) -> None:
+        """Show how much of how much is done.
+
+        Args:
+            done: so far.
+            of: all; None where that is unknown.
+            text: beside the bar.
+            at_once: draw it now, and not a moment later.
+        """
+        left = time_left(done / of, now_s() - self._started_s) if of else ""
+        now = {"completed": done, "total": of, "text": left + on_one_line(text)}
+        if self._drawn is not None:
+            self._drawn.update(self._drawn.task_ids[0], refresh=at_once, **now)
+        elif _shown() and not (self._passing and os.environ.get("TERM") in _DUMB):
+            self._drawn = _rich(self._form, passing=self._passing)
+            self._drawn.add_task(self.label, unit=self._unit, **now)
+            self._drawn.start()
+
+    def end(self, *, done: bool = False) -> None:
+        """Take the bar away, or leave it as it is; fill it first where the work is done."""
+        if self._drawn is None:
+            return
+        if done:
+            self._drawn.update(self._drawn.task_ids[0], completed=self._drawn.tasks[0].total, text="done")
+        self._drawn.stop()
+        self._drawn, self._started_s = None, now_s()
+
+
+def _rich(form: str, *, passing: bool) -> Progress:
+    """Return Rich's progress with the columns of a form."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.table import Column
+
+    console = Console(stderr=True)
+    console.width = max(console.width - _INTERRUPT, 1)
+    rest = Column(no_wrap=True, overflow="ellipsis", ratio=1)
+    return Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(_WIDTH),
+        TextColumn(form) if form else TimeElapsedColumn(),
+        TextColumn("{task.fields[text]}", markup=False, table_column=rest),
+        console=console,
+        expand=True,
+        redirect_stdout=False,
+        refresh_per_second=5,
+        transient=passing,
+    )
 
 
 @contextmanager
@@ -49,23 +131,23 @@ def progress_bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
 def count_bar(label: str) -> Iterator[Callable[[int, int], None]]:
     """Show a bar for work that is counted; yields what is to be told how much of how much is done.
 
-    The bar begins when the work has taken a moment, and ends with the last piece, so that lines said afterwards stay whole.
+    The bar begins when the work has taken a moment, and ends with the last piece.
     """
-    started_s = time.monotonic()
-    with ExitStack() as stack:
-        bars: list[Any] = []
+    bar, started_s, begun = Bar(label, COUNTED), now_s(), False
 
-        def tell(done: int, of: int) -> None:
-            if not bars and time.monotonic() - started_s > _SHORT_S and done < of and _shown():
-                bar = click.progressbar(length=of, label=label, file=sys.stderr, show_pos=True, show_percent=False)
-                bars.append(stack.enter_context(bar))
-            if bars:
-                bars[0].update(done - bars[0].pos)
-            if done >= of:
-                stack.close()
-                bars.clear()
+    def tell(done: int, of: int) -> None:
+        nonlocal begun
+        begun = begun or (now_s() - started_s > _SHORT_S and done < of)
+        if begun:
+            bar.show(done, of, at_once=False)
+        if done >= of:
+            bar.end()
+            begun = False
 
+    try:
         yield tell
+    finally:
+        bar.end()
 
 
 @contextmanager
@@ -79,17 +161,17 @@ def stage_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
         stages: how much is done when a stage begins [%], in their order; a text belongs to the stage whose name it begins
             with.
     """
-    bar = _StageBar(label, stages)
-    with bar.stack:
+    bar = _Stages(Bar(label, SHARE), stages)
+    try:
         yield bar.tell
-        bar.end()
+        bar.bar.end(done=True)
+    finally:
+        bar.bar.end()
 
 
 @contextmanager
 def task_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
     """Show how far a task has come that reads sessions first: a bar for that, and one for its stages.
-
-    What was noticed in the files is said between both, on lines of its own.
 
     Args:
         label: what is being done.
@@ -108,51 +190,25 @@ def task_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
         yield tell
 
 
-class _StageBar:
+class _Stages:
     """One bar over several stages."""
 
-    def __init__(self, label: str, stages: Mapping[str, int]) -> None:
-        self.stack = ExitStack()
-        self._label = label
+    def __init__(self, bar: Bar, stages: Mapping[str, int]) -> None:
+        self.bar = bar
         self._stages = stages
         self._reached = 0.0
         self._told = ""
-        self._bar: Any = None
-        self._started_s = time.monotonic()
 
     def tell(self, text: str, done: int = 0, of: int = 0) -> None:
         """Move to a stage, or on within it."""
-        if text != self._told:
+        new = text != self._told
+        if new:
             _LOG.info("... %s", text)
         self._told = text
         before = self._reached
         now = _reached_within(text, self._stages, done / of) if of else _reached(text, self._stages, before)
         self._reached = max(before, 1.0, now)
-        self._show(f"{text} {done} of {of}" if of else text)
-
-    def end(self) -> None:
-        """Fill the bar, where one was begun."""
-        if self._bar is not None:
-            self._bar.update(100 - self._bar.pos, "done")
-
-    def _show(self, text: str) -> None:
-        if not _shown():
-            return
-        if self._bar is None:
-            # Room for the ^C of a terminal is left, lest it begins a line of its own.
-            room = max(shutil.get_terminal_size().columns - len(f"{self._label}  [{'':{_WIDTH}}]  100%  ^C") - 1, 0)
-
-            def beside(item: str | None) -> str:
-                whole = item or ""
-                return whole if len(whole) <= room else whole[: max(room - 1, 0)] + "…"
-
-            bar = click.progressbar(
-                length=100, label=self._label, file=sys.stderr, width=_WIDTH, show_eta=False, item_show_func=beside
-            )
-            self._bar = self.stack.enter_context(bar)
-        left = time_left(self._reached / 100.0, time.monotonic() - self._started_s)
-        self._bar.update(int(self._reached) - self._bar.pos, f"{left}{text}")
-        self._bar.render_progress()
+        self.bar.show(self._reached, 100.0, f"{text} {done} of {of}" if of else text, at_once=new)
 
 
 def time_left(share: float, passed_s: float) -> str:
@@ -163,7 +219,7 @@ def time_left(share: float, passed_s: float) -> str:
         passed_s: time since it began [s].
     """
     least_s, least = _TRUSTED
-    if passed_s < least_s or share < least:
+    if passed_s < least_s or not least <= share < 1.0:
         return ""
     left_s = passed_s * (1.0 - share) / share
     return f"{left_s / _MINUTE_S:.0f} min left, " if left_s > 2.0 * _MINUTE_S else f"{left_s:.0f} s left, "

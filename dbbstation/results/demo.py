@@ -87,9 +87,10 @@ class DemoCause:
 
 @dataclass(frozen=True)
 class DemoDiagnosis:
-    """What the diagnosis found, and how well held-out tests are predicted [µm]."""
+    """What the diagnosis found, and how well held-out tests are predicted [µm] where they are `tested`."""
 
     sources: tuple[DemoCause, ...]
+    held_out: str
     held_out_rms_um: BeforeAfter
 
 

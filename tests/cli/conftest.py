@@ -34,12 +34,12 @@ class Outcome:
         return json.loads(self.out, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
 
 
-def call(*arguments) -> Outcome:
-    """Run the command line as `dbbstation ARGUMENTS` would."""
-    out, err = io.StringIO(), io.StringIO()
+def call(*arguments, err=None) -> Outcome:
+    """Run the command line as `dbbstation ARGUMENTS` would; standard error may be a stream that is there already."""
+    out, err = io.StringIO(), err or io.StringIO()
     with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as left:
         main([str(argument) for argument in arguments])
-    return Outcome(left.value.code, out.getvalue(), err.getvalue())
+    return Outcome(left.value.code, out.getvalue(), err.getvalue() if isinstance(err, io.StringIO) else "")
 
 
 @pytest.fixture(scope="session")

@@ -23,7 +23,6 @@ FORMULA = "=HYPERLINK(1)"
 
 PRINT = {
     "cli/output.py": "is the one way out",
-    "cli/progress.py": "draws bars over themselves, whose labels are the program's own words",
     "cli/asking.py": "asks, with escaped questions",
     "cli/import_.py": "asks, with an escaped question",
     "service/worker.py": "tells the station, which escapes what it shows",

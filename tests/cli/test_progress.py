@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from contextlib import redirect_stderr, suppress
+from contextlib import suppress
 from pathlib import Path
 
 import click
 import numpy as np
+import pyte
 import pytest
 
 from dbbstation.cli import DONE, FAILED, progress
+from dbbstation.cli.output import say
 from dbbstation.cli.progress import count_bar, stage_bar, time_left
 from dbbstation.errors import KinematicsError
 from dbbstation.files.shipped import shipped_folder
@@ -27,6 +27,7 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources
 from dbbstation.tasks.diagnose import STAGES
+from tests.cli.screen import COLUMNS, ROWS, bars, watched
 
 pty = pytest.importorskip("pty", reason="needs a pseudo-terminal")
 
@@ -36,29 +37,13 @@ MACHINE = shipped_folder("fixtures") / "machines" / "reference.yaml"
 SESSION = Path(__file__).parents[2] / "fixtures" / "sessions" / "small"
 PROGRAM = [sys.executable, "-m", "dbbstation", "diagnose", str(SESSION), "--sources", "gravity,backlash"]
 PATIENCE_S = 120.0
-SHOW_CURSOR = "\x1b[?25h"
 
 
-def on_terminal(work: Callable[[], None]) -> list[str]:
-    """What a terminal gets from work whose standard error it is, split where the line begins anew."""
-    ours, theirs = pty.openpty()
-    with os.fdopen(theirs, "w", buffering=1) as screen, redirect_stderr(screen):
-        work()
-        screen.write("\0")
-        screen.flush()
-        shown = b""
-        while not shown.endswith(b"\0"):
-            shown += os.read(ours, 4096)
-    os.close(ours)
-    return shown.decode().rstrip("\0").replace("\n", "").split("\r")
-
-
-def percents(lines: list[str]) -> list[int]:
-    return [int(line.partition("%")[0].rpartition(" ")[2]) for line in lines if "%" in line]
+def percents(seen):
+    return [int(bar[5]) for lines in seen.screens for bar in bars(lines) if bar[5]]
 
 
 def test_the_bar_never_goes_back_and_ends_full(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
     told = [
         "kinematic calibration",
         "candidates",
@@ -72,25 +57,42 @@ def test_the_bar_never_goes_back_and_ends_full(monkeypatch):
         with stage_bar("diagnosis", STAGES) as tell:
             for text in told:
                 tell(text)
+                time.sleep(0.02)  # the screen is looked at between two stages
 
-    lines = on_terminal(work)
-    seen = percents(lines)
-    assert seen == sorted(seen)
-    assert seen[-1] == 100
-    assert {10, 45, 75, 77, 80} <= set(seen)
+    seen = watched(work, monkeypatch)
+    found = percents(seen)
+    assert found == sorted(found)
+    assert found[-1] == 100
+    assert {10, 45, 75, 77, 80} <= set(found)
     # Joint fits are as many as it takes: they come closer to the verdicts and never reach them.
-    assert all(p < 75 for line, p in zip([x for x in lines if "%" in x], seen, strict=True) if "joint fit" in line)
-    assert all(any(text[:20] in line for line in lines) for text in told)
-    assert 60 < max(len(re.sub(r"\x1b\[[?0-9]*[a-zA-Z]", "", line)) for line in lines) < 80
-    assert "".join(lines).endswith(SHOW_CURSOR)
+    shown = [bar for lines in seen.screens for bar in bars(lines)]
+    assert all(int(bar[5]) < 75 for bar in shown if bar[7].startswith("joint fit"))
+    assert all(any(bar[7].startswith(text[:20]) for bar in shown) for text in told)
+    # What is too long for the line is cut; there is room for the ^C of Ctrl-C behind it.
+    assert max(len(line) for lines in seen.screens for line in lines) == COLUMNS - 3
+    assert any(bar[7].endswith("…") for bar in shown)
+    assert len(seen.last) == 1
 
 
-def test_nothing_told_is_no_bar():
+def test_nothing_told_is_no_bar(monkeypatch):
     def work() -> None:
         with stage_bar("diagnosis", STAGES):
             click.echo("note", err=True)
 
-    assert on_terminal(work) == ["note", ""]
+    assert watched(work, monkeypatch).last == ["note"]
+
+
+def test_lines_that_are_said_meanwhile_stand_above_the_bar(monkeypatch):
+    def work() -> None:
+        with stage_bar("diagnosis", STAGES) as tell:
+            tell("candidates")
+            say("note: [small] has \x1b[2J in it")
+            tell("verdicts")
+
+    last = watched(work, monkeypatch).last
+    assert last[0] == r"note: [small] has \x1b[2J in it"
+    assert bars(last[1:])[0][5] == "100"
+    assert len(last) == 2
 
 
 def test_in_a_pipe_is_nothing(run):
@@ -113,7 +115,7 @@ class Clock:
 
     def __init__(self, monkeypatch):
         self.now_s = 100.0
-        monkeypatch.setattr(progress.time, "monotonic", lambda: self.now_s)
+        monkeypatch.setattr(progress, "now_s", lambda: self.now_s)
 
 
 def test_a_count_shows_how_many_of_how_many_and_ends_its_line(monkeypatch):
@@ -126,24 +128,23 @@ def test_a_count_shows_how_many_of_how_many_and_ends_its_line(monkeypatch):
                 clock.now_s += 0.4
             click.echo("note", err=True)
 
-    lines = on_terminal(work)
-    assert any("reading runs" in line and "12/30" in line for line in lines)
-    assert any("30/30" in line for line in lines)
+    last = watched(work, monkeypatch).last
+    bar = bars(last)[0]
+    assert (bar[1], bar[3], bar[4]) == ("reading runs", "30", "30")
     # What is said after the last run stands on a line of its own.
-    assert "".join(lines).rpartition(SHOW_CURSOR)[2] == "note"
+    assert last[1:] == ["note"]
 
 
-def test_what_is_over_at_once_shows_no_bar():
+def test_what_is_over_at_once_shows_no_bar(monkeypatch):
     def work() -> None:
         with count_bar("reading runs") as tell:
             for done in range(31):
                 tell(done, 30)
 
-    assert on_terminal(work) == [""]
+    assert watched(work, monkeypatch).raw == b""
 
 
 def test_counts_move_within_their_stage_and_say_what_is_left(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "100")
     clock = Clock(monkeypatch)
 
     def work() -> None:
@@ -152,14 +153,16 @@ def test_counts_move_within_their_stage_and_say_what_is_left(monkeypatch):
             clock.now_s += 10.0
             for done in range(5):
                 tell("predicting pose", done, 4)
+                time.sleep(0.5)  # counts are drawn five times a second
                 clock.now_s += 5.0
             tell("writing")
 
-    lines = [re.sub(r"\x1b\[[?0-9]*[a-zA-Z]", "", line) for line in on_terminal(work)]
+    seen = watched(work, monkeypatch)
+    at = {bar[7]: (bar[5], bar[6]) for lines in seen.screens for bar in bars(lines)}
     # Ten seconds for half of the work: ten are left. Half of the next 40 % after ten more: 20 s for 70 %.
-    assert any("50%" in line and "10 s left, predicting pose 0 of 4" in line for line in lines)
-    assert any("70%" in line and "9 s left, predicting pose 2 of 4" in line for line in lines)
-    assert percents(lines) == sorted(percents(lines))
+    assert at["predicting pose 0 of 4"] == ("50", "10")
+    assert at["predicting pose 2 of 4"] == ("70", "9")
+    assert percents(seen) == sorted(percents(seen))
 
 
 @pytest.mark.parametrize(
@@ -169,7 +172,7 @@ def test_counts_move_within_their_stage_and_say_what_is_left(monkeypatch):
         (0.1, 60.0, "9 min left, "),
         (0.5, 2.0, ""),
         (0.01, 100.0, ""),
-        (1.0, 50.0, "0 s left, "),
+        (1.0, 50.0, ""),
     ],
 )
 def test_what_is_left(share, passed_s, text):
@@ -250,38 +253,35 @@ def test_ctrl_c_ends_with_one_line_and_leaves_whole_files(tmp_path, name, after_
     assert (tmp_path / "model.yaml").read_text() == "what was there before"
 
 
-def in_terminal(*, interrupt: bool) -> tuple[int, str]:
-    """Run the command with standard error on a terminal; interrupted as soon as the bar is there, or to its end."""
+def in_terminal() -> tuple[int, str]:
+    """Run the command with standard error on a terminal, and interrupt it as soon as the bar is there."""
     ours, theirs = pty.openpty()
-    process = subprocess.Popen(PROGRAM, stdout=subprocess.DEVNULL, stderr=theirs)
+    process = subprocess.Popen(
+        PROGRAM, stdout=subprocess.DEVNULL, stderr=theirs, env={**os.environ, "COLUMNS": str(COLUMNS), "TERM": "xterm"}
+    )
     os.close(theirs)
-    said, end_s = "", time.monotonic() + PATIENCE_S
+    said, end_s = b"", time.monotonic() + PATIENCE_S
+    interrupt = True
     with suppress(OSError):  # the other end is closed: it is over
         while time.monotonic() < end_s:
-            came = os.read(ours, 4096).decode()
+            came = os.read(ours, 4096)
             if not came:
                 break
             said += came
-            if interrupt and "candidates" in said:
+            if interrupt and b"candidates" in said:
                 process.send_signal(signal.SIGINT)
                 interrupt = False
     os.close(ours)
-    return process.wait(PATIENCE_S), said
-
-
-def test_a_terminal_has_a_bar():
-    code, said = in_terminal(interrupt=False)
-    assert code == DONE
-    assert percents(said.split("\r"))[-1] == 100
-    assert "..." not in said
-    # What was noticed in the files stands on a line of its own.
-    assert said.splitlines()[0] == "note: small: run l cw 2 is recording, not accepted: left out"
+    return process.wait(PATIENCE_S), said.decode()
 
 
 def test_ctrl_c_ends_the_bar_and_says_so():
-    code, said = in_terminal(interrupt=True)
+    code, said = in_terminal()
     assert code == FAILED
     assert "Traceback" not in said
-    bar, told = said.rsplit(SHOW_CURSOR, 1)
-    assert "candidates" in bar
-    assert told.strip() == "interrupted; what was written before stays"
+    screen = pyte.Screen(COLUMNS, ROWS)
+    pyte.Stream(screen).feed(said)
+    *shown, told = [line.rstrip() for line in screen.display if line.strip()]
+    assert told == "interrupted; what was written before stays"
+    assert [bar[1] for bar in bars(shown)][-1] == "diagnosis"
+    assert not screen.cursor.hidden

@@ -15,7 +15,7 @@ from dbbstation.cli.jig import jig
 from dbbstation.cli.session import session
 from dbbstation.cli.study import STUDIES
 
-HEAVY = ("numba", "scipy", "textual", "matplotlib", "pydantic", "numpy")
+HEAVY = ("numba", "scipy", "rich", "textual", "matplotlib", "pydantic", "numpy")
 
 
 GROUPS = {"study": STUDIES, "session": session.commands, "jig": jig.commands}

@@ -79,6 +79,13 @@ if TYPE_CHECKING:
     "far as it is off].",
 )
 @click.option("--free", metavar="NAME,...", help="Parameters of which nothing is known, such as initial states.")
+@click.option(
+    "--matters",
+    type=float,
+    metavar="SIZE",
+    help='Smallest effect that you care about, rms in the unit of the measured values: "no" is answered only where it would have been '
+    "found [default: what refitted parameters leave].",
+)
 @click.option("--no-offset", is_flag=True, help="Let no constant lie between measured and simulated values.")
 @click.option("--no-held-out", is_flag=True, help="Leave out the held-out test, which takes most of the time.")
 @click.option(
@@ -105,6 +112,7 @@ def mismatch(
     source_files: tuple[Path, ...],
     known: str | None,
     free: str | None,
+    matters: float | None,
     no_offset: bool,
     no_held_out: bool,
     decimal: str | None,
@@ -146,7 +154,7 @@ def mismatch(
     _refuse_mixed(
         simulator,
         {"--measured": measured, "--simulated": simulated, "--variables": variables, "--run": run, "--time": time}
-        | {"--known": known, "--free": free, "--no-offset": no_offset or None},
+        | {"--known": known, "--free": free, "--no-offset": no_offset or None, "--matters": matters},
         {"--most-runs": most_runs, "--corrected": corrected, "--anew": anew or None},
     )
     if simulator is not None:
@@ -185,6 +193,7 @@ def mismatch(
             known_u=stated_uncertainties(known) if known else None,
             free=tuple(name.strip() for name in free.split(",")) if free else (),
             has_offset=not no_offset,
+            matters=matters,
             hold_out=not no_held_out,
             numbers=numbers,
             progress=progress,
@@ -214,6 +223,7 @@ def _refuse_mixed(simulator: Path | None, of_tables: Mapping[str, object], of_si
 
 def _print(result: MismatchResult) -> None:
     from dbbstation.cli.output import print_table
+    from dbbstation.report.levels_text import level_sentences
 
     unit, held_out = result.unit, result.held_out_rms
     if held_out and held_out.worse:
@@ -221,6 +231,7 @@ def _print(result: MismatchResult) -> None:
             f"Held-out rows are predicted worse than as simulated: {held_out.after:.3g} corrected, {held_out.as_simulated:.3g} "
             f"{unit} rms as simulated. Nothing is identified.\n".replace("  ", " ")
         )
+    echo("\n".join((*level_sentences(result.levels, unit), "")))
     print_table(
         ["variable", "kind", "unit", "from", "to"],
         [[v.name, v.kind, v.unit or "none", f"{v.low:.5g}", f"{v.high:.5g}"] for v in result.variables],

@@ -168,9 +168,14 @@ class Bank:
         """Columns over the kept rows, whitened, shape (m, p)."""
         return np.asarray(self._columns.of(columns), dtype=np.float64)
 
-    def beside(self, but_for: NDArray[np.bool_] | None = None) -> BesideBase:
-        """Causes beside the base; some kept rows, shape (m,), may say nothing: the target must be zero there."""
-        columns = self._columns if but_for is None else self._columns.but_for(but_for)
+    def beside(self, but_for: NDArray[np.bool_] | None = None, only: NDArray[np.int64] | None = None) -> BesideBase:
+        """Causes beside the base; some kept rows, shape (m,), may say nothing: the target must be zero there.
+
+        Args:
+            but_for: these rows.
+            only: columns that are then asked for, rising, shape (q,); all if None.
+        """
+        columns = self._columns if but_for is None else self._columns.but_for(but_for, only)
         return BesideBase(columns, self.channel.known, self.channel.held, self.noise.innovation)
 
     def add(self, more: Sequence[Pattern]) -> list[str]:

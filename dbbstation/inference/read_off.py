@@ -120,10 +120,17 @@ class Trial:
     Attributes:
         held_out: predictions of each part, everything chosen anew without it; None where these were not asked for.
         refits: values of base and members without each part [`refits_without`]; none: uncertainties are the model's.
+        is_worse_here: whether what was found leaves more of the rows themselves than the reference does; asked without held-out parts.
     """
 
     held_out: HeldOutError | ChosenAnew | None = None
     refits: Sequence[Solution] = ()
+    is_worse_here: bool = False
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether what was found predicts worse than the reference."""
+        return self.is_worse_here if self.held_out is None else self.held_out.is_worse
 
 
 def read_off(settled: Settled, trial: Trial | None = None) -> tuple[CauseFinding, ...]:
@@ -329,8 +336,7 @@ class _Judge:
             return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
         if self._trial is None:
             return claim(probability, sigmas, Acts.ALWAYS, None), (), ""
-        gains, held_out = self._gains(name), self._trial.held_out
-        worse = held_out is not None and held_out.is_worse
+        gains, worse = self._gains(name), self._trial.is_worse
         verdict = claim(probability, sigmas, self._acts(name), gains, worse=worse)
         text = ""
         if name in self._in_time:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from dbbstation.inference.levels import Levels
 from dbbstation.results.frame import Framed
 from dbbstation.results.inference import CancellingResult, EffectSpan, HeldOutGains, ResidualResult
 from dbbstation.results.serialise import Absent, AsItIs, Kept, Quantified
@@ -253,6 +254,7 @@ class MismatchResult(Framed):
         row_count: rows that were compared; `rows` in JSON.
         blocks: names of the runs.
         variables: that the difference may follow.
+        levels: whether anything differs, what it follows, which law it is.
         mismatch: whether there is more than noise.
         offset: measured less simulated on average; None where none was allowed.
         noise: of one row.
@@ -277,6 +279,7 @@ class MismatchResult(Framed):
     row_count: Annotated[int, Field(serialization_alias="rows")]
     blocks: tuple[str, ...]
     variables: tuple[VariableResult, ...]
+    levels: Levels
     mismatch: bool
     offset: OffsetResult | None
     noise: NoiseResult

@@ -61,6 +61,7 @@ def mismatch_result(
             VariableResult(v.name, str(v.kind), v.unit, v.period, float(v.low), float(v.high))
             for v in compared.variables
         ),
+        levels=found.levels,
         mismatch=found.is_there,
         offset=_offset(found),
         noise=_noise(found),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.table.mismatch import find_mismatch
+from dbbstation.errors import StationError
 from dbbstation.results.of_mismatch import mismatch_result
 from dbbstation.tasks.load import paths_of
 from dbbstation.tasks.tables import TableOptions, load_sources, load_tables, stated_variables
@@ -29,6 +31,8 @@ STAGES = {"look": 0, "sets of causes": 8, "held-out part": 15}
 STAGES_WHOLE = {"look": 0, "sets of causes": 50}
 """Stages of a comparison with the held-out test and without it, and the share of its time that has passed by then [%]."""
 
+MATTERS = "state the smallest effect that you care about, as root mean square in the unit of the measured values"
+
 CORRECTED, LEFT = "corrected", "left"
 """Columns that are added to the table."""
 
@@ -45,6 +49,7 @@ def mismatch(
     known_u: Mapping[str, float] | None = None,
     free: Sequence[str] = (),
     has_offset: bool = True,
+    matters: float | None = None,
     hold_out: bool = True,
     numbers: NumberLanguage | None = None,
     progress: Progress = silent,
@@ -67,6 +72,7 @@ def mismatch(
         known_u: standard uncertainty to which parameters were known before, by name, in their own units.
         free: parameters of which nothing is known, such as initial states.
         has_offset: whether a constant of no interest may lie between measured and simulated values.
+        matters: size of an effect that matters, root mean square in the unit of the values; None: what refitted parameters leave.
         hold_out: repeat everything for each held-out part, which takes most of the time.
         numbers: how numbers are written; None: with a dot, and the separator that the header has most of.
         progress: told each stage.
@@ -78,9 +84,14 @@ def mismatch(
 
     Raises:
         InputError: every fault of every file; too few rows.
+        StationError: the size that matters is none.
         CalibrationError: the difference is so much larger than its noise that rounding hides what it follows.
         StoppedError: `stop` returned True.
     """
+    if matters is not None and not (math.isfinite(matters) and matters > 0.0):
+        raise StationError(
+            f"a size that matters must be above zero, not {matters:g}", where="--matters", remedy=MATTERS
+        )
     telling = Telling(progress, stop, say)
     asked = TableOptions(
         measured,
@@ -97,7 +108,9 @@ def mismatch(
     telling.note(*tabulated.notes)
     sources, lacking = load_sources([Path(file) for file in source_files], tabulated.table)
     telling.note(*(f"{name} cannot be asked: {why}" for name, why in lacking.items()))
-    found = find_mismatch(tabulated.table, sources, hold_out=hold_out, lacking=lacking, progress=telling.stage)
+    found = find_mismatch(
+        tabulated.table, sources, hold_out=hold_out, lacking=lacking, matters=matters, progress=telling.stage
+    )
     return mismatch_result(
         found, table=_corrected(tabulated, found), drawing=partial(_drawn, found), notes=tuple(telling.notes)
     )

@@ -130,14 +130,15 @@ def _at(port: SimulatorPort, signals: Mapping[str, NDArray[np.float64]], span: t
         for form, power in ((TermForm.LINEAR, ""), (TermForm.SQUARE, "²"), (TermForm.DRAG, "²"), (TermForm.CUBIC, "³")):
             if form is not TermForm.DRAG or values.min() < 0.0 < values.max():
                 found.append(_candidate(port, form, (name,), ("coefficient",), (_per(port.unit, unit, power),)))
-        places, longest = np.quantile(values, np.linspace(0.0, 1.0, LENGTHS + 2)[1:-1]), span[1] / 3.0
-        found.append(_candidate(port, TermForm.CURVE, (name,), *_curve(port, values)))
-        hinge = _candidate(
-            port, TermForm.HINGE, (name,), ("slope", "place"), (_per(port.unit, unit), unit), grid=tuple(places)
-        )
-        # Beyond what the signal reached a hinge does nothing, and its numbers could be anything.
-        reached = (float(values.min()), float(values.max()))
-        found.append(replace(hinge, term=replace(hinge.term, bounds=(reached,))))
+        longest = span[1] / 3.0
+        if len(inside := inner_quantiles(values, LENGTHS)):
+            found.append(_candidate(port, TermForm.CURVE, (name,), *_curve(port, values)))
+            hinge = _candidate(
+                port, TermForm.HINGE, (name,), ("slope", "place"), (_per(port.unit, unit), unit), grid=inside
+            )
+            # Beyond what the signal reached a hinge does nothing, and its numbers could be anything.
+            reached = (float(values.min()), float(values.max()))
+            found.append(replace(hinge, term=replace(hinge.term, bounds=(reached,))))
         constants = tuple(np.geomspace(2.0 * span[0], max(longest, 4.0 * span[0]), LENGTHS).tolist())
         found.append(
             _candidate(
@@ -208,13 +209,19 @@ def _candidate(
     )
 
 
+def inner_quantiles(values: NDArray[np.float64], count: int) -> tuple[float, ...]:
+    """Quantiles between the ends of a signal, rising, each once: fewer where values repeat, none where it is only at its ends."""
+    every = np.unique(np.quantile(values, np.linspace(0.0, 1.0, count + 2)[1:-1]))
+    return tuple(every[(every > values.min()) & (every < values.max())].tolist())
+
+
 def _curve(
     port: SimulatorPort, values: NDArray[np.float64]
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
     """Names, units and knots of a cubic spline over the range of a signal, its inner knots where as many values lie below as between."""
     low, high = float(values.min()), float(values.max())
     room = 0.05 * (high - low)
-    inner = np.quantile(values, np.linspace(0.0, 1.0, INNER + 2)[1:-1])
+    inner = inner_quantiles(values, INNER)
     knots = np.concatenate([[low - room] * 4, inner, [high + room] * 4])
     count = len(knots) - DEGREE - 3
     return tuple(f"bend {k + 1}" for k in range(count)), (port.unit,) * count, tuple(knots.tolist())

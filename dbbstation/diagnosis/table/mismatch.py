@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,15 +12,17 @@ from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.folds import held_out_error, parts_of
+from dbbstation.inference.followed import WithoutPart
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.noise import noise_of
 from dbbstation.inference.patterns import Family, covers_turns, turn
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import compress, solve, with_random
-from dbbstation.inference.verdict import OUT, Value, Verdict
+from dbbstation.inference.verdict import OUT, Value, Verdict, is_worse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.left_over import LeftOver
+    from dbbstation.inference.levels import Levels
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.settled import Settled
@@ -104,6 +106,8 @@ class Mismatch:
         resembles: of smooth curves that are there, which named forms they follow: share of each, R², by name of finding.
         fitted: base parameters.
         left: tests of the residual.
+        levels: whether anything differs, what it follows, which law it is.
+        is_worse_here: whether what was found leaves more of the rows than the values as simulated do.
         held_out: error of rows that took no part; None where it was not asked for.
         lacking: physics of the user's own that could not be asked, and why.
         texts: of that which was asked, by name.
@@ -118,6 +122,8 @@ class Mismatch:
     resembles: dict[str, dict[str, float]]
     fitted: tuple[RefittedParameter, ...]
     left: LeftOver
+    levels: Levels
+    is_worse_here: bool
     held_out: HeldOutError | None
     lacking: dict[str, str]
     texts: dict[str, Texts]
@@ -136,8 +142,8 @@ class Mismatch:
 
     @property
     def is_worse(self) -> bool:
-        """Whether held-out parts are predicted worse than by the values as simulated."""
-        return self.held_out is not None and self.held_out.is_worse
+        """Whether held-out parts, or where none were asked for all rows, are predicted worse than by the values as simulated."""
+        return self.is_worse_here if self.held_out is None else self.held_out.is_worse
 
     @property
     def is_there(self) -> bool:
@@ -183,6 +189,7 @@ def find_mismatch(
     *,
     hold_out: bool = True,
     lacking: dict[str, str] | None = None,
+    matters: float | None = None,
     progress: Callable[..., None] = lambda *_: None,
 ) -> Mismatch:
     """Compare measured with simulated values.
@@ -192,6 +199,7 @@ def find_mismatch(
         sources: physics of the user's own that the table has the columns for.
         hold_out: repeat everything for each held-out part; takes most of the time.
         lacking: physics that could not be asked, and why.
+        matters: size of an effect that matters, in the unit of the table; None: what base parameters leave of the rows.
         progress: called with what is being done, and how much of how much where that can be counted.
 
     Raises:
@@ -199,7 +207,7 @@ def find_mismatch(
     """
     try:
         with np.errstate(over="raise"):
-            return _found(table, sources, lacking or {}, progress, hold_out=hold_out)
+            return _found(table, sources, lacking or {}, progress, hold_out=hold_out, matters=matters)
     except (np.linalg.LinAlgError, FloatingPointError) as error:
         what = "the difference is so much larger than its noise that rounding hides what it follows"
         remedy = "check that measured and simulated values are of one quantity in one unit"
@@ -215,13 +223,18 @@ def _found(
     progress: Callable[..., None],
     *,
     hold_out: bool,
+    matters: float | None,
 ) -> Mismatch:
     channel = table.channel(sources)
     channel = replace(channel, static=static_patterns(channel))
     settled = settle(channel, progress=progress)
-    held_out = _held_out(settled, table, progress) if hold_out else None
+    chosen: list[WithoutPart] = []
+    held_out = _held_out(settled, table, chosen, progress) if hold_out else None
     refits = refits_without(settled, [rows for _, rows in parts_of(channel)])
-    findings = read_off(settled, Trial(held_out, refits))
+    kept = channel.residual - (float(np.mean(channel.residual)) if table.has_offset else 0.0)
+    is_worse_here = is_worse(_rms(channel.residual - settled.predicted()), _rms(kept))
+    findings = read_off(settled, Trial(held_out, refits, is_worse_here=is_worse_here))
+    left = left_over(settled)
     return Mismatch(
         table=table,
         settled=settled,
@@ -229,7 +242,9 @@ def _found(
         shares=_shares(settled),
         resembles=_resembles(settled),
         fitted=_fitted(settled, table, refits),
-        left=left_over(settled),
+        left=left,
+        is_worse_here=is_worse_here,
+        levels=levels_of(settled, left, chosen, held_out, matters),
         held_out=held_out,
         lacking=lacking,
         texts={source.name: source.texts for source in sources},
@@ -238,19 +253,24 @@ def _found(
     )
 
 
-def _held_out(settled: Settled, table: Table, progress: Callable[..., None]) -> HeldOutError:
-    """Held-out error; the reference is the values as simulated, and a constant where one may lie between."""
+def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progress: Callable[..., None]) -> HeldOutError:
+    """Held-out error; the reference is the values as simulated, and a constant where one may lie between.
+
+    What was chosen without each part is added to `chosen`.
+    """
     residual = settled.channel.residual
+    parts = iter(parts_of(settled.channel))
 
     def as_simulated(rows: NDArray[np.bool_]) -> NDArray[np.float64]:
         return np.full(len(residual), float(np.mean(residual[rows])) if table.has_offset else 0.0)
 
+    def choose(channel: Channel, out: NDArray[np.bool_]) -> Settled:
+        one = choose_without(channel, out, beginning=settled.beginning)
+        chosen.append(WithoutPart(next(parts)[1], one))
+        return one
+
     return held_out_error(
-        settled.channel,
-        partial(choose_without, beginning=settled.beginning),
-        progress,
-        alike=settled.noise.correlation_samples,
-        reference=as_simulated,
+        settled.channel, choose, progress, alike=settled.noise.correlation_samples, reference=as_simulated
     )
 
 

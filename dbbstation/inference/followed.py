@@ -1,0 +1,309 @@
+"""Which variables are followed: classes of them by probability over all sets of causes, and what they bring in held-out parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import logsumexp
+
+from dbbstation.inference.bank import LOOKED_FOR
+from dbbstation.inference.levels import RUN, TIME
+from dbbstation.inference.patterns import Family
+from dbbstation.inference.seen import IN_TIME
+from dbbstation.inference.uneven import log_student
+from dbbstation.inference.variables import Kind
+from dbbstation.inference.verdict import SURE, DensityGains
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.bank import Bank
+    from dbbstation.inference.model_comparison import Cause
+    from dbbstation.inference.settled import Settled
+
+NEGLIGIBLE = 30.0
+"""Log odds against all sets together from which on a set counts for nothing."""
+
+MOST_VARIABLES = 5
+"""Variables of a class at the most: one of more says nothing to anybody."""
+
+LEAST_ADDED = 0.02
+"""Probability that a variable must add to a class to be named in it: less changes no figure that is printed with two digits."""
+
+INTERCHANGEABLE = 0.9
+"""Share of the squares of a fitted effect that one cause over another variable must make for both to be named: what it leaves is less
+than a third of the effect. At 0.8 two variables that correlate by 0.98 are joined in rows that tell them apart."""
+
+WAYS = {
+    **dict.fromkeys((Family.HYSTERESIS, Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION), "direction"),
+    **dict.fromkeys((Family.SPEED, Family.LAG, Family.MEMORY, Family.DEAD_TIME), "late"),
+    **dict.fromkeys((Family.DRIFT, *IN_TIME), "in time"),
+}
+VALUE = "value"
+
+
+@dataclass(frozen=True, eq=False)
+class WithoutPart:
+    """Everything chosen anew without one part.
+
+    Attributes:
+        rows: of the part, shape (n,).
+        settled: what was chosen.
+    """
+
+    rows: NDArray[np.bool_]
+    settled: Settled
+
+
+def followed_by(bank: Bank, name: str) -> frozenset[str]:
+    """Variables that a cause follows; physics of a user has its own name."""
+    of = bank.patterns.get(name) or bank.laws.get(name)
+    if of is None:
+        return frozenset({name})
+    if of.family is Family.BLOCKS:
+        return frozenset({RUN})
+    if of.family in IN_TIME and not of.variables:
+        return frozenset({TIME})
+    return frozenset(TIME if v.kind is Kind.TIME else v.name for v in of.variables) or frozenset({name})
+
+
+def way_of(bank: Bank, name: str) -> str:
+    """How a cause follows its variables."""
+    of = bank.patterns.get(name) or bank.laws.get(name)
+    return VALUE if of is None or of.family is None else WAYS.get(of.family, VALUE)
+
+
+def only_begun(settled: Settled) -> frozenset[str]:
+    """Members with memory that is mostly what fades from the start of a run, and that are not sure themselves: these follow the time."""
+    channel, bank, found, first = settled.channel, settled.bank, set(), 0
+    members = settled.best.members
+    values = settled.comparison.estimates(members).values if members else np.zeros(0)
+    axes = np.linalg.qr(channel.base.samples[channel.kept])[0]
+    for member in members:
+        own = values[first : first + len(member.columns)]
+        first += len(member.columns)
+        count, law = len(member.variant.columns), bank.laws.get(member.cause.name)
+        if law is None or law.family is not Family.MEMORY or count < 2:  # noqa: PLR2004 - its gain, then its state at each start
+            continue
+        samples = bank.samples(member.variant.columns)[channel.kept]
+        samples = samples - axes @ (axes.T @ samples)
+        begun = np.sum(np.square(samples[:, 1:] @ own[1:count]))
+        if begun > np.sum(np.square(samples[:, 0] * own[0])):
+            found.add(member.cause.name)
+    return frozenset(name for name in found if settled.posterior.probability([name]) < SURE)
+
+
+def _follow(settled: Settled) -> Callable[[str], frozenset[str]]:
+    """What causes of a comparison follow, by name."""
+    begun = only_begun(settled)
+    return lambda name: frozenset({TIME}) if name in begun else followed_by(settled.bank, name)
+
+
+def weighted(settled: Settled) -> list[tuple[Settled, float]]:
+    """What the beginnings of the noise came to, with their probability."""
+    every = [settled, *settled.others]
+    logs = np.array([one.log_probability for one in every])
+    return list(zip(every, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
+
+
+def probability_of_any(settled: Settled) -> float:
+    """That any cause is there."""
+    none = (share * one.posterior.probability_of(lambda names: not names) for one, share in weighted(settled))
+    return 1.0 - float(sum(none))
+
+
+class VariableProbabilities:
+    """Probability that variables are followed, over all sets of causes and beginnings of the noise."""
+
+    def __init__(self, settled: Settled) -> None:
+        self._sets: dict[frozenset[str], float] = {}
+        for one, share in weighted(settled):
+            follow, weights = _follow(one), one.posterior.weights
+            total = float(logsumexp(list(weights.values())))
+            for names, weight in weights.items():
+                if weight > total - NEGLIGIBLE:
+                    key = frozenset[str]().union(*(follow(name) for name in names))
+                    self._sets[key] = self._sets.get(key, 0.0) + share * float(np.exp(weight - total))
+
+    def of(self, names: Iterable[str]) -> float:
+        """That at least one of these is followed."""
+        wanted = set(names)
+        return min(1.0, sum(p for key, p in self._sets.items() if key & wanted))
+
+    def class_of(self, name: str) -> tuple[str, ...]:
+        """A variable with others of which one is followed for sure, if it is not."""
+        chosen = [name]
+        every = sorted(frozenset[str]().union(*self._sets))
+        unsure = [other for other in every if self.of([other]) < SURE]
+        while self.of(chosen) < SURE and len(chosen) < MOST_VARIABLES:
+            added = {other: self.of([*chosen, other]) - self.of(chosen) for other in unsure if other not in chosen}
+            best = max(added, key=lambda other: added[other], default=None)
+            if best is None or added[best] < LEAST_ADDED:
+                break
+            chosen.append(best)
+        return tuple(chosen)
+
+
+@dataclass(frozen=True)
+class VariableClass:
+    """Variables that the same members follow.
+
+    Attributes:
+        each: classes, each of which is followed.
+        others: variables that these rows cannot tell from them.
+        members: causes of the best set that follow them.
+    """
+
+    each: tuple[tuple[str, ...], ...]
+    others: tuple[str, ...]
+    members: frozenset[str]
+
+    @property
+    def wanted(self) -> frozenset[str]:
+        """All variables that are pooled."""
+        return frozenset(self.others).union(*self.each)
+
+
+def classes_of(settled: Settled, probabilities: VariableProbabilities) -> list[VariableClass]:
+    """Classes of the variables that anything in the best set follows, most probable first."""
+    follow = _follow(settled)
+    of = {member.cause.name: follow(member.cause.name) for member in settled.best.members}
+    there = sorted(frozenset[str]().union(*of.values()), key=lambda v: (-probabilities.of([v]), v))
+    found: list[VariableClass] = []
+    for variable in there:
+        if any(variable in one.wanted for one in found):
+            continue
+        own = probabilities.class_of(variable)
+        members = frozenset(name for name, variables in of.items() if variables & set(own))
+        others = tuple(v for v in interchangeable(settled, members, follow) if v not in own)
+        same = next((k for k, one in enumerate(found) if one.members == members), None)
+        if same is None:
+            found.append(VariableClass((own,), others, members))
+        else:
+            one = found[same]
+            found[same] = VariableClass((*one.each, own), tuple(dict.fromkeys((*one.others, *others))), members)
+    return found
+
+
+def interchangeable(
+    settled: Settled, members: Collection[str], follow: Callable[[str], frozenset[str]]
+) -> tuple[str, ...]:
+    """Variables over which one cause that acts at once makes what members do, beside base and the other members."""
+    comparison, best, bank = settled.comparison, settled.best, settled.bank
+    columns, values = _columns_and_values(settled, members)
+    others = [m for m in best.members if m.cause.name not in members]
+    own = frozenset[str]().union(*(follow(name) for name in members))
+    found: set[str] = set()
+    for cause in settled.causes:
+        over = followed_by(bank, cause.name)
+        pattern = bank.patterns.get(cause.name)
+        picked = pattern is not None and pattern.family in LOOKED_FOR
+        if cause.name in best.names or len(over) != 1 or over & own or picked or way_of(bank, cause.name) != VALUE:
+            continue
+        variant = max(cause.variants, key=lambda one: len(one.columns))
+        products = comparison.beside(others, np.concatenate([columns, variant.columns]))
+        if _share_made(products, values) >= INTERCHANGEABLE:
+            found |= over
+    return tuple(sorted(found))
+
+
+def _columns_and_values(settled: Settled, members: Collection[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    every, first = settled.comparison.estimates(settled.best.members).values, 0
+    columns, values = [], []
+    for member in settled.best.members:
+        if member.cause.name in members:
+            columns.append(member.columns)
+            values.append(every[first : first + len(member.columns)])
+        first += len(member.columns)
+    return np.concatenate(columns), np.concatenate(values)
+
+
+def _share_made(products: NDArray[np.float64], values: NDArray[np.float64]) -> float:
+    """Share of the squares of an effect, of the first columns with these values, that the other columns make."""
+    p = len(values)
+    whole = float(values @ products[:p, :p] @ values)
+    axes_of = np.linalg.pinv(products[p:, p:], rcond=1e-9, hermitian=True)
+    towards = products[p:, :p] @ values
+    return float(towards @ axes_of @ towards) / max(whole, 1e-300)
+
+
+@dataclass(frozen=True)
+class ClassGain:
+    """What a class brings in held-out parts.
+
+    Attributes:
+        gains: log density with it less that without.
+        before: root mean square error without it.
+        after: the same with it.
+    """
+
+    gains: DensityGains
+    before: float
+    after: float
+
+    @property
+    def predicts(self) -> bool:
+        """Whether parts prefer it without the best of them, half of the rows at least, and err less."""
+        return self.gains.predicts and self.gains.share_with_gain >= MOST_PARTS and self.after < self.before
+
+
+MOST_PARTS = 0.5
+"""Share of the held-out rows that must be in parts with a gain: what happened in a few parts goes on in no others."""
+
+
+def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None) -> ClassGain:
+    """What all that follows some variables brings in parts that did not choose it; all that was chosen if None."""
+    brought, before, after = [], 0.0, 0.0
+    for part in parts:
+        one, rows = part.settled, part.rows
+        follow = _follow(one)
+        names = [m.cause.name for m in one.best.members if wanted is None or follow(m.cause.name) & set(wanted)]
+        with_all = one.channel.residual - one.predicted()
+        without = _left_without(one, names) if names else with_all
+        after += float(np.sum(np.square(with_all[rows])))
+        before += float(np.sum(np.square(without[rows])))
+        brought.append(log_density(one, rows, with_all) - log_density(one, rows, without) if names else 0.0)
+    counts = tuple(int(part.rows.sum()) for part in parts)
+    mean = float(sum(counts))
+    return ClassGain(DensityGains(tuple(brought), counts), float(np.sqrt(before / mean)), float(np.sqrt(after / mean)))
+
+
+def _left_without(one: Settled, names: Collection[str]) -> NDArray[np.float64]:
+    """What is left of all rows without some members, base and the others refitted, shape (n,)."""
+    effect = np.zeros(len(one.channel.residual))
+    if rest := one.best.without(*names):
+        samples = np.hstack([one.bank.samples(member.columns) for member in rest])
+        effect = samples @ one.comparison.estimates(rest).values
+    return np.asarray(one.channel.residual - effect - one.channel.base.samples @ one.base_values(effect))
+
+
+def log_density(one: Settled, rows: NDArray[np.bool_], left: NDArray[np.float64]) -> float:
+    """Log density of what is left of a part in the noise of the others, but for what is the same for all that is left.
+
+    Rows count as far apart as those that the noise was measured on.
+    """
+    spaced = np.zeros(len(rows), dtype=bool)
+    spaced[np.flatnonzero(rows)[:: one.channel.apart]] = True
+    whitening = one.noise.whitening(replace(one.channel, kept=spaced).stretches)
+    white = (left[spaced] if whitening is None else whitening @ left[spaced]) / one.noise.innovation
+    if np.isfinite(one.bank.tails):
+        return float(np.sum(log_student(white, one.bank.tails)))
+    return -0.5 * float(white @ white)
+
+
+def way_probability(settled: Settled, wanted: Collection[str], way: str) -> float:
+    """That a cause follows some variables in a way."""
+
+    def inside(cause: Cause, one: Settled) -> bool:
+        return bool(followed_by(one.bank, cause.name) & set(wanted)) and way_of(one.bank, cause.name) == way
+
+    return float(
+        sum(
+            share * one.posterior.probability([cause.name for cause in one.causes if inside(cause, one)])
+            for one, share in weighted(settled)
+        )
+    )

@@ -1,0 +1,146 @@
+"""Read the three levels off a comparison and what was chosen anew without each part."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from dbbstation.inference.coloured import FEWEST_INDEPENDENT
+from dbbstation.inference.detectable import detectable
+from dbbstation.inference.followed import (
+    VariableProbabilities,
+    classes_of,
+    gain_of,
+    probability_of_any,
+    way_probability,
+)
+from dbbstation.inference.law_form import law_form
+from dbbstation.inference.levels import TIME, Followed, Follows, Levels, difference_of
+from dbbstation.inference.verdict import SURE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.inference.folds import HeldOutError
+    from dbbstation.inference.followed import ClassGain, VariableClass, WithoutPart
+    from dbbstation.inference.left_over import LeftOver
+    from dbbstation.inference.levels import Detectable
+    from dbbstation.inference.settled import Settled
+
+SLOW = 10
+"""Slowest frequencies of a stretch, whose power is held against that of the next twice as many: noise with `FEWEST_INDEPENDENT` independent
+samples is flat over them."""
+
+BY_CHANCE = 1e-3
+"""Probability below which their power is no chance, as that of `left_over`."""
+
+WAYS = ("value", "direction", "late", "in time")
+
+
+def levels_of(
+    settled: Settled,
+    left: LeftOver,
+    parts: Sequence[WithoutPart],
+    held_out: HeldOutError | None,
+    matters: float | None = None,
+) -> Levels:
+    """Answer in three levels.
+
+    Args:
+        settled: what the comparison came to.
+        left: tests of the residual.
+        parts: everything chosen anew without each part; none where that was not asked for.
+        held_out: errors of these parts.
+        matters: size of an effect that matters, in the unit of the residual; None: what the base leaves of the rows.
+    """
+    probabilities = VariableProbabilities(settled)
+    classes = tuple(_followed(settled, one, probabilities, parts) for one in classes_of(settled, probabilities))
+    sizes = detectable(settled)
+    size = settled.channel.size if matters is None else matters
+    samples = settled.noise.independent_samples(settled.channel.stretches)
+    differs = difference_of(
+        probability_of_any(settled),
+        classes,
+        gain_of(parts, None).gains if parts else None,
+        _doubts(settled, left, sizes, size),
+        (size, matters is not None, samples, sizes),
+    )
+    correction = None
+    if held_out is not None and settled.best.members:
+        correction = held_out.after < held_out.as_simulated
+    return Levels(differs, classes, correction)
+
+
+def _doubts(settled: Settled, left: LeftOver, sizes: tuple[Detectable, ...], matters: float) -> tuple[str, ...]:
+    """Why an effect that matters may be there though none is found; none where none can."""
+    channel, unit, found = settled.channel, settled.channel.unit, []
+    if len(channel.target) <= FEWEST_INDEPENDENT:
+        found.append(f"{len(channel.target)} rows are too few to know the noise")
+    if channel.time is None:
+        found.append("the order of the rows is unknown, so that noise cannot be told from an effect")
+    if not left.is_noise:
+        found.append("what is left is not noise")
+    if slow_chance(settled) < BY_CHANCE:
+        found.append("slow noise could hide it")
+    for one in sizes:
+        if one.size is None:
+            parameters = ", ".join(channel.base.names)
+            found.append(f"an effect over {one.follows} could be concealed by {parameters}")
+        elif one.size > matters:
+            found.append(f"an effect over {one.follows} is not found below {one.size:.2g} {unit}".rstrip())
+    return tuple(found)
+
+
+def slow_chance(settled: Settled) -> float:
+    """Probability by chance of as much power in the slowest frequencies of what is left, over that of the next ones."""
+    channel = settled.channel
+    if channel.time is None:
+        return 1.0
+    rows = (channel.residual - settled.predicted())[channel.kept]
+    own = rows[max(channel.stretches, key=lambda one: one.stop - one.start)]
+    power = np.abs(np.fft.rfft(own - own.mean())[1 : len(own) // 2]) ** 2
+    low, following = power[:SLOW], power[SLOW : 3 * SLOW]
+    if len(following) < 2 * SLOW:
+        return 1.0
+    # What the base takes out of slow rows is taken out of the slowest.
+    free = max(SLOW - 0.5 * channel.base.samples.shape[1], 2.0)
+    return float(f_distribution.sf(low.sum() / free / following.mean(), 2.0 * free, 2.0 * len(following)))
+
+
+def _followed(
+    settled: Settled, one: VariableClass, probabilities: VariableProbabilities, parts: Sequence[WithoutPart]
+) -> Followed:
+    probability = min(probabilities.of(each) for each in one.each)
+    gain = gain_of(parts, one.wanted) if parts else None
+    answer = _answer(probability, gain, in_time=one.wanted <= {TIME})
+    effect = settled.effect(sorted(one.members))[settled.channel.kept]
+    form = None
+    if answer is Follows.FOLLOWS and len(parts) > 1:
+        form = law_form(settled, one, [part.rows for part in parts])
+    return Followed(
+        variables=one.each,
+        or_variables=one.others,
+        answer=answer,
+        probability=probability,
+        ways={way: way_probability(settled, one.wanted, way) for way in WAYS},
+        rms=float(np.std(effect)),
+        members=tuple(sorted(one.members)),
+        before=None if gain is None else gain.before,
+        after=None if gain is None else gain.after,
+        gain=None if gain is None else gain.gains.total,
+        gain_without_best=None if gain is None else gain.gains.without_best,
+        parts_with_gain=None if gain is None else gain.gains.share_with_gain,
+        form=form,
+    )
+
+
+def _answer(probability: float, gain: ClassGain | None, *, in_time: bool) -> Follows:
+    if probability < SURE:
+        return Follows.UNDECIDED
+    if in_time:
+        return Follows.GOES_ON if gain is not None and gain.predicts else Follows.HAPPENED
+    if gain is None:
+        return Follows.NOT_TESTED
+    return Follows.FOLLOWS if gain.predicts else Follows.DOES_NOT_PREDICT

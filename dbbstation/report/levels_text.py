@@ -1,0 +1,95 @@
+"""The three levels in sentences, for terminal and page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.inference.levels import Differs, Follows
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dbbstation.inference.levels import Difference, Followed, LawForm, Levels
+
+LIKELY = 0.5
+"""Probability from which on a way is mentioned."""
+
+MOST_LISTED = 4
+"""Variables or laws that are listed by name, at the most."""
+
+WAYS = {"value": "by value", "direction": "by direction of travel", "late": "late", "in time": "in time"}
+
+
+def level_sentences(levels: Levels, unit: str) -> list[str]:
+    """Sentences of an answer: whether anything differs, what it follows and which law it is, and whether to correct.
+
+    Args:
+        levels: the answer.
+        unit: of measured and simulated values; empty where it has none.
+    """
+    found = [*_difference(levels.differs, unit)]
+    for one in levels.follows:
+        found += _followed(one, unit)
+    if levels.correction is False:
+        found.append(
+            "No correction is offered: the corrected values predict held-out rows no better than as simulated. The refit may be at fault."
+        )
+    return found
+
+
+def _difference(one: Difference, unit: str) -> Iterator[str]:
+    answer = {
+        Differs.YES: f"Measured and simulated values differ: probability {one.probability:.3f}",
+        Differs.NO: f"No effect of {_size(one.matters, unit)} rms or more is there: probability of any effect {one.probability:.2f}",
+        Differs.CANNOT_TELL: f"Whether measured and simulated values differ cannot be told: {one.why}",
+    }[one.answer]
+    if one.answer is Differs.YES and one.why:
+        answer += f"; {one.why}"
+    elif one.answer is Differs.YES and one.gain is not None:
+        answer += f", log density of held-out rows {one.gain:+.0f}"
+    yield f"{answer}."
+    seen = [f"{d.follows} {_size(d.size, unit)}" for d in one.detectable if d.size is not None][:MOST_LISTED]
+    if seen and one.answer is not Differs.YES:
+        yield f"Smallest effects that are found, rms: {', '.join(seen)}. The noise has {one.independent_samples:.0f} independent samples."
+    hidden = [d for d in one.detectable if d.size is not None and d.concealed > LIKELY]
+    for d in hidden[:MOST_LISTED]:
+        yield f"Fitted parameters take up {100.0 * d.concealed:.0f} % of the squares of an effect over {d.follows}."
+
+
+def _followed(one: Followed, unit: str) -> Iterator[str]:
+    ways = [WAYS[way] for way, probability in one.ways.items() if probability >= LIKELY]
+    how = f"probability {one.probability:.3f}{''.join(f', {way}' for way in ways)}, {_size(one.rms, unit)} rms"
+    also = f" These rows cannot tell it from {_listed(one.or_variables)}." if one.or_variables else ""
+    what = {
+        Follows.FOLLOWS: f"The difference follows {one.name}",
+        Follows.GOES_ON: "The difference goes on in time; no listed variable says it",
+        Follows.HAPPENED: "Something happened in time",
+        Follows.DOES_NOT_PREDICT: f"In these rows the difference follows {one.name}; other rows gain nothing by it",
+        Follows.NOT_TESTED: f"The difference follows {one.name}; this was not tested on held-out rows",
+        Follows.UNDECIDED: f"The difference may follow {one.name}; these rows do not decide it",
+    }[one.answer]
+    yield f"{what}: {how}.{also}"
+    if one.answer in (Follows.FOLLOWS, Follows.GOES_ON) and one.before is not None and one.after is not None:
+        yield f"  Correcting it leaves {one.after:.3g} of {_size(one.before, unit)} rms in rows that took no part."
+    if one.form is not None:
+        yield f"  {_law(one.form)}"
+
+
+def _law(form: LawForm) -> str:
+    if form.name is not None:
+        same = f" These rows cannot tell it from {_listed(form.not_worse)}." if form.not_worse else ""
+        return f"Law: {form.name}.{same}"
+    if len(form.not_worse) == 1:
+        return f"Law: no single one; {form.not_worse[0]} predicts best."
+    return f"Law: open. These rows cannot tell {_listed(form.not_worse)} apart."
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    more = len(names) - MOST_LISTED
+    if more > 0:
+        return f"{', '.join(names[:MOST_LISTED])} and {more} more"
+    return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"  # noqa: PLR2004 - a pair
+
+
+def _size(value: float | None, unit: str) -> str:
+    return f"{value:.2g} {unit}".rstrip() if value is not None else "any size"

@@ -1,0 +1,218 @@
+"""Three levels of answer: sizes that are found by brute force, classes by sums over sets, gains by refits written out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from dbbstation.inference.detectable import MARGIN, POWER, detectable, least_seen
+from dbbstation.inference.folds import parts_of
+from dbbstation.inference.followed import (
+    VariableProbabilities,
+    WithoutPart,
+    classes_of,
+    followed_by,
+    gain_of,
+    log_density,
+    probability_of_any,
+)
+from dbbstation.inference.left_over import left_over
+from dbbstation.inference.levels import TIME, Detectable, Differs, Followed, Follows, difference_of
+from dbbstation.inference.levels_of import levels_of, slow_chance
+from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
+from dbbstation.inference.settle import settle
+from dbbstation.inference.settled import Beginning
+from dbbstation.inference.verdict import DensityGains
+from tests.inference.tables import direction, table
+from tests.inference.test_channel import EFFECTS, channel
+
+ONE = (Beginning.EVERYTHING,)
+
+
+@pytest.fixture(scope="module")
+def both():
+    """Hysteresis of one variable and cogging of another, with everything chosen anew without each of ten parts."""
+    data = table(2, lambda d: EFFECTS["hysteresis of q"](d) + EFFECTS["twice per turn of angle"](d), rows=600)
+    whole = channel(data, blocks=1)
+    settled = settle(whole, thorough=False)
+    parts = [WithoutPart(rows, settle(whole.without(rows), look=False, beginnings=ONE)) for _, rows in parts_of(whole)]
+    return data, settled, parts
+
+
+@pytest.fixture(scope="module")
+def nothing():
+    whole = channel(table(3, rows=600), blocks=1)
+    return settle(whole, thorough=False)
+
+
+def test_both_variables_are_followed_each_with_its_law(both):
+    _, settled, parts = both
+    found = levels_of(settled, left_over(settled), parts, None)
+    assert found.differs.answer is Differs.YES
+    assert found.differs.gain_without_best > np.log(19.0)
+    by_name = {one.name: one for one in found.follows}
+    assert {one.answer for one in by_name.values()} == {Follows.FOLLOWS}
+    assert by_name["q"].form.name == "hysteresis of q"
+    assert by_name["angle"].form.name == "twice per turn of angle"
+    assert by_name["q"].ways["direction"] > 0.95
+    assert by_name["angle"].ways["direction"] < 0.5 < by_name["angle"].ways["value"]
+
+
+def test_what_a_class_brings_is_what_a_refit_without_it_loses(both):
+    """Least squares written out, in the noise of the other rows; sizes of effects have priors, which matter little here."""
+    data, settled, parts = both
+    q = [direction(data.q)]
+    angle = [np.cos(2.0 * np.radians(data.angle)), np.sin(2.0 * np.radians(data.angle))]
+    gain = gain_of(parts, {"q"})
+    for part, brought in zip(parts, gain.gains.parts, strict=True):
+        sigma = part.settled.noise.innovation
+        with_it, without = (squares(data.residual, columns, part.rows) for columns in ([*q, *angle], angle))
+        assert brought == pytest.approx(0.5 * (without - with_it) / sigma**2, rel=0.1)
+    assert gain.predicts
+    assert gain.after < gain.before
+    every = gain_of(parts, None).gains.total
+    assert every > gain.gains.total > 0.0
+    assert gain_of(parts, {"load"}).gains.total == 0.0
+    assert settled.best.names == {"hysteresis of q", "twice per turn of angle"}
+
+
+def squares(residual, columns, rows):
+    stacked = np.column_stack([np.ones(len(residual)), *columns])
+    values, *_ = np.linalg.lstsq(stacked[~rows], residual[~rows], rcond=None)
+    return float(np.sum((residual - stacked @ values)[rows] ** 2))
+
+
+def test_the_density_of_a_part_is_that_of_white_rows(both):
+    _, _, parts = both
+    one, rows = parts[3].settled, parts[3].rows
+    left = one.channel.residual - one.predicted()
+    assert one.noise.is_white
+    assert log_density(one, rows, left) == pytest.approx(-0.5 * np.sum(left[rows] ** 2) / one.noise.innovation**2)
+    # Of every other row where the noise was measured on every other one.
+    thin = replace(one, channel=replace(one.channel, apart=2))
+    expected = -0.5 * np.sum(left[rows][::2] ** 2) / one.noise.innovation**2
+    assert log_density(thin, rows, left) == pytest.approx(expected)
+
+
+def test_probabilities_are_sums_over_sets(both):
+    _, settled, _ = both
+    weights = settled.posterior.weights
+    total = logsumexp(list(weights.values()))
+    inside = [
+        weight for names, weight in weights.items() if any("q" in followed_by(settled.bank, name) for name in names)
+    ]
+    probabilities = VariableProbabilities(settled)
+    assert probabilities.of(["q"]) == pytest.approx(np.exp(logsumexp(inside) - total), abs=1e-6)
+    assert probabilities.of(["q", "angle"]) >= probabilities.of(["q"])
+    assert probability_of_any(settled) == pytest.approx(1.0)
+    assert {one.each for one in classes_of(settled, probabilities)} == {(("q",),), (("angle",),)}
+
+
+def test_no_effect_is_no_with_the_size_from_which_it_holds(nothing):
+    found = levels_of(nothing, left_over(nothing), [], None)
+    assert found.differs.answer is Differs.NO
+    assert found.differs.matters == pytest.approx(nothing.channel.size)
+    assert not found.follows
+    worst = found.differs.detectable[0]
+    assert 0.0 < worst.size < found.differs.matters
+    strict = levels_of(nothing, left_over(nothing), [], None, matters=0.1 * worst.size)
+    assert strict.differs.answer is Differs.CANNOT_TELL
+    assert worst.follows in strict.differs.why
+    assert strict.differs.matters_stated
+
+
+def test_rows_without_an_order_have_no_no(nothing):
+    unordered = replace(nothing, channel=replace(nothing.channel, time=None))
+    answer = levels_of(unordered, left_over(unordered), [], None).differs
+    assert answer.answer is Differs.CANNOT_TELL
+    assert "order" in answer.why
+
+
+def test_what_the_base_conceals_wholly_has_no_size(nothing):
+    """A base that bends as a curve over a variable does: no size of it would be seen, and there is no "no"."""
+    cause = next(c for c in nothing.causes if c.name == "curve over load")
+    samples = nothing.bank.samples(cause.variants[0].columns)
+    base = nothing.channel.base
+    wide = replace(
+        base,
+        names=(*base.names, *(f"p{k}" for k in range(samples.shape[1]))),
+        samples=np.hstack([base.samples, samples]),
+        prior=np.concatenate([base.prior, np.full(samples.shape[1], np.inf)]),
+        random=np.concatenate([base.random, np.zeros(samples.shape[1], dtype=bool)]),
+    )
+    concealed = settle(replace(nothing.channel, base=wide, static=None), thorough=False, beginnings=ONE)
+    sizes = {one.follows: one for one in detectable(concealed)}
+    assert sizes["load"] == Detectable("load", None, 1.0)
+    assert levels_of(concealed, left_over(concealed), [], None).differs.answer is Differs.CANNOT_TELL
+
+
+def test_the_least_size_is_found_in_nine_of_ten_draws(rng):
+    """Targets drawn at that size, each scored with the marginal likelihood written out over dense matrices."""
+    rows, p, odds = 120, 3, -4.0
+    samples = rng.standard_normal((rows, p)) * [1.0, 0.3, 0.1]
+    plausible = np.full(p, 2.0)
+    size = least_seen(samples.T @ samples, samples, plausible, odds)
+    seen = 0
+    covariances = [np.eye(rows) + scale**2 * (samples * plausible**2) @ samples.T for scale in SCALES]
+    inverses = [np.linalg.inv(one) for one in covariances]
+    spreads = [np.linalg.slogdet(one)[1] for one in covariances]
+    for _ in range(400):
+        effect = samples @ rng.standard_normal(p)
+        target = size * effect / np.sqrt(np.mean(effect**2)) + rng.standard_normal(rows)
+        factors = [
+            0.5 * (target @ target - target @ inverse @ target - spread)
+            for inverse, spread in zip(inverses, spreads, strict=True)
+        ]
+        seen += logsumexp(np.array(factors) + LOG_SCALE_WEIGHTS) + odds >= np.log(19.0)
+    # 100 draws know it to 3 %, these to 1.5 %.
+    assert seen / 400 == pytest.approx(POWER, abs=0.08)
+
+
+def test_a_larger_margin_than_one_is_on_every_size(nothing):
+    cause = next(c for c in nothing.causes if c.name == "curve over load")
+    variant = cause.variants[0]
+    samples = nothing.bank.samples(variant.columns)
+    samples = samples - samples.mean(axis=0)
+    products = nothing.comparison.beside((), variant.columns)
+    least = least_seen(products, samples, variant.plausible, cause.log_prior_odds + variant.log_weight)
+    assert {one.follows: one.size for one in detectable(nothing)}["load"] == pytest.approx(MARGIN * least)
+
+
+def test_slow_power_is_no_chance(nothing, rng):
+    assert slow_chance(nothing) > 1e-3
+    walk = np.cumsum(rng.standard_normal(600))
+    slow = replace(nothing, channel=replace(nothing.channel, residual=walk * nothing.noise.sigma))
+    assert slow_chance(slow) < 1e-3
+
+
+def followed(answer):
+    return Followed((("x",),), (), answer, 1.0, {}, 1.0, ())
+
+
+@pytest.mark.parametrize(
+    ("probability", "classes", "gains", "doubts", "answer"),
+    [
+        (0.99, (), None, (), Differs.YES),
+        (0.99, (), DensityGains((5.0, 5.0)), (), Differs.YES),
+        (0.99, (), DensityGains((0.1, 0.1)), (), Differs.CANNOT_TELL),
+        (0.99, (followed(Follows.HAPPENED),), DensityGains((0.1, 0.1)), ("slow",), Differs.YES),
+        (0.99, (followed(Follows.DOES_NOT_PREDICT),), DensityGains((0.1, 0.1)), (), Differs.CANNOT_TELL),
+        (0.20, (), DensityGains((0.1, 0.1)), ("slow",), Differs.CANNOT_TELL),
+        (0.20, (), DensityGains((0.1, 0.1)), (), Differs.NO),
+    ],
+)
+def test_whether_anything_differs(probability, classes, gains, doubts, answer):
+    assert difference_of(probability, classes, gains, doubts, (1.0, False, 100.0, ())).answer is answer
+
+
+def test_time_and_single_rows_are_the_time():
+    data = table(4, rows=600)
+    inside = (np.arange(600) >= 200) & (np.arange(600) < 300)
+    whole = channel(data, blocks=1)
+    settled = settle(replace(whole, residual=whole.residual + 0.4 * inside))
+    (one,) = levels_of(settled, left_over(settled), [], None).follows
+    assert one.name == TIME
+    assert one.answer is Follows.HAPPENED

@@ -41,7 +41,7 @@ than a third of the effect. At 0.8 two variables that correlate by 0.98 are join
 WAYS = {
     **dict.fromkeys((Family.HYSTERESIS, Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION), "direction"),
     **dict.fromkeys((Family.SPEED, Family.LAG, Family.MEMORY, Family.DEAD_TIME), "late"),
-    **dict.fromkeys((Family.DRIFT, *IN_TIME), "in time"),
+    **dict.fromkeys((Family.DRIFT, *IN_TIME), "in_time"),
 }
 VALUE = "value"
 

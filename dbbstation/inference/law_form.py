@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bank import LOOKED_FOR
 from dbbstation.inference.followed import followed_by
-from dbbstation.inference.levels import LawForm
+from dbbstation.inference.levels import LawForm, ScoredLaw
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
@@ -60,7 +60,9 @@ def law_form(settled: Settled, one: VariableClass, parts: Sequence[NDArray[np.bo
     picked = pattern is not None and pattern.family in LOOKED_FOR
     named = len(candidates[best]) == 1 and not picked and totals[best] > 0.0 and set(same) == set(not_worse)
     return LawForm(
-        best if named else None, tuple(not_worse if named else [best, *not_worse]), {n: totals[n] for n in order}
+        best if named else None,
+        tuple(not_worse if named else [best, *not_worse]),
+        tuple(ScoredLaw(n, totals[n]) for n in order),
     )
 
 

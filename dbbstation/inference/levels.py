@@ -82,18 +82,31 @@ class Difference:
 
 
 @dataclass(frozen=True)
+class ScoredLaw:
+    """A law, or the sum of several, in one place.
+
+    Attributes:
+        name: of it.
+        log_density: of held-out parts with it, over nothing in its place.
+    """
+
+    name: str
+    log_density: float
+
+
+@dataclass(frozen=True)
 class LawForm:
     """Level 3: the law within a class.
 
     Attributes:
         name: of the law; None where it is open.
         not_worse: causes that predict parts as well as it, or as the best; those that are the same to these rows included.
-        log_densities: of held-out parts with each, over nothing in its place, best first.
+        scored: all that were compared, best first.
     """
 
     name: str | None
     not_worse: tuple[str, ...]
-    log_densities: dict[str, float]
+    scored: tuple[ScoredLaw, ...]
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ samples is flat over them."""
 BY_CHANCE = 1e-3
 """Probability below which their power is no chance, as that of `left_over`."""
 
-WAYS = ("value", "direction", "late", "in time")
+WAYS = ("value", "direction", "late", "in_time")
 
 
 def levels_of(

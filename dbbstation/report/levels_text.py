@@ -17,7 +17,7 @@ LIKELY = 0.5
 MOST_LISTED = 4
 """Variables or laws that are listed by name, at the most."""
 
-WAYS = {"value": "by value", "direction": "by direction of travel", "late": "late", "in time": "in time"}
+WAYS = {"value": "by value", "direction": "by direction of travel", "late": "late", "in_time": "in time"}
 
 
 def level_sentences(levels: Levels, unit: str) -> list[str]:

@@ -38,6 +38,40 @@ def test_a_person_reads_whether_where_and_what_form(run, warm):
     assert "Nothing is left beyond noise." in outcome.out
 
 
+def test_the_answer_in_three_levels_comes_first(run, warm):
+    outcome = run("mismatch", warm, *COLUMNS)
+    first, second, third, fourth = outcome.out.splitlines()[:4]
+    assert first.startswith("Measured and simulated values differ: probability 1.000, log density of held-out rows +")
+    assert second.startswith("The difference follows oil_temp_c")
+    assert third.startswith("  Correcting it leaves 0.00")
+    assert fourth.startswith("  Law: ")
+    levels = run("mismatch", warm, *COLUMNS, "--json").data["levels"]
+    assert levels["differs"]["answer"] == "yes"
+    assert levels["correction"] is True
+    (one,) = levels["follows"]
+    assert one["variables"] == [["oil_temp_c"]]
+    assert one["after"] < one["before"]
+    sizes = {each["follows"]: each["size"] for each in levels["differs"]["detectable"]}
+    assert max(sizes.values()) < 0.005  # of noise of 2 µm
+
+
+def test_a_size_that_matters_is_held_against_what_is_found(run, tmp_path):
+    noise = 0.01 * np.random.default_rng(5).standard_normal(300)
+    lines = [f"{k * 0.1:.1f},{m:.5f},0.0,{np.sin(k / 9.0):.5f}" for k, m in enumerate(noise)]
+    path = tmp_path / "noise.csv"
+    path.write_text("\n".join(["t_s,measured_mm,simulated_mm,place_mm", *lines]) + "\n")
+    outcome = run("mismatch", path, *QUICK)
+    assert outcome.out.startswith(
+        f"No effect of {np.std(noise):.2g} mm rms or more is there: probability of any effect 0."
+    )
+    assert "Smallest effects that are found, rms: " in outcome.out
+    outcome = run("mismatch", path, *QUICK, "--matters", "0.0001")
+    assert outcome.out.startswith("Whether measured and simulated values differ cannot be told: an effect over ")
+    outcome = run("mismatch", path, *QUICK, "--matters", "0")
+    assert outcome.code == FAILED
+    assert "a size that matters must be above zero, not 0" in outcome.err
+
+
 def test_a_program_reads_the_same_and_the_files_hold_it(run, warm, tmp_path):
     out, figure = tmp_path / "out.csv", tmp_path / "figure.svg"
     outcome = run("mismatch", warm, *QUICK, "--json", "--out", out, "--figure", figure)

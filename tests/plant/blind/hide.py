@@ -62,6 +62,13 @@ class Hider:
             self._session, circumstances.noise, circumstances.rate_hz, self._base, angles=circumstances.angles
         )
 
+    def at(self, effects: Sequence[Effect], scales: Sequence[float]) -> list[Hidden]:
+        """Effects at sizes that are given, in their own units; the answers say what shows with the others fitted too."""
+        return [
+            self._hidden(effect, scale, self._columns([other for other in effects if other is not effect]))
+            for effect, scale in zip(effects, scales, strict=True)
+        ]
+
     def single(self, name: str) -> list[Hidden]:
         """One effect of the list; another one where this one cannot be large enough on this plan."""
         for draw in range(DRAWS):

@@ -1,0 +1,59 @@
+"""Sixty sessions of machines with laws of their own, diagnosed by any commit, and the score of each.
+
+python -m tests.plant.foreign make FOLDER --seed 48 --count 60
+python -m tests.plant.foreign run FOLDER CHECKOUT --only 1-40
+python -m tests.plant.foreign score FOLDER COMMIT ... --only 1-40 --out docs/validation/sixty.json
+
+All can be resumed: what exists is not made again. A checkout of another commit: `git worktree add --detach PATH COMMIT`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from tests.plant.foreign.judge import commit_of, judge
+from tests.plant.foreign.score import scored
+from tests.plant.foreign.sessions import make
+
+
+def main() -> None:
+    """Read the command line and do what it says."""
+    parser = argparse.ArgumentParser(prog="python -m tests.plant.foreign", description=__doc__.splitlines()[0])
+    parser.add_argument("task", choices=("make", "run", "score"))
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("of", nargs="*", help="run: one checkout; score: commits that were run")
+    parser.add_argument("--seed", type=int, default=48, help="of everything")
+    parser.add_argument("--count", type=int, default=60, help="sessions")
+    parser.add_argument("--only", default="", help="sessions to run or score, in this order, as in 12,3,20-40")
+    parser.add_argument("--out", type=Path, help="score: write the figures here as JSON, too")
+    given = parser.parse_args()
+    numbers = _numbers(given.only) or list(range(1, given.count + 1))
+    if given.task == "make":
+        for number in range(1, given.count + 1):
+            make(given.folder, given.seed, number)
+            sys.stderr.write(f"{number} of {given.count} sessions\n")
+    elif given.task == "run":
+        checkout = Path(given.of[0]).resolve() if given.of else Path.cwd()
+        commit = commit_of(checkout)
+        for number in numbers:
+            verdict = judge(given.folder, checkout, commit, f"{number:04d}")
+            sys.stderr.write(f"{commit} {number:04d} {verdict['processor_s']:.0f} s, {verdict['memory_mb']:.0f} MB\n")
+    else:
+        figures = scored(given.folder, given.of, [f"{number:04d}" for number in numbers], given.seed)
+        text = json.dumps(figures, indent=1, ensure_ascii=False) + "\n"
+        sys.stdout.write(text)
+        if given.out:
+            given.out.parent.mkdir(parents=True, exist_ok=True)
+            given.out.write_text(text, encoding="utf-8")
+
+
+def _numbers(text: str) -> list[int]:
+    spans = [part.split("-") for part in text.split(",") if part]
+    return [number for span in spans for number in range(int(span[0]), int(span[-1]) + 1)]
+
+
+if __name__ == "__main__":
+    main()

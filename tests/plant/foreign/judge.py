@@ -1,0 +1,59 @@
+"""Runs `diagnose` of any checkout on a session, and keeps what it said with its processor time and memory."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+COMMAND = {"": ("diagnose", "{session}", "--json")}
+"""Words of the command by the beginning of a commit; those under "" are for all commits that say nothing else."""
+KIB_PER_MB = 1024.0
+
+
+def commit_of(checkout: Path) -> str:
+    """The commit that is checked out, in eight digits."""
+    asked = ["git", "-C", str(checkout), "rev-parse", "--short=8", "HEAD"]
+    return subprocess.run(asked, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def judge(folder: Path, checkout: Path, commit: str, session: str) -> dict[str, Any]:
+    """What a checkout says of a session; kept in `folder/verdicts/COMMIT`, and read from there the next time."""
+    kept = folder / "verdicts" / commit / f"{session}.json"
+    if kept.exists():
+        return dict(json.loads(kept.read_text(encoding="utf-8")))
+    words = next(COMMAND[begin] for begin in sorted(COMMAND, reverse=True) if commit.startswith(begin))
+    path = (folder / session).resolve()
+    with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as complained:
+        child = subprocess.Popen(
+            [sys.executable, "-m", "dbbstation", *(word.format(session=path) for word in words)],
+            cwd=checkout,
+            env={**os.environ, "PYTHONPATH": str(checkout)},
+            stdout=said,
+            stderr=complained,
+        )
+        # The only way to the time and memory of this child alone, with all that it started and waited for.
+        _, status, used = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        said.seek(0)
+        complained.seek(0)
+        text, error = said.read().decode(), complained.read().decode()
+    if child.returncode < 0:
+        sys.exit(f"{session}: diagnose was ended by signal {-child.returncode}; run the same command to go on")
+    verdict = {
+        "session": session,
+        "commit": commit,
+        "processor_s": used.ru_utime + used.ru_stime,
+        "memory_mb": used.ru_maxrss / KIB_PER_MB,
+        "exit_code": child.returncode,
+        **({"summary": json.loads(text)} if text.strip() else {"error": error[-2000:]}),
+    }
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    part = kept.with_suffix(".part")
+    part.write_text(json.dumps(verdict), encoding="utf-8")
+    part.replace(kept)
+    return verdict

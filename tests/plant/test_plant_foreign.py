@@ -1,0 +1,99 @@
+"""Laws of other forms against closed formulas, sessions from their seed, and the score on verdicts written by hand."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from tests.plant.foreign.score import compare
+from tests.plant.foreign.sessions import KINDS, LEAST_SIZE, kind_of, make, small_machine
+from tests.plant.machine import reference_machine
+from tests.plant.mechanisms.reversal_forms import SoftBacklash, StickSlip
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+UNUSED: Any = None
+TO_AND_FRO_MM = np.tile(np.concatenate([np.linspace(0.0, 1.0, 1001), np.linspace(1.0, 0.0, 1001)[1:]])[:, None], 6)
+
+
+def test_soft_backlash_comes_to_its_other_side_exponentially() -> None:
+    change_um = 1000.0 * SoftBacklash((8.0,) * 6, (50.0,) * 6).driven_mm(UNUSED, TO_AND_FRO_MM)[:, 0]
+    assert change_um[1000] == pytest.approx(-4.0, abs=1e-6)
+    travel_um = np.arange(1.0, 1001.0)
+    # From minus to plus half the gap of 8 µm: Dahl's law, integrated by hand.
+    assert change_um[1001:] == pytest.approx(4.0 - 8.0 * np.exp(-travel_um / 50.0), abs=1e-6)
+
+
+def test_a_strut_sticks_and_jumps_a_few_times_after_it_turned_round() -> None:
+    late_um = 1000.0 * StickSlip((4.5, 0.0, 0.0, 0.0, 0.0, 0.0), jerks=2).driven_mm(UNUSED, TO_AND_FRO_MM)
+    assert not late_um[:1001].any()
+    assert not late_um[:, 1:].any()
+    expected_um = [*(1.0, 2.0, 3.0, 4.0), *(0.5, 1.5, 2.5, 3.5), *[0.0] * 992]
+    assert late_um[1001:, 0] == pytest.approx(expected_um, abs=1e-6)
+
+
+def test_the_small_robot_has_eight_tenths_of_every_radius_and_its_own_angles() -> None:
+    small, large = small_machine(), reference_machine()
+    for of_small, of_large in (
+        (small.base_joints_mm, large.base_joints_mm),
+        (small.platform_joints_mm, large.platform_joints_mm),
+    ):
+        assert np.hypot(*of_small[:, :2].T) == pytest.approx(0.8 * np.hypot(*of_large[:, :2].T))
+        angles_rad = np.arctan2(of_small[:, 1], of_small[:, 0]) - np.arctan2(of_large[:, 1], of_large[:, 0])
+        assert np.all(np.abs(np.sin(angles_rad)) > 0.05)
+
+
+def test_kinds_are_those_promised_in_every_sixty() -> None:
+    for first in (1, 61):
+        assert Counter(kind_of(5, number) for number in range(first, first + 60)) == Counter(KINDS)
+
+
+def test_a_seed_makes_the_same_session_and_an_answer_is_not_made_twice(tmp_path: Path) -> None:
+    number = next(n for n in range(1, 61) if kind_of(48, n) == "pair")
+    one, two = (make(tmp_path / part, 48, number) for part in ("one", "two"))
+    assert one == two | {"truth": one["truth"]}
+    files = sorted(path.relative_to(tmp_path / "one") for path in (tmp_path / "one" / one["session"]).rglob("*.*"))
+    assert len([file for file in files if file.suffix == ".csv"]) == 30
+    assert all((tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes() for file in files)
+    assert all(effect["size"] >= LEAST_SIZE for effect in one["effects"] if effect["listed"])
+    (tmp_path / "one" / one["session"] / "plan.yaml").unlink()
+    assert make(tmp_path / "one", 48, number)["seed"] == one["seed"]
+    assert not (tmp_path / "one" / one["session"] / "plan.yaml").exists()
+
+
+def _source(name: str, verdict: str, **more: Any) -> dict[str, Any]:
+    return {"name": name, "verdict": verdict, "ambiguous_with": [], "parameters": {}, "class": []} | more
+
+
+def _verdict(after_um: float, *sources: dict[str, Any]) -> dict[str, Any]:
+    residual = {"before": 2.0, "after": after_um}
+    summary = {"mismatch": True, "residual_rms_um": residual, "sources": list(sources)}
+    return {"summary": summary, "processor_s": 1.0, "memory_mb": 1.0}
+
+
+def test_the_score_counts_names_values_and_silence() -> None:
+    gap = {
+        "name": "backlash",
+        "listed": True,
+        "amplitudes": {"strut_1_um": 5.0},
+        "largest_amplitude": 5.0,
+        "unit": "µm",
+    }
+    walk = {"name": "wandering-bar", "listed": False, "amplitudes": {}, "largest_amplitude": 0.05, "unit": "µm"}
+    answer = {"kind": "single", "effects": [gap, walk]}
+    found = _source("backlash", "identified", parameters={"strut_1_um": {"value": 5.4, "uncertainty": 0.1}})
+    said = compare(answer, _verdict(0.4, found, _source("servo-lag", "identified"), _source("play", "ruled-out")))
+    assert (said["right"], said["wrong"], said["without_answer"]) == (["backlash"], ["servo-lag"], False)
+    assert said["values_u"] == {"backlash strut_1_um": 4.0}
+    # A name of the same class, and an ambiguity that holds the cause, are no wrong names; an ambiguity without it is one.
+    assert not compare(answer, _verdict(0.4, _source("play", "identified", **{"class": ["backlash"]})))["wrong"]
+    pairs = [_source("play", "ambiguous", ambiguous_with=["backlash"]), _source("ball-form", "ambiguous")]
+    unsure = compare(answer, _verdict(0.4, *pairs))
+    assert (unsure["right"], unsure["right_or_unsure"], unsure["wrong"]) == ([], ["backlash"], ["(ball-form)"])
+    silent = compare(answer, _verdict(2.0, _source("backlash", "not-testable")))
+    assert silent["without_answer"]
+    assert silent["silent"]

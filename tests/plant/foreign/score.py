@@ -21,8 +21,8 @@ SILENT = ("clean", "walk", "stick-slip")
 
 def scored(folder: Path, commits: Sequence[str], sessions: Sequence[str], seed: int) -> dict[str, Any]:
     """Figures of every commit over those of the sessions that it has diagnosed, and over those that all have."""
-    answers = {name: _read(folder / "answers" / f"{name}.json") for name in sessions}
     verdicts = {commit: _verdicts(folder / "verdicts" / commit, sessions) for commit in commits}
+    answers = {name: _read(folder / "answers" / f"{name}.json") for of in verdicts.values() for name in of}
     shared = [name for name in sessions if all(name in of for of in verdicts.values())]
     return {
         "question": "Do causes whose laws are not the textbook's keep their names, beside what is on no list?",

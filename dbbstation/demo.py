@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import StationError
+from dbbstation.facts.serialise import read_json
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
@@ -33,7 +34,6 @@ from dbbstation.results.demo import (
     DemoRun,
     MeasuredBeforeAfter,
 )
-from dbbstation.results.serialise import read_json
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from dbbstation.virtual.truth import random_kinematics

@@ -14,11 +14,11 @@ from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.diagnosis.table.mismatch import find_mismatch
+from dbbstation.facts.serialise import plain
 from dbbstation.files.recordings.drive_csv import read_drive
+from dbbstation.results.drive import drive_result
 from dbbstation.results.of_comparison import comparison_result
-from dbbstation.results.of_drive import drive_result
 from dbbstation.results.of_mismatch import mismatch_result
-from dbbstation.results.serialise import plain
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnose import default_candidates
 from dbbstation.tasks.load import load_sessions

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -12,9 +13,10 @@ from dbbstation.circles.estimates import estimate_of, pair_estimate, slow_noise_
 from dbbstation.circles.noise import FEWEST_SAMPLES, ROUNDING
 from dbbstation.circles.quantity import ABSOLUTE, BudgetQuantity
 from dbbstation.computing.threads import with_one_thread
+from dbbstation.facts.serialise import Kept, OrNull
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
 
@@ -63,30 +65,38 @@ class Budget:
     """Standard uncertainty of one figure.
 
     Attributes:
-        quantity: which.
+        u_um: standard uncertainty; None where a cause of unknown size counts [µm].
         terms_um: standard uncertainty by cause, as far as it is known [µm].
         missing: causes that count for it and that nobody stated.
+        why_not: why it has no uncertainty; empty where it has one.
         value_um: the figure, without what noise adds to it [µm].
         as_read_um: the figure of the readings [µm].
-        why_not: why it has no uncertainty; empty where it has one.
     """
 
-    quantity: BudgetQuantity
+    u_um: float | None
     terms_um: Mapping[BudgetTerm, float]
     missing: tuple[str, ...]
+    why_not: OrNull
     value_um: float
     as_read_um: float
-    why_not: str = ""
+    quantity: Annotated[BudgetQuantity, Kept]
 
     @property
     def known_um(self) -> float:
         """Root of the sum of squares of the terms that are known [µm]."""
         return float(np.sqrt(sum(term**2 for term in self.terms_um.values())))
 
-    @property
-    def u_um(self) -> float | None:
-        """Standard uncertainty [µm]; None where a cause of unknown size counts."""
-        return None if self.why_not else self.known_um
+
+def _budget(
+    quantity: BudgetQuantity,
+    terms_um: Mapping[BudgetTerm, float],
+    missing: tuple[str, ...],
+    value_um: float,
+    as_read_um: float,
+    why_not: str = "",
+) -> Budget:
+    found = Budget(None, terms_um, missing, why_not, value_um, as_read_um, quantity)
+    return found if why_not else replace(found, u_um=found.known_um)
 
 
 TOO_FEW = f"fewer than {FEWEST_SAMPLES} samples do not separate noise from form"
@@ -119,7 +129,7 @@ def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowled
         value = one.mean_radial_error_um if quantity is BudgetQuantity.MEAN_RADIAL else one.radius_error_um
         length = _length_terms(one, known, scale)
         terms = {BudgetTerm.NOISE: scale * slow_noise_um(one, 0) / np.sqrt(len(one.raw)), **length.terms}
-        return Budget(quantity, terms, (*length.missing, *NOT_STATED), value, value, _why_not(one, quantity, known))
+        return _budget(quantity, terms, (*length.missing, *NOT_STATED), value, value, _why_not(one, quantity, known))
     axis = 0 if quantity is BudgetQuantity.X else 1
     across_um = 1e3 * one.centre_mm[1 - axis]
     value = 1e3 * one.centre_mm[axis]
@@ -134,7 +144,7 @@ def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowled
         missing.insert(0, BudgetTerm.MOUNTING.value)
     else:
         terms[BudgetTerm.MOUNTING] = known.u_ball_um
-    return Budget(quantity, terms, tuple(missing), value, value, _why_not(one, quantity, known))
+    return _budget(quantity, terms, tuple(missing), value, value, _why_not(one, quantity, known))
 
 
 def _why_not(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> str:
@@ -164,9 +174,9 @@ def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge)
     found = estimate_of(one, quantity)
     if found is None:
         read = _as_read(one)[quantity]
-        return Budget(quantity, terms, missing, read, read, why)
+        return _budget(quantity, terms, missing, read, read, why)
     terms[BudgetTerm.NOISE] = float(np.hypot(found.u_um, terms.get(BudgetTerm.NOISE, 0.0)))
-    return Budget(quantity, terms, missing, found.value_um, found.as_read_um, why)
+    return _budget(quantity, terms, missing, found.value_um, found.as_read_um, why)
 
 
 def _of_extremes(one: CircleAnalysis, extremes: int) -> dict[BudgetTerm, float]:
@@ -219,7 +229,7 @@ def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[BudgetQuanti
         for quantity in (BudgetQuantity.G_BOTH, BudgetQuantity.G_BOTH_LS, BudgetQuantity.H)
     }
     why = next((each.why_not for each in radius if each.why_not), "")
-    found[BudgetQuantity.D] = Budget(BudgetQuantity.D, d_terms, radius[0].missing, pair.d_um, pair.d_um, why)
+    found[BudgetQuantity.D] = _budget(BudgetQuantity.D, d_terms, radius[0].missing, pair.d_um, pair.d_um, why)
     return {quantity: found[quantity] for quantity in OF_BOTH}
 
 
@@ -238,9 +248,9 @@ def _pair_range(pair: PairAnalysis, quantity: BudgetQuantity) -> Budget:
     }[quantity]
     found = pair_estimate(pair, quantity)
     if found is None:
-        return Budget(quantity, terms, NOT_STATED, read, read, TOO_FEW)
+        return _budget(quantity, terms, NOT_STATED, read, read, TOO_FEW)
     terms[BudgetTerm.NOISE] = found.u_um
-    return Budget(quantity, terms, NOT_STATED, found.value_um, read)
+    return _budget(quantity, terms, NOT_STATED, found.value_um, read)
 
 
 @dataclass

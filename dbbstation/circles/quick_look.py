@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 from dbbstation.circles.noise import LEAST_UM
 from dbbstation.circles.signatures import Signature, SignatureColumn, cyclic_shapes, shapes_of
 from dbbstation.computing.threads import with_one_thread
+from dbbstation.facts.serialise import OrNull
 from dbbstation.inference.harmonics import LOW, basis, misfit
 from dbbstation.trace.average import means, sector_of
 
@@ -69,20 +70,20 @@ class Symptom:
         place: end or axis; empty where it belongs to both axes.
         value: its size; None where it cannot be determined.
         u: standard uncertainty of that; None likewise.
-        unit: of both.
+        below: with 95 % probability it is less, where it is not seen and only that can be told; None otherwise.
+        unit: of all of these.
         seen: whether it is larger than four times its uncertainty.
         text: further information, such as the period of a cyclic error.
-        below: with 95 % probability it is less, where it is not seen and only that can be told; None otherwise.
     """
 
     signature: Signature
-    place: str
+    place: OrNull
     value: float | None
     u: float | None
+    below: float | None
     unit: str
     seen: bool
-    text: str = ""
-    below: float | None = None
+    text: OrNull = ""
 
 
 @dataclass(frozen=True)
@@ -256,14 +257,16 @@ def _symptoms(fits: Sequence[_Fit], sigma_um: float, *, both: bool) -> list[Symp
     fit = _best(fits)
     values, u = _over_lengths(fits, sigma_um)
     found = [
-        Symptom(shape.signature, shape.place, float(value), float(each), shape.unit, bool(abs(value) > SEEN * each))
+        Symptom(
+            shape.signature, shape.place, float(value), float(each), None, shape.unit, bool(abs(value) > SEEN * each)
+        )
         for shape, value, each in zip(fit.shapes, values, u, strict=True)
     ]
     if both:
         return [_with_length(one, fit) for one in found]
     why = "one direction cannot separate squareness from servo mismatch"
     mixed = [
-        Symptom(signature, "", None, None, unit, seen=False, text=why)
+        Symptom(signature, "", None, None, None, unit, seen=False, text=why)
         for signature, unit in ((Signature.SQUARENESS, "µm/m"), (Signature.SERVO, "ms"))
     ]
     return [*mixed, *(_with_length(one, fit) for one in found if one.signature is not Signature.SQUARENESS)]
@@ -308,13 +311,11 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
     if gained <= limit:
         # The strongest of so many waves is no estimate of one that nobody sees; it bounds what may be there.
         below = amplitude + ONE_SIDED * u
-        symptom = Symptom(
-            Signature.CYCLIC, axis, None, None, "µm", seen=False, text=f"below {below:.2g} µm", below=below
-        )
+        symptom = Symptom(Signature.CYCLIC, axis, None, None, below, "µm", seen=False, text=f"below {below:.2g} µm")
         return _Wave(symptom, waves, gained)
     # Noise across a wave makes it longer by its variance over twice its size.
     size_um = float(np.sqrt(max(amplitude**2 - across @ covariance @ across, 0.0)))
-    symptom = Symptom(Signature.CYCLIC, axis, size_um, u, "µm", seen=True, text=f"every {found.period_mm:.1f} mm")
+    symptom = Symptom(Signature.CYCLIC, axis, size_um, u, None, "µm", seen=True, text=f"every {found.period_mm:.1f} mm")
     return _Wave(symptom, waves, gained)
 
 

@@ -13,7 +13,9 @@ from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
-    from dbbstation.results.calibration import CalibrationResult, PlanCheckResult, ScatterResult
+    from dbbstation.calibration.checks.plan_check import PlanCheck
+    from dbbstation.calibration.checks.scatter import ScatterCheck
+    from dbbstation.results.calibration import CalibrationResult
 
 
 @click.command()
@@ -170,7 +172,7 @@ def _print(result: CalibrationResult) -> None:
     print_currents(result.motor_currents)
 
 
-def _print_plan_check(check: PlanCheckResult) -> None:
+def _print_plan_check(check: PlanCheck) -> None:
     echo(
         f"{check.tests} tests are too few to reveal a wrong tilt, height or position in the plan: {check.left} degrees "
         f"of freedom are left to check it, one circle has {check.of_one_test}; a small residual proves nothing here, so "
@@ -210,7 +212,7 @@ def _print_parameters(result: CalibrationResult) -> None:
             if unit == "mm" and source.name not in IN_MM:
                 each, unit = 1e3, "µm"
             cells = [f"{each * value:.1f}", "-", "-"]
-            if uncertainty is not None:
+            if parameter.is_known:
                 u, expanded = each * uncertainty, COVERAGE_FACTOR * each * uncertainty
                 cells = [f"{number:.{decimals_of(expanded)}f}" for number in (each * value, u, expanded)]
             rows.append([source.name, name.removesuffix("_mm").replace("_", " "), *cells, unit])
@@ -228,7 +230,7 @@ BESIDE_MISSING_PHYSICS = (
 )
 
 
-def _print_scatter(check: ScatterResult, *, missing_physics: bool) -> None:
+def _print_scatter(check: ScatterCheck, *, missing_physics: bool) -> None:
     stated = f"balls stated to stand within {check.stated_um:.2f} µm per axis"
     if check.fits is None or check.interval_um is None:
         echo(f"{stated}: these tests cannot tell")

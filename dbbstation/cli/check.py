@@ -164,9 +164,8 @@ def _result(
 def _file(result: Checked) -> CheckedFile:
     """Return what was found in a file; of a session also the findings of its runs."""
     from dbbstation.results.checked import CheckedFile, CheckedRun
-    from dbbstation.results.findings import finding_results
 
-    runs = tuple(CheckedRun(one.run.label, finding_results(one.findings)) for one in result.judgements)
+    runs = tuple(CheckedRun(one.run.label, tuple(one.findings)) for one in result.judgements)
     return CheckedFile(str(result.path), result.kind, not result.problems, result.summary, runs or None)
 
 

@@ -95,7 +95,7 @@ def _print(result: DemoResult) -> None:
             hidden = 100 * (source.concealed or 0.0)
             for name, number in source.parameters.items():
                 echo(
-                    f"The diagnosis names {source.name}: {name} {number.value:.3g} ± {number.uncertainty or 0.0:.1g} {number.unit}; "
+                    f"The diagnosis names {source.name}: {name} {number.value:.3g} ± {number.uncertainty:.1g} {number.unit}; "
                     f"the kinematic parameters had concealed {hidden:.0f} % of it."
                 )
     held_out = result.diagnosis.held_out_rms_um

@@ -16,8 +16,9 @@ from dbbstation.cli.output import echo
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.drive import DriveCause, DriveResult, DriveValue, ForceLocation, HeldOutForce
-    from dbbstation.results.serialise import Quantified
+    from dbbstation.diagnosis.drive.findings import DriveFinding, ForceLocation, HeldOutForce
+    from dbbstation.facts.value import Value
+    from dbbstation.results.drive import DriveResult
 
 
 @click.command()
@@ -167,7 +168,7 @@ def _print_locations(locations: Sequence[ForceLocation]) -> None:
         echo(f"  {location.text} ({100 * location.share:.0f} % of it)")
 
 
-def _print_sources(sources: Sequence[DriveCause]) -> None:
+def _print_sources(sources: Sequence[DriveFinding]) -> None:
     from dbbstation.cli.output import print_table
 
     rows = [
@@ -191,7 +192,7 @@ def _print_sources(sources: Sequence[DriveCause]) -> None:
             echo(f"  {source.text}")
 
 
-def _print_parts(source: DriveCause) -> None:
+def _print_parts(source: DriveFinding) -> None:
     """Numbers of a cause, or of each wave and pulse where it has several."""
     if source.parameters and len(source.parts) <= 1:
         for name, number in source.parameters.items():
@@ -207,7 +208,7 @@ def _probability(probability: float) -> str:
     return "> 0.999" if probability > 0.999 else f"{probability:.3f}"  # noqa: PLR2004 - three digits are shown
 
 
-def _number(number: Quantified | DriveValue) -> str:
-    if number.uncertainty is None:
+def _number(number: Value) -> str:
+    if not number.is_known:
         return f"{number.value:#.4g} {number.unit}"
     return f"{number.value:#.4g} ± {number.uncertainty:.2g} {number.unit}"

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.inference import CancellingResult, HeldOutGains, ResidualResult
-    from dbbstation.results.serialise import Quantified
+    from dbbstation.facts.value import Value
+    from dbbstation.inference.cancelling import Cancelling
+    from dbbstation.inference.left_over import LeftOver
+    from dbbstation.inference.verdict import Gains
 
 SURELY_FOUND = ("identified", "happened", "does-not-predict")
 """Verdicts of effects that the recording shows for sure."""
@@ -20,10 +22,9 @@ MOST_NAMES = 6
 """Names that are printed in a row."""
 
 
-def with_uncertainty(number: Quantified) -> str:
+def with_uncertainty(number: Value) -> str:
     """Return a value with its standard uncertainty and unit, as people read it."""
-    u = number.uncertainty
-    known = f"{number.value:.4g} ± {u:.2g}" if u is not None else f"{number.value:.4g}"
+    known = f"{number.value:.4g} ± {number.uncertainty:.2g}" if number.is_known else f"{number.value:.4g}"
     return f"{known} {number.unit}".rstrip()
 
 
@@ -33,7 +34,7 @@ def first_names(names: Sequence[str]) -> str:
     return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
 
 
-def parts_with_gain(gains: HeldOutGains | None, *, acts: str = "always") -> str:
+def parts_with_gain(gains: Gains | None, *, acts: str = "always") -> str:
     """Return in how many held-out parts of how many an effect gains; nothing where other parts cannot show it.
 
     Args:
@@ -43,13 +44,13 @@ def parts_with_gain(gains: HeldOutGains | None, *, acts: str = "always") -> str:
     return gains.counted if gains is not None and acts == "always" else ""
 
 
-def cancelling_text(cancelling: CancellingResult) -> str:
+def cancelling_text(cancelling: Cancelling) -> str:
     """Return which effects cancel each other, as a sentence."""
     parts = ", ".join(f"{name} {rms:.2g}" for name, rms in cancelling.rms.items())
     return f"Effects cancel each other: {parts}, together {cancelling.rms_of_sum:.2g} {cancelling.unit} rms."
 
 
-def residual_text(left: ResidualResult, unit: str) -> str:
+def residual_text(left: LeftOver, unit: str) -> str:
     """Return whether something is left beyond noise, and what, as a sentence.
 
     Args:

@@ -14,7 +14,7 @@ from dbbstation.cli.source_files import source_file_option
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.evaluation import EvaluatedRun
+    from dbbstation.calibration.reporting.evaluation import EvaluatedRun
 
 
 @click.command()

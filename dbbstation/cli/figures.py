@@ -9,7 +9,7 @@ from dbbstation.cli.output import echo, print_table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.evaluation import EvaluatedRun
+    from dbbstation.calibration.reporting.evaluation import EvaluatedRun
 
 G_WITH_NOISE = "G: greatest less least deviation from the least-squares circle [ISO 230-4], the bar's noise included"
 G_LOW_PASSED = (

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, TextIO
 
 from dbbstation.cli.output import echo, log_said
 from dbbstation.cli.progress import COUNTED, Bar
-from dbbstation.results.findings import finding_results
 from dbbstation.results.measured import CompletedRun, MeasuredSession, RecordedRun
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.station import events
@@ -146,7 +145,7 @@ class Summary:
             lost=completed.lost,
             doubtful=completed.doubtful,
             problem=completed.problem or None,
-            findings=finding_results(completed.findings),
+            findings=tuple(completed.findings),
             centre_deviation_um=None if figures is None else figures.centre_deviation_um,
             mean_radial_error_um=None if figures is None else figures.mean_radial_error_um,
             circularity_um=None if figures is None else figures.circularity_um,

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 from dbbstation.cli.output import echo, print_table
 
 if TYPE_CHECKING:
-    from dbbstation.results.currents import CurrentsResult
-    from dbbstation.results.serialise import Quantified
+    from dbbstation.calibration.reporting.motors import CurrentsFigures
+    from dbbstation.facts.value import Value
 
 NOT_TOLD = "-"
 MA_PER_A = 1e3
 
 
-def print_currents(currents: CurrentsResult | None) -> None:
+def print_currents(currents: CurrentsFigures | None) -> None:
     """Print drives, centre of gravity by channel and notes, where a calibration used motor currents."""
     if currents is None:
         return
@@ -56,8 +56,8 @@ def print_currents(currents: CurrentsResult | None) -> None:
         echo(f"note: {note}")
 
 
-def _with_uncertainty(number: Quantified | None, digits: int) -> tuple[str, str]:
+def _with_uncertainty(number: Value | None, digits: int) -> tuple[str, str]:
     """Return value and uncertainty as text, the uncertainty with two digits."""
     if number is None:
         return NOT_TOLD, NOT_TOLD
-    return f"{number.value:.{digits}f}", f"{number.uncertainty or 0.0:.2g}"
+    return f"{number.value:.{digits}f}", f"{number.uncertainty:.2g}"

@@ -48,7 +48,7 @@ def print_json(data: Mapping[str, object]) -> None:
 
 def print_result(result: object) -> None:
     """Print a result as one JSON object with where it comes from."""
-    from dbbstation.results.serialise import plain
+    from dbbstation.facts.serialise import plain
 
     print_json(plain(result))
 

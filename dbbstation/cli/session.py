@@ -45,8 +45,8 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
       dbbstation session list 2026-11-20-hexapod-7 --json
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_result, print_table
+    from dbbstation.facts.serialise import read_plain
     from dbbstation.files.recordings.session import read_session
-    from dbbstation.results.serialise import read_plain
     from dbbstation.results.sessions import ListedRun, ListedSession, SampleCounts
     from dbbstation.text.counting import repeats_in_order
 

@@ -9,7 +9,7 @@ from dbbstation.cli.output import echo
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.evaluation import EvaluatedTolerance, WorstRun
+    from dbbstation.calibration.reporting.tolerances import EvaluatedTolerance, WorstRun
 
 
 def which_circles(tests: Sequence[str], directions: Sequence[str]) -> str:

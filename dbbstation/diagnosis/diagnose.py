@@ -118,7 +118,7 @@ def _cancelling(explained: Explained) -> Cancelling | None:
         own, values = values[: len(member.columns)], values[len(member.columns) :]
         if member.cause.named:
             effects[member.cause.name] = samples[:, member.columns] @ own
-    return cancelling(effects)
+    return cancelling(effects, "µm", 1e3)
 
 
 def _widened(explained: Explained) -> Explained:

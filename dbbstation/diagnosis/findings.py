@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.inference.verdict import Acts, Gains, Value, Verdict
+from dbbstation.facts.value import Value
+from dbbstation.inference.verdict import Acts, Gains, Verdict
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration

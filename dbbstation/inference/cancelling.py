@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     from dbbstation.inference.settled import Settled
@@ -24,25 +23,29 @@ class Cancelling:
     """Effects that cancel each other.
 
     Attributes:
-        rms: root mean square of each about its mean, those that are larger than all together, in the unit of the residual.
+        rms: root mean square of each about its mean, by name, those that are larger than all together.
         rms_of_sum: the same of all together.
+        unit: of both.
     """
 
-    rms: dict[str, float]
+    rms: Mapping[str, float]
     rms_of_sum: float
+    unit: str
 
 
-def cancelling(effects: Mapping[str, NDArray[np.float64]]) -> Cancelling | None:
+def cancelling(effects: Mapping[str, NDArray[np.float64]], unit: str, scale: float = 1.0) -> Cancelling | None:
     """Effects larger than all together, where most of their squares cancel; None where they do not.
 
     Args:
         effects: by name, over all rows, shape (n,).
+        unit: that they are given in.
+        scale: this many of it are one of the residual's.
     """
     rms = {name: float(np.std(effect)) for name, effect in effects.items()}
     whole = float(np.std(np.sum(list(effects.values()), axis=0))) if effects else 0.0
     if whole >= MOST_CANCELS * float(np.sqrt(np.sum(np.square(list(rms.values()))))):
         return None
-    return Cancelling({name: own for name, own in rms.items() if own > whole}, whole)
+    return Cancelling({name: scale * own for name, own in rms.items() if own > whole}, scale * whole, unit)
 
 
 def effects_by_name(settled: Settled, names: Mapping[str, str] | None = None) -> dict[str, NDArray[np.float64]]:

@@ -49,24 +49,22 @@ class ResidualTest:
 
 @dataclass(frozen=True)
 class LeftOver:
-    """What is left, looked at in all these ways."""
+    """Whether something is left beyond noise.
 
+    Attributes:
+        is_noise: whether nothing is.
+        probability: that noise alone leaves as much in any of these tests.
+        looks: the tests.
+    """
+
+    is_noise: bool
+    probability: float
     looks: tuple[ResidualTest, ...]
 
     @property
     def worst(self) -> ResidualTest:
         """The one that is least probable by chance."""
         return min(self.looks, key=lambda look: look.probability)
-
-    @property
-    def probability(self) -> float:
-        """That noise alone leaves as much in any of these ways."""
-        return min(1.0, len(self.looks) * self.worst.probability)
-
-    @property
-    def is_noise(self) -> bool:
-        """Whether nothing is left beyond noise."""
-        return self.probability >= SIGNIFICANT
 
 
 def left_over(settled: Settled, freedom: float | None = None) -> LeftOver:
@@ -95,7 +93,8 @@ def left_over(settled: Settled, freedom: float | None = None) -> LeftOver:
         values = variable.values[channel.kept]
         if len(np.unique(values)) > 1:
             looks.append(_over(left, replace(variable, values=values), settled.noise.sigma))
-    return LeftOver(tuple(looks))
+    probability = min(1.0, len(looks) * min(look.probability for look in looks))
+    return LeftOver(probability >= SIGNIFICANT, probability, tuple(looks))
 
 
 def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: float) -> list[ResidualTest]:

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.facts.value import Value
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.jackknife import weighted_jackknife
 from dbbstation.inference.settle import growth, moved
-from dbbstation.inference.verdict import Value
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

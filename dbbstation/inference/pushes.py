@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
-from dbbstation.inference.verdict import OUT, Value
+from dbbstation.facts.value import Value
+from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
 from dbbstation.inference.impossible import impossible
 from dbbstation.inference.model_comparison import SCALES
@@ -17,7 +18,7 @@ from dbbstation.inference.pushes import too_many, within_a_step
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.variables import Kind
-from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, Gains, Value, Verdict, claim
+from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, Gains, Verdict, claim
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,8 +16,13 @@ Sure: a probability of `SURE` or more, and an effect of `OUT` standard deviation
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from enum import Enum, StrEnum, auto
+from dataclasses import dataclass
+from enum import StrEnum, auto
+from typing import Annotated
+
+from pydantic import computed_field
+
+from dbbstation.facts.serialise import Kept
 
 SURE = 0.95
 """Probability from which on something is said to be there: one claim in twenty may be wrong if the model of noise and causes is right."""
@@ -54,7 +59,7 @@ class Verdict(StrEnum):
         return tuple(Verdict).index(self)
 
 
-class Acts(Enum):
+class Acts(StrEnum):
     """When a cause is at work: whether other rows or tests can show it again."""
 
     ALWAYS = auto()
@@ -72,17 +77,24 @@ class Gains:
     """
 
     parts: tuple[float, ...]
-    rows: tuple[int, ...] = ()
+    rows: Annotated[tuple[int, ...], Kept] = ()
 
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def with_gain(self) -> int:
+        """Parts in which it brought something."""
+        return sum(part > 0.0 for part in self.parts)
+
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def total(self) -> float:
         """Over all parts."""
         return sum(self.parts)
 
     @property
-    def with_gain(self) -> int:
-        """Parts in which it brought something."""
-        return sum(part > 0.0 for part in self.parts)
+    def counted(self) -> str:
+        """In how many parts of how many it gains, as tables print it."""
+        return f"{self.with_gain} of {len(self.parts)}"
 
     @property
     def share_with_gain(self) -> float:
@@ -95,6 +107,7 @@ class Gains:
         """Over all parts but the best."""
         return self.total - max(self.parts, default=0.0)
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def predicts(self) -> bool:
         """Whether it brought something in enough parts, and in sum without the best part."""
@@ -117,19 +130,6 @@ class DensityGains(Gains):
     def predicts(self) -> bool:
         """Whether the parts but the best prefer the effect by the odds at which something is sure."""
         return self.without_best >= math.log(SURE / ABSENT)
-
-
-@dataclass(frozen=True)
-class Value:
-    """A number with its standard uncertainty and unit."""
-
-    value: float
-    uncertainty: float
-    unit: str
-
-    def at_least(self, uncertainty: float) -> Value:
-        """Return it with the larger of its own and another standard uncertainty; one that is not known (nan) changes nothing."""
-        return replace(self, uncertainty=uncertainty) if uncertainty > self.uncertainty else self
 
 
 def is_worse(corrected: float, reference: float) -> bool:

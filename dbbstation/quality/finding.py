@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
+
+from dbbstation.facts.serialise import Kept
 
 
 class Name(StrEnum):
@@ -62,7 +65,7 @@ class Finding:
     unit: str
     verdict: FindingVerdict
     text: str
-    short: str = ""
+    short: Annotated[str, Kept] = ""
 
     @property
     def wrong(self) -> bool:

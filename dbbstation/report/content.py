@@ -29,12 +29,12 @@ from dbbstation.results.tolerances import held_against, tolerated_circles, toler
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from dbbstation.circles.budget import Budget
     from dbbstation.circles.path import Filter
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.report.certificate import Certified
-    from dbbstation.results.circle_figures import FigureBudget
     from dbbstation.results.circles import Circled, CirclesResult
     from dbbstation.results.evaluation import EvaluationResult
     from dbbstation.results.ranked import Ranked
@@ -245,7 +245,7 @@ def _findings(found: Circled) -> ShownFindings:
     return ShownFindings(wrong, [(name, text, runs) for (name, text), runs in undecided.items()], good)
 
 
-def _budgets(circles: CirclesResult) -> Iterable[tuple[str, FigureBudget]]:
+def _budgets(circles: CirclesResult) -> Iterable[tuple[str, Budget]]:
     """Yield the name and the budget of every figure."""
     for one in (*circles.runs, *circles.pairs):
         if not isinstance(one, RunWithoutCircle):

@@ -13,13 +13,13 @@ from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from dbbstation.diagnosis.drive.findings import DriveDiagnosis
+    from dbbstation.diagnosis.drive.findings import DriveFindings
 
 MOST_POINTS = 3000
 """Points of a line that are drawn: more make a large file and the same picture."""
 
 
-def drive_figure(diagnosis: DriveDiagnosis, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+def drive_figure(diagnosis: DriveFindings, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
     """Draw a diagnosis of a drive, as SVG."""
     with in_style():
         figure = Figure(figsize=(11.0, 6.2), layout="constrained")
@@ -32,8 +32,8 @@ def drive_figure(diagnosis: DriveDiagnosis, wanted: FigureFormat | Stamped = Fig
         return in_format(figure, wanted)
 
 
-def _force(axes: Axes, diagnosis: DriveDiagnosis) -> None:
-    table = diagnosis.table()
+def _force(axes: Axes, diagnosis: DriveFindings) -> None:
+    table = diagnosis.table
     t, step = table["t_s"], max(len(table["t_s"]) // MOST_POINTS, 1)
     lines = (
         ("measured", "force_n"),
@@ -42,35 +42,35 @@ def _force(axes: Axes, diagnosis: DriveDiagnosis) -> None:
     )
     for colour, (label, column) in zip((MEASURED, BEFORE, AFTER), lines, strict=True):
         axes.plot(t[::step], table[column][::step], color=colour, label=label, linewidth=0.8)
-    axes.axvspan(*diagnosis.held_back_s, color="#eeeeee", zorder=0)
+    axes.axvspan(*diagnosis.held_back.t_s, color="#eeeeee", zorder=0)
     axes.set_ylabel("force, N")
     axes.set_title("force in the band of the comparison; grey: held back")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
 
 
-def _left(axes: Axes, diagnosis: DriveDiagnosis) -> None:
-    table = diagnosis.table()
+def _left(axes: Axes, diagnosis: DriveFindings) -> None:
+    table = diagnosis.table
     t, step = table["t_s"], max(len(table["t_s"]) // MOST_POINTS, 1)
     for colour, column in zip((BEFORE, AFTER), ("base_force_n", "model_force_n"), strict=True):
         axes.plot(t[::step], (table["force_n"] - table[column])[::step], color=colour, linewidth=0.8)
-    before, after = diagnosis.steps[0].relative_force_error, diagnosis.steps[-1].relative_force_error
-    axes.axvspan(*diagnosis.held_back_s, color="#eeeeee", zorder=0)
+    errors = diagnosis.held_back.relative_force_error
+    axes.axvspan(*diagnosis.held_back.t_s, color="#eeeeee", zorder=0)
     axes.set_xlabel("time, s")
     axes.set_ylabel("measured less model, N")
-    axes.set_title(f"what is left; held back {100 * before:.1f} % -> {100 * after:.1f} % of the force")
+    axes.set_title(f"what is left; held back {100 * errors.before:.1f} % -> {100 * errors.after:.1f} % of the force")
 
 
-def _friction(axes: Axes, diagnosis: DriveDiagnosis) -> None:
-    table, curve = diagnosis.table(), diagnosis.curve
-    base, after = diagnosis.before, diagnosis.after
-    mass = after["mass_kg"].value.value if np.isfinite(after["mass_kg"].value.value) else 0.0
+def _friction(axes: Axes, diagnosis: DriveFindings) -> None:
+    table, curve = diagnosis.table, diagnosis.curve
+    base, after = diagnosis.before, diagnosis.parameters
+    mass = after["mass_kg"].value if np.isfinite(after["mass_kg"].value) else 0.0
     # Inertia taken off: what is left hangs on friction, load and noise.
     friction = table["force_n"] - mass * 1e-3 * table["acceleration_mm_s2"]
     step = max(len(friction) // MOST_POINTS, 1)
     axes.plot(table["speed_mm_s"][::step], friction[::step], ".", color=MEASURED, markersize=1.5, label="less inertia")
     axes.plot(
         1e3 * curve.speed_m_s,
-        base["viscous_n_s_m"].value.value * curve.speed_m_s,
+        base["viscous_n_s_m"].value * curve.speed_m_s,
         color=BEFORE,
         label="mass and viscous friction",
         linewidth=1.0,
@@ -89,6 +89,6 @@ def _friction(axes: Axes, diagnosis: DriveDiagnosis) -> None:
     axes.legend(loc="upper left")
 
 
-def _named(diagnosis: DriveDiagnosis) -> str:
+def _named(diagnosis: DriveFindings) -> str:
     count = len(diagnosis.chosen)
     return f"with {count} named cause{'' if count == 1 else 's'}" if count else "nothing more was found"

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from dbbstation.errors import Problem
-from dbbstation.results.findings import FindingResult
+from dbbstation.facts.serialise import Absent
+from dbbstation.quality.finding import Finding
 from dbbstation.results.sampling import SampledCircle
-from dbbstation.results.serialise import Absent
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class CheckedRun:
     """
 
     run: str
-    findings: tuple[FindingResult, ...]
+    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from dbbstation.results.findings import FindingResult
-from dbbstation.results.serialise import Absent
+from dbbstation.circles.budget import Budget
+from dbbstation.circles.quick_look import Symptom
+from dbbstation.circles.reversals import Harmonic, ReversalStep
+from dbbstation.facts.serialise import Absent
+from dbbstation.quality.finding import Finding
 
 
 @dataclass(frozen=True)
@@ -34,36 +37,6 @@ class PlaneVector:
 
     x: float
     y: float
-
-
-@dataclass(frozen=True)
-class HarmonicResult:
-    """One harmonic of the radius.
-
-    Attributes:
-        undulations: per revolution.
-        amplitude_um: of it [µm].
-        peak_deg: where it is largest [deg].
-    """
-
-    undulations: int
-    amplitude_um: float
-    peak_deg: float
-
-
-@dataclass(frozen=True)
-class ReversalStepResult:
-    """A step of the path.
-
-    Attributes:
-        theta_deg: where [deg].
-        height_um: how much the path rises in the sense of travel [µm].
-        u_um: its standard uncertainty [µm].
-    """
-
-    theta_deg: float
-    height_um: float
-    u_um: float
 
 
 @dataclass(frozen=True)
@@ -95,27 +68,6 @@ class NoiseFigures:
 
 
 @dataclass(frozen=True)
-class FigureBudget:
-    """Uncertainty of one figure.
-
-    Attributes:
-        u_um: standard uncertainty [µm]; None where `why_not` says why.
-        terms_um: standard uncertainties that it is made of, by name [µm].
-        missing: what is not stated and not in it.
-        why_not: why it is not known.
-        value_um: the figure, what noise adds taken off [µm].
-        as_read_um: the figure as read [µm].
-    """
-
-    u_um: float | None
-    terms_um: Mapping[str, float]
-    missing: tuple[str, ...]
-    why_not: str | None
-    value_um: float
-    as_read_um: float
-
-
-@dataclass(frozen=True)
 class RunWithoutCircle:
     """A run whose recording shows no circle.
 
@@ -133,7 +85,7 @@ class RunWithoutCircle:
     direction: str
     repeat: int
     problem: str | None
-    findings: Annotated[tuple[FindingResult, ...] | None, Absent] = None
+    findings: Annotated[tuple[Finding, ...] | None, Absent] = None
 
     def row(self) -> dict[str, object]:
         """Its name and findings, for a table."""
@@ -194,14 +146,14 @@ class CircleFiguresResult:
     radius_error_um: float
     mean_radial_error_um: float
     centre_um: PlaneVector
-    harmonics: tuple[HarmonicResult, ...]
-    reversal_steps: tuple[ReversalStepResult, ...]
-    closure: ReversalStepResult | None
+    harmonics: tuple[Harmonic, ...]
+    reversal_steps: tuple[ReversalStep, ...]
+    closure: ReversalStep | None
     drift_um_per_turn: float | None
     feed_shown_mm_min: ShownFeed | None
     noise_um: NoiseFigures
-    uncertainty: Mapping[str, FigureBudget]
-    findings: Annotated[tuple[FindingResult, ...] | None, Absent] = None
+    uncertainty: Mapping[str, Budget]
+    findings: Annotated[tuple[Finding, ...] | None, Absent] = None
 
     def row(self) -> dict[str, object]:
         """Every number of the circle, for a table."""
@@ -249,32 +201,7 @@ class PairFigures:
     d_um: float
     h_um: float
     h_deg: float
-    uncertainty: Mapping[str, FigureBudget]
-
-
-@dataclass(frozen=True, kw_only=True)
-class SymptomResult:
-    """One signature of a serial axis.
-
-    Attributes:
-        signature: its name.
-        place: which axis or end; None where there is one only.
-        value: in its unit; None where it cannot be told.
-        u: standard uncertainty; likewise.
-        below: it is smaller than this, where it was not seen.
-        unit: of all of these.
-        seen: whether it is there.
-        text: in words.
-    """
-
-    signature: str
-    place: str | None
-    value: float | None
-    u: float | None
-    below: float | None
-    unit: str
-    seen: bool
-    text: str | None
+    uncertainty: Mapping[str, Budget]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -295,10 +222,10 @@ class QuickLookResult:
     test: str
     repeat: int
     directions: tuple[str, ...]
-    symptoms: tuple[SymptomResult, ...]
+    symptoms: tuple[Symptom, ...]
     form_rms_um: float | None
     left_rms_um: float | None
 
 
-def _verdicts(findings: tuple[FindingResult, ...] | None) -> dict[str, object]:
+def _verdicts(findings: tuple[Finding, ...] | None) -> dict[str, object]:
     return {f"finding_{one.name.replace(' ', '_')}": one.verdict for one in findings or ()}

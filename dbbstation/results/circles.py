@@ -10,31 +10,25 @@ from dbbstation.circles.analysis import EDITION
 from dbbstation.circles.budget import budgets, pair_budgets
 from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.quick_look import quick_look
+from dbbstation.facts.serialise import Absent, AsItIs, Kept
+from dbbstation.facts.value import finite
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
 from dbbstation.results.circle_figures import (
     CircleFiguresResult,
-    FigureBudget,
-    HarmonicResult,
     LargestAndLeast,
     NoiseFigures,
     PairFigures,
     PlaneVector,
     QuickLookResult,
-    ReversalStepResult,
     RunWithoutCircle,
     ShownFeed,
-    SymptomResult,
 )
-from dbbstation.results.findings import finding_results
 from dbbstation.results.frame import Framed
-from dbbstation.results.inference import finite
-from dbbstation.results.serialise import Absent, AsItIs, Kept
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
-    from dbbstation.circles.budget import Budget, SetUpKnowledge
+    from dbbstation.circles.budget import SetUpKnowledge
     from dbbstation.circles.path import Filter
-    from dbbstation.circles.reversals import ReversalStep
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.quality.judge import Judgement
@@ -147,7 +141,7 @@ def circles_result(found: Circled, chosen: Filter, *, quick_look: bool = False) 
 
 def _run(circle: MeasuredCircle) -> CircleFiguresResult | RunWithoutCircle:
     entry, one = circle.entry, circle.analysis
-    findings = None if circle.judgement is None else finding_results(circle.judgement.findings)
+    findings = None if circle.judgement is None else tuple(circle.judgement.findings)
     if one is None:
         name = (circle.session, entry.test, str(entry.direction), entry.repeat)
         return RunWithoutCircle(*name, circle.problem or None, findings)
@@ -173,13 +167,13 @@ def _run(circle: MeasuredCircle) -> CircleFiguresResult | RunWithoutCircle:
         radius_error_um=one.radius_error_um,
         mean_radial_error_um=one.mean_radial_error_um,
         centre_um=PlaneVector(1e3 * x_mm, 1e3 * y_mm),
-        harmonics=tuple(HarmonicResult(h.undulations, h.amplitude_um, h.peak_deg) for h in one.harmonics),
-        reversal_steps=tuple(_step(step) for step in one.steps),
-        closure=None if one.closure is None else _step(one.closure),
+        harmonics=tuple(one.harmonics),
+        reversal_steps=tuple(one.steps),
+        closure=one.closure,
         drift_um_per_turn=None if one.passes is None else one.passes.mean_um,
         feed_shown_mm_min=None if one.feed_mm_min is None else ShownFeed(*one.feed_mm_min),
         noise_um=NoiseFigures(finite(one.noise.slow_um), finite(one.noise.reading_um), one.noise.resolution_um),
-        uncertainty=_budgets(figures),
+        uncertainty={str(quantity): budget for quantity, budget in figures.items()},
         findings=findings,
     )
 
@@ -195,26 +189,8 @@ def _pair(pair: MeasuredPair) -> PairFigures:
         d_um=pair.analysis.d_um,
         h_um=figures[BudgetQuantity.H].value_um,
         h_deg=pair.analysis.h_deg,
-        uncertainty=_budgets(figures),
+        uncertainty={str(quantity): budget for quantity, budget in figures.items()},
     )
-
-
-def _budgets(figures: Mapping[BudgetQuantity, Budget]) -> dict[str, FigureBudget]:
-    return {
-        str(quantity): FigureBudget(
-            u_um=budget.u_um,
-            terms_um={str(term): float(size) for term, size in budget.terms_um.items()},
-            missing=tuple(budget.missing),
-            why_not=budget.why_not or None,
-            value_um=budget.value_um,
-            as_read_um=budget.as_read_um,
-        )
-        for quantity, budget in figures.items()
-    }
-
-
-def _step(step: ReversalStep) -> ReversalStepResult:
-    return ReversalStepResult(step.theta_deg, step.height_um, step.u_um)
 
 
 def _quick_looks(found: Circled) -> list[QuickLookResult]:
@@ -227,26 +203,13 @@ def _quick_looks(found: Circled) -> list[QuickLookResult]:
             continue
         turns = [one for one in (circle, partner.get(id(circle))) if one is not None]
         looked = quick_look([one.analysis for one in turns if one.analysis is not None])
-        symptoms = () if looked is None else looked.symptoms
         looks.append(
             QuickLookResult(
                 session=circle.session,
                 test=circle.entry.test,
                 repeat=circle.entry.repeat,
                 directions=tuple(str(one.entry.direction) for one in turns),
-                symptoms=tuple(
-                    SymptomResult(
-                        signature=str(one.signature),
-                        place=one.place or None,
-                        value=one.value,
-                        u=one.u,
-                        below=one.below,
-                        unit=one.unit,
-                        seen=one.seen,
-                        text=one.text or None,
-                    )
-                    for one in symptoms
-                ),
+                symptoms=() if looked is None else tuple(looked.symptoms),
                 form_rms_um=None if looked is None else looked.form_rms_um,
                 left_rms_um=None if looked is None else looked.left_rms_um,
             )

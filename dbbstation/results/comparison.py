@@ -8,10 +8,11 @@ from typing import Annotated
 
 from pydantic import Field
 
+from dbbstation.facts.value import Value
+from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.verdict import Gains
 from dbbstation.results.diagnosis import BeforeAfter
 from dbbstation.results.frame import Framed
-from dbbstation.results.inference import CancellingResult, HeldOutGains
-from dbbstation.results.serialise import Quantified
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +143,7 @@ class ComparedCause:
     acts: str
     persists: bool
     recurs: bool
-    gains: HeldOutGains | None
+    gains: Gains | None
     probability: float
     log_evidence: float
     ambiguous_with: tuple[str, ...]
@@ -153,7 +154,7 @@ class ComparedCause:
     opposite: float | None
     where: LargestEffect | None
     spans: tuple[VariableSpan, ...]
-    parameters: Mapping[str, Quantified]
+    parameters: Mapping[str, Value]
     text: str
 
 
@@ -252,7 +253,7 @@ class ComparisonResult(Framed):
     held_out_rms_um: BeforeAfter
     runs: tuple[ComparedRun, ...]
     directions: DirectionHalves | None
-    cancelling: CancellingResult | None
+    cancelling: Cancelling | None
     organised_text: str
     causes: tuple[ComparedCause | CauseNotAsked, ...]
     left: ComparisonResidual

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from dbbstation.calibration.reporting.evaluation import CircleDeviations
+from dbbstation.facts.value import Value
 from dbbstation.results.diagnosis import BeforeAfter
-from dbbstation.results.evaluation import CircleDeviations
 from dbbstation.results.report import ReportVerdict
-from dbbstation.results.serialise import Quantified
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class DemoCause:
     name: str
     verdict: str
     concealed: float | None
-    parameters: Mapping[str, Quantified]
+    parameters: Mapping[str, Value]
 
 
 @dataclass(frozen=True)

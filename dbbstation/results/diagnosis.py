@@ -8,12 +8,14 @@ from typing import Annotated
 
 from pydantic import Field
 
+from dbbstation.calibration.outliers.outlier import Outlier
+from dbbstation.facts.serialise import Absent, AsItIs, Kept
+from dbbstation.facts.value import Value
+from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.verdict import Gains
 from dbbstation.model.identified import IdentifiedModel
-from dbbstation.results.calibration import OutlierResult
 from dbbstation.results.effects import CauseContribution
 from dbbstation.results.frame import Framed
-from dbbstation.results.inference import CancellingResult, HeldOutGains
-from dbbstation.results.serialise import Absent, AsItIs, Kept, Quantified
 
 
 @dataclass(frozen=True)
@@ -129,8 +131,8 @@ class CauseResult:
     acts: str | None = None
     persists: bool = False
     sigmas: float | None = None
-    gains: HeldOutGains | None = None
-    parameters: Mapping[str, Quantified] = field(default_factory=dict)
+    gains: Gains | None = None
+    parameters: Mapping[str, Value] = field(default_factory=dict)
     text: str
 
 
@@ -305,10 +307,10 @@ class DiagnosisFigures(Framed):
     held_out_worse: bool | None
     circularity_um: tuple[CircularityLeft, ...]
     workspace: WorkspaceGain | None
-    outliers: tuple[OutlierResult, ...]
+    outliers: tuple[Outlier, ...]
     locations: tuple[MisfitLocation, ...]
     sources: tuple[CauseResult, ...]
-    cancelling: CancellingResult | None
+    cancelling: Cancelling | None
     unexplained: UnexplainedResult
     parameter_shift: tuple[ParameterShift, ...]
     second_start_agrees: bool | None

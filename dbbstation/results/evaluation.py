@@ -5,102 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from dbbstation.calibration.reporting.evaluation import EvaluatedRun
+from dbbstation.calibration.reporting.tolerances import EvaluatedTolerance
+from dbbstation.facts.serialise import Absent
 from dbbstation.results.frame import Framed
-from dbbstation.results.serialise import Absent
-
-
-@dataclass(frozen=True)
-class CircleDeviations:
-    """Figures of one circle [CAL Table III].
-
-    Attributes:
-        centre_deviation_um: length of the least-squares centre's offset [µm].
-        mean_radial_error_um: mean of length less radius about the commanded centre [µm].
-        circularity_um: greatest less least deviation from the least-squares circle [µm].
-        centre_deviation_from_first_um: distance of the centre from that of the first test in this direction; None of readings
-            themselves [µm].
-    """
-
-    centre_deviation_um: float
-    mean_radial_error_um: float
-    circularity_um: float
-    centre_deviation_from_first_um: Annotated[float | None, Absent] = None
-
-
-@dataclass(frozen=True)
-class LowPassedCircularity:
-    """Circular deviation G of readings low-passed at 30 undulations per revolution.
-
-    Attributes:
-        measured: of the readings [µm].
-        predicted: of what the model makes the bar read [µm].
-        before: of what the nominal machine leaves [µm].
-        after: of what the model leaves [µm].
-    """
-
-    measured: float
-    predicted: float
-    before: float
-    after: float
-
-
-@dataclass(frozen=True)
-class EvaluatedRun:
-    """One run before, under the nominal machine, and after, under the model.
-
-    Attributes:
-        test: name of the test.
-        direction: `ccw` or `cw`.
-        repeat: counts runs of this test and direction.
-        measured: figures of the readings.
-        before: figures of what the nominal machine leaves.
-        after: figures of what the model leaves.
-        circularity_30_upr_um: the circular deviation without the bar's noise; None where it was not asked for.
-    """
-
-    test: str
-    direction: str
-    repeat: int
-    measured: CircleDeviations
-    before: CircleDeviations
-    after: CircleDeviations
-    circularity_30_upr_um: Annotated[LowPassedCircularity | None, Absent] = None
-
-
-@dataclass(frozen=True)
-class WorstRun:
-    """The run with the largest figure that a tolerance is for.
-
-    Attributes:
-        run: test, direction and repeat.
-        worst_um: its figure [µm].
-        within: whether that is within tolerance.
-    """
-
-    run: str
-    worst_um: float
-    within: bool
-
-
-@dataclass(frozen=True)
-class EvaluatedTolerance:
-    """A tolerance, and the worst run under the nominal machine and under the model.
-
-    Attributes:
-        quantity: which figure it is for.
-        largest_um: the limit [µm].
-        tests: that it holds for; empty for all.
-        directions: that it holds for; empty for both.
-        before: under the nominal machine; None where it holds for no run.
-        after: under the model; None where it holds for no run.
-    """
-
-    quantity: str
-    largest_um: float
-    tests: tuple[str, ...]
-    directions: tuple[str, ...]
-    before: WorstRun | None
-    after: WorstRun | None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from dbbstation.facts.serialise import Absent
 from dbbstation.results.frame import Framed
-from dbbstation.results.serialise import Absent
 
 State = Literal["done", "up-to-date", "failed"]
 """Of a session: worked out now; known from an earlier call with the same inputs, options and program; failed."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import OutputError, StationError
+from dbbstation.facts.serialise import AsItIs, Kept, json_of, plain
 from dbbstation.files.atomic import write_bytes
-from dbbstation.results.serialise import AsItIs, Kept, json_of, plain
 
 if TYPE_CHECKING:
     from os import PathLike

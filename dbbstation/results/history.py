@@ -8,8 +8,8 @@ from typing import Annotated
 
 from pydantic import Field
 
+from dbbstation.facts.serialise import Kept
 from dbbstation.results.frame import Framed
-from dbbstation.results.serialise import Kept
 
 
 @dataclass(frozen=True)

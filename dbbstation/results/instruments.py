@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.results.serialise import Absent
+from dbbstation.facts.serialise import Absent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

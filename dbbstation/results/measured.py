@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from dbbstation.results.findings import FindingResult
-from dbbstation.results.serialise import Absent
+from dbbstation.facts.serialise import Absent
+from dbbstation.quality.finding import Finding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ class CompletedRun(RecordedRun):
     lost: int
     doubtful: int
     problem: str | None
-    findings: tuple[FindingResult, ...]
+    findings: tuple[Finding, ...]
     centre_deviation_um: Annotated[float | None, Absent] = None
     mean_radial_error_um: Annotated[float | None, Absent] = None
     circularity_um: Annotated[float | None, Absent] = None

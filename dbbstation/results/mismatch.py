@@ -8,10 +8,14 @@ from typing import Annotated
 
 from pydantic import Field
 
+from dbbstation.facts.serialise import Absent, AsItIs, Kept
+from dbbstation.facts.value import Value
+from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
+from dbbstation.inference.read_off import Span
+from dbbstation.inference.verdict import Gains
 from dbbstation.results.frame import Framed
-from dbbstation.results.inference import CancellingResult, EffectSpan, HeldOutGains, ResidualResult
-from dbbstation.results.serialise import Absent, AsItIs, Kept, Quantified
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,7 @@ class VariableResult:
 
 
 @dataclass(frozen=True)
-class OffsetResult(Quantified):
+class OffsetResult(Value):
     """Measured less simulated value on average.
 
     Attributes:
@@ -188,7 +192,7 @@ class EffectResult:
     acts: str
     persists: bool
     recurs: bool
-    gains: HeldOutGains | None
+    gains: Gains | None
     form: str | None
     variables: tuple[str, ...]
     probability: float
@@ -196,8 +200,8 @@ class EffectResult:
     rms: float
     sigmas: float
     confounded: float
-    values: Mapping[str, Quantified]
-    spans: tuple[EffectSpan, ...]
+    values: Mapping[str, Value]
+    spans: tuple[Span, ...]
     rows_there: float
     rows: tuple[tuple[int, ...], ...]
     blocks: Mapping[str, float]
@@ -223,8 +227,8 @@ class RefittedResult:
     """
 
     name: str
-    before: Quantified
-    after: Quantified
+    before: Value
+    after: Value
     shift: float
     confounded: float
     known: float | None
@@ -286,11 +290,11 @@ class MismatchResult(Framed):
     residual_rms: ResidualRms
     held_out: str
     held_out_rms: HeldOutRms | None
-    cancelling: CancellingResult | None
+    cancelling: Cancelling | None
     led_by: tuple[VariableShare, ...]
     findings: tuple[EffectResult, ...]
     parameters: tuple[RefittedResult, ...]
-    left: ResidualResult
+    left: LeftOver
     second_start_agrees: bool
     second_start_log_odds: float
     next: tuple[NextMeasurement, ...]

@@ -20,7 +20,6 @@ from dbbstation.results.comparison import (
     VariableSpan,
 )
 from dbbstation.results.diagnosis import BeforeAfter
-from dbbstation.results.inference import all_quantified, cancelling_result, gains_result
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -68,7 +67,7 @@ def comparison_result(
         held_out_rms_um=BeforeAfter(1e3 * before.rms, 1e3 * after.rms),
         runs=tuple(_run(run) for run in largest_first),
         directions=None if halves is None else DirectionHalves(1e3 * halves[0], 1e3 * halves[1]),
-        cancelling=cancelling_result(found.cancelling, "µm", 1e3),
+        cancelling=found.cancelling,
         organised_text=organised_text(found),
         causes=(
             *(_cause(found, finding) for finding in found.there),
@@ -104,7 +103,7 @@ def _cause(found: Comparison, finding: CauseFinding) -> ComparedCause:
         acts=finding.acts.name.lower(),
         persists=finding.persists,
         recurs=finding.recurs,
-        gains=gains_result(finding.gains),
+        gains=finding.gains,
         probability=finding.probability,
         log_evidence=finding.log_factor,
         ambiguous_with=tuple(finding.ambiguous_with),
@@ -115,7 +114,7 @@ def _cause(found: Comparison, finding: CauseFinding) -> ComparedCause:
         opposite=None if effect is None else effect.opposite,
         where=where,
         spans=tuple(VariableSpan(one.variable, one.low, one.high, one.unit) for one in finding.spans),
-        parameters=all_quantified(finding.values),
+        parameters=finding.values,
         text=finding.text,
     )
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.calibration.outliers.outlier import SOURCE_OF, OutlierKind
 from dbbstation.calibration.reporting.evaluation import rms_um
+from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import Acts, Verdict
 from dbbstation.results.diagnosis import (
     BeforeAfter,
@@ -23,9 +24,6 @@ from dbbstation.results.diagnosis import (
     UnexplainedResult,
     WorkspaceGain,
 )
-from dbbstation.results.inference import cancelling_result, gains_result
-from dbbstation.results.of_calibration import outlier_result
-from dbbstation.results.serialise import Quantified
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
@@ -58,14 +56,14 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
         held_out_worse=None if diagnosis.chosen_anew is None else diagnosis.chosen_anew.is_worse,
         circularity_um=_circularity(diagnosis),
         workspace=_workspace(diagnosis),
-        outliers=tuple(outlier_result(outlier) for outlier in diagnosis.outliers),
+        outliers=tuple(outlier for outlier in diagnosis.outliers),
         locations=tuple(_location(location) for location in diagnosis.locations),
         sources=(
             *_mountings(diagnosis),
             *(_cause(source) for source in diagnosis.sources),
             *(CauseResult(name=name, verdict=str(Verdict.NOT_TESTABLE), text=why) for name, why in lacking.items()),
         ),
-        cancelling=cancelling_result(diagnosis.cancelling, "µm", 1e3),
+        cancelling=diagnosis.cancelling,
         unexplained=UnexplainedResult(
             rms_um=rest.rms_um,
             strut=rest.strut,
@@ -170,7 +168,7 @@ def _mountings(diagnosis: Diagnosis) -> list[CauseResult]:
                     acts=Acts.ONCE.name.lower(),
                     ambiguous_with=tuple(alike),
                     parameters={
-                        _of(outlier): Quantified(outlier.size_um, outlier.uncertainty_um, "µm")
+                        _of(outlier): Value(outlier.size_um, outlier.uncertainty_um, "µm")
                         for outlier in of
                         if outlier.uncertainty_um is not None
                     },
@@ -181,7 +179,7 @@ def _mountings(diagnosis: Diagnosis) -> list[CauseResult]:
 
 
 def _of(outlier: Outlier) -> str:
-    return f"offset ({outlier.test})" if outlier.kind is OutlierKind.BAR else f"distance ({outlier.run})"
+    return f"offset ({outlier.test})" if outlier.kind is OutlierKind.BAR else f"distance ({outlier.runs})"
 
 
 BALLS = ("mounting", "ball-coordinate")
@@ -224,8 +222,8 @@ def _cause(source: SourceFinding) -> CauseResult:
         acts=source.acts.name.lower(),
         persists=source.persists,
         sigmas=source.sigmas,
-        gains=gains_result(source.gains),
-        parameters={name: Quantified(v.value, v.uncertainty, v.unit) for name, v in source.parameters.items()},
+        gains=source.gains,
+        parameters={name: Value(v.value, v.uncertainty, v.unit) for name, v in source.parameters.items()},
         text=source.text,
     )
 

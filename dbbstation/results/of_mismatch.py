@@ -7,14 +7,6 @@ from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.diagnosis.table.words import sentence_of
-from dbbstation.results.inference import (
-    all_quantified,
-    cancelling_result,
-    gains_result,
-    quantified,
-    residual_result,
-    span_result,
-)
 from dbbstation.results.mismatch import (
     EffectResult,
     HeldOutPart,
@@ -68,11 +60,11 @@ def mismatch_result(
         residual_rms=ResidualRms(found.rms_before, found.rms_after),
         held_out="not-tested" if found.held_out is None else "tested",
         held_out_rms=_held_out(found),
-        cancelling=cancelling_result(found.cancelling, compared.unit),
+        cancelling=found.cancelling,
         led_by=tuple(VariableShare(s.variable, s.rms, s.share, s.lost, s.terms) for s in found.shares),
         findings=tuple(_effect(found, finding) for finding in found.findings),
         parameters=tuple(_parameter(one) for one in found.fitted),
-        left=residual_result(found.left),
+        left=found.left,
         second_start_agrees=found.second_start == 0.0,
         second_start_log_odds=found.second_start,
         next=tuple(NextMeasurement(step.text, tuple(step.variables)) for step in next_measurements(found)),
@@ -86,7 +78,7 @@ def mismatch_result(
 def _offset(found: Mismatch) -> OffsetResult | None:
     if found.offset is None:
         return None
-    known = quantified(found.offset)
+    known = found.offset
     return OffsetResult(known.value, known.uncertainty, known.unit, found.offset_is_there)
 
 
@@ -123,7 +115,7 @@ def _effect(found: Mismatch, finding: CauseFinding) -> EffectResult:
         acts=finding.acts.name.lower(),
         persists=finding.persists,
         recurs=finding.recurs,
-        gains=gains_result(finding.gains),
+        gains=finding.gains,
         form=None if finding.family is None else str(finding.family),
         variables=tuple(finding.variables),
         probability=finding.probability,
@@ -131,8 +123,8 @@ def _effect(found: Mismatch, finding: CauseFinding) -> EffectResult:
         rms=finding.rms,
         sigmas=finding.sigmas,
         confounded=finding.confounded,
-        values=all_quantified(finding.values),
-        spans=tuple(span_result(one) for one in finding.spans),
+        values=finding.values,
+        spans=tuple(one for one in finding.spans),
         rows_there=finding.rows_there,
         rows=tuple(tuple(rows) for rows in finding.rows),
         blocks=dict(zip(found.table.names, finding.blocks, strict=True)) if finding.blocks else {},
@@ -146,8 +138,8 @@ def _effect(found: Mismatch, finding: CauseFinding) -> EffectResult:
 def _parameter(one: RefittedParameter) -> RefittedResult:
     return RefittedResult(
         name=one.name,
-        before=quantified(one.before),
-        after=quantified(one.after),
+        before=one.before,
+        after=one.after,
         shift=one.after.value - one.before.value,
         confounded=one.confounded,
         known=one.known,

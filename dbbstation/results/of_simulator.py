@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.simulator.nodes import spread_of
+from dbbstation.facts.value import finite
 from dbbstation.inference.verdict import Verdict
-from dbbstation.results.inference import all_quantified, finite, gains_result, quantified, residual_result
 from dbbstation.results.simulator import (
     HeldOutSimulation,
     HeldOutSimulations,
@@ -61,7 +61,7 @@ def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -
         held_out_rms=_held_out(answer),
         findings=tuple(_term(answer, one) for one in answer.findings),
         parameters=tuple(_parameter(one) for one in answer.parameters),
-        left=residual_result(answer.left),
+        left=answer.left,
         next=tuple(
             SeparatingInput(
                 one.text,
@@ -104,8 +104,8 @@ def _term(answer: SimulatorComparison, one: CauseFinding) -> PortTerm:
         sigmas=one.sigmas,
         confounded=one.confounded,
         linear_and_true_differ_by=finite(answer.nonlinear.get(one.name)),
-        values=all_quantified(one.values),
-        gains=gains_result(one.gains),
+        values=one.values,
+        gains=one.gains,
         equivalent=tuple(one.equivalent),
         ambiguous_with=tuple(one.ambiguous_with),
         text=one.text or _why(one),
@@ -126,8 +126,8 @@ def _parameter(one: Moved) -> SimulatorParameterResult:
         name=one.name,
         unit=one.before.unit,
         stated=one.stated,
-        refitted=quantified(one.before),
-        corrected=quantified(one.after),
+        refitted=one.before,
+        corrected=one.after,
         shift=shift,
         shift_over_u=finite(shift / u if u > 0.0 else None),
         confounded=one.confounded,

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from numpy.typing import NDArray
 
+from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.model.uncertainty import pose_errors
 from dbbstation.results.frame import Framed
 from dbbstation.results.model_warnings import model_warnings, unknown_causes
-from dbbstation.results.serialise import Absent, AsItIs, Kept
 
 if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
+from dbbstation.facts.serialise import Kept
 from dbbstation.nc.kept import said_acceleration
 from dbbstation.results.frame import Framed
-from dbbstation.results.serialise import Kept
 
 if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine

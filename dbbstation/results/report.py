@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from dbbstation.facts.serialise import Kept
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.effects import CauseContribution
 from dbbstation.results.evaluation import EvaluationResult
 from dbbstation.results.frame import Framed
-from dbbstation.results.serialise import Kept
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from dbbstation.facts.serialise import schema_of
 from dbbstation.results.calibration import CalibrationResult
 from dbbstation.results.checked import CheckResult
 from dbbstation.results.circles import CirclesResult
@@ -23,7 +24,6 @@ from dbbstation.results.plotted import PlotResult
 from dbbstation.results.prediction import PredictionResult
 from dbbstation.results.programs import ProgramsResult
 from dbbstation.results.report import ReportResult
-from dbbstation.results.serialise import schema_of
 from dbbstation.results.sessions import ListedSession, SessionEvents, SimulatedSession
 from dbbstation.results.settings import SettingsResult
 from dbbstation.results.simulator import SimulatorResult

@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
+from dbbstation.facts.serialise import Absent
+from dbbstation.facts.value import Value
+from dbbstation.inference.left_over import LeftOver
+from dbbstation.inference.verdict import Gains
 from dbbstation.results.frame import Framed
-from dbbstation.results.inference import HeldOutGains, ResidualResult
-from dbbstation.results.serialise import Absent, Quantified
 
 
 @dataclass(frozen=True)
@@ -133,8 +135,8 @@ class PortTerm:
     sigmas: float
     confounded: float
     linear_and_true_differ_by: float | None
-    values: Mapping[str, Quantified]
-    gains: HeldOutGains | None
+    values: Mapping[str, Value]
+    gains: Gains | None
     equivalent: tuple[str, ...]
     ambiguous_with: tuple[str, ...]
     text: str
@@ -159,8 +161,8 @@ class SimulatorParameterResult:
     name: str
     unit: str
     stated: float
-    refitted: Quantified
-    corrected: Quantified
+    refitted: Value
+    corrected: Value
     shift: float
     shift_over_u: float | None
     confounded: float
@@ -249,7 +251,7 @@ class SimulatorResult(Framed):
     held_out_rms: HeldOutSimulations | None
     findings: tuple[PortTerm, ...]
     parameters: tuple[SimulatorParameterResult, ...]
-    left: ResidualResult
+    left: LeftOver
     next: tuple[SeparatingInput, ...]
     not_asked: Mapping[str, str]
     simulations: SimulationsRun

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from dbbstation.calibration.fit.calibrate import default_sources
+from dbbstation.facts.serialise import Absent
 from dbbstation.machine.geometry import Machine
-from dbbstation.results.serialise import Absent
 from dbbstation.sources.contract import ErrorSource
 
 

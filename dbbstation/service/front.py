@@ -9,10 +9,10 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
+from dbbstation.facts.serialise import read_plain
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
-from dbbstation.results.serialise import read_plain
 from dbbstation.service.after import JOINT, KINEMATIC, After
 from dbbstation.service.answers import ProgramsAnswer
 from dbbstation.service.bar_calibration import BarCalibration, Stated

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, InstrumentError, Problem
+from dbbstation.facts.serialise import read_plain
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.job import JobFile, read_job
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
@@ -18,7 +19,6 @@ from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import format_for, read_document, validate
 from dbbstation.instrument.library import load_instrument
 from dbbstation.quality.conformity import Conformity
-from dbbstation.results.serialise import read_plain
 from dbbstation.service.after import After
 from dbbstation.service.answers import ReportAnswer
 from dbbstation.service.choice import Choice

@@ -77,7 +77,7 @@ def done(job: SessionJob) -> Mapping[str, object]:
         StationError: whatever the task raises.
         ValueError: the job lacks a file that its task needs.
     """
-    from dbbstation.results.serialise import plain  # noqa: PLC0415 - the job is read before half a second of imports
+    from dbbstation.facts.serialise import plain  # noqa: PLC0415 - the job is read before half a second of imports
 
     settings = read_settings(settings_files(job.beside) if job.settings is None else [job.settings])
     match job.task:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -15,11 +16,12 @@ from dbbstation.calibration.fit.calibrate import calibrate as fit
 from dbbstation.calibration.fit.methods import Method, as_known
 from dbbstation.calibration.outliers.robust import calibrate_robust
 from dbbstation.calibration.reporting.evaluation import evaluate
+from dbbstation.calibration.reporting.figures import calibration_figures, covariance_of, report_of
 from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.errors import ModelError
 from dbbstation.files.own_sources import every_source
 from dbbstation.model.observation import Motions
-from dbbstation.results.of_calibration import calibration_figures, calibration_result, report_of
+from dbbstation.results.calibration import CalibrationResult
 from dbbstation.sources.laws.by_temperature import following_thermometers
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import loaded
@@ -30,7 +32,6 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.fit.prescription import Name
     from dbbstation.model.observation import Observation
-    from dbbstation.results.calibration import CalibrationResult
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.load import Recorded, Sessions
     from dbbstation.tasks.telling import Progress
@@ -106,9 +107,10 @@ def calibrate(
     telling.stage("observability")
     figures = calibration_figures(calibration, evaluated, outliers)
     model = identified_model(calibration, report_of(figures, method=str(way)), recorded.sessions)
-    return calibration_result(
-        figures,
+    return CalibrationResult(
+        **{one.name: getattr(figures, one.name) for one in fields(figures)},
         method=str(way),
+        covariance=covariance_of(model),
         model=model,
         drawing=partial(_drawn, calibration),
         notes=tuple(telling.notes),

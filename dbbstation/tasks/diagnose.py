@@ -10,17 +10,17 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import default_sources
 from dbbstation.calibration.reporting.evaluation import evaluate
+from dbbstation.calibration.reporting.figures import calibration_figures, report_of
 from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.diagnosis import diagnose as search
 from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.diagnosis.effects import effects_of
 from dbbstation.diagnosis.unexplained_model import keep_unexplained as keeping
 from dbbstation.errors import ModelError
+from dbbstation.facts.serialise import plain
 from dbbstation.files.own_sources import every_source
 from dbbstation.results.effects import effect_results
-from dbbstation.results.of_calibration import calibration_figures, report_of
 from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result, kept_of
-from dbbstation.results.serialise import plain
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.load import loaded
 from dbbstation.tasks.telling import Telling, never, silent

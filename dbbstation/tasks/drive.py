@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
 from dbbstation.files.recordings.drive_csv import read_drive
-from dbbstation.results.of_drive import drive_result
+from dbbstation.results.drive import drive_result
 from dbbstation.tasks.load import paths_of
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.diagnosis.drive.findings import DriveDiagnosis
+    from dbbstation.diagnosis.drive.findings import DriveFindings
     from dbbstation.results.drive import DriveResult
     from dbbstation.tasks.load import Sessions
     from dbbstation.tasks.telling import Progress
@@ -67,7 +67,7 @@ def drive(
     return result
 
 
-def _drawn(found: DriveDiagnosis, wanted: object) -> bytes:
+def _drawn(found: DriveFindings, wanted: object) -> bytes:
     from dbbstation.report.drive_figure import drive_figure  # noqa: PLC0415 - half a second for who draws nothing
     from dbbstation.report.figure_format import figure_format  # noqa: PLC0415
 

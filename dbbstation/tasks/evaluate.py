@@ -6,12 +6,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.calibration.reporting import evaluation
-from dbbstation.calibration.reporting.evaluation import plane_figures, plane_uncertainty_um
+from dbbstation.calibration.reporting.evaluation import LowPassedCircularity, plane_figures, plane_uncertainty_um
 from dbbstation.calibration.reporting.prediction import predicted_circles
+from dbbstation.calibration.reporting.tolerances import evaluated_tolerances
 from dbbstation.machine.difference import check_model_is_of
-from dbbstation.results.evaluation import EvaluationResult, LowPassedCircularity
+from dbbstation.results.evaluation import EvaluationResult
 from dbbstation.results.model_warnings import model_warnings
-from dbbstation.results.of_evaluation import evaluated_runs, evaluated_tolerances
 from dbbstation.tasks.load import loaded
 from dbbstation.tasks.models import model_of
 from dbbstation.tasks.telling import Telling, never, silent
@@ -77,7 +77,7 @@ def evaluate(
                 circle.measured_um, circle.predicted_um, circle.before_um, circle.after_um
             ),
         )
-        for run, circle in zip(evaluated_runs(found.runs), circles, strict=True)
+        for run, circle in zip(found.runs, circles, strict=True)
     )
     height_mm = min(observation.raw.circle.centre_mm[2] for observation in recorded.observations)
     plane = plane_figures(identified.model, height_mm)

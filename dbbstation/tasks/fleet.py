@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
+from dbbstation.facts.serialise import read_plain
 from dbbstation.files.atomic import write_bytes
 from dbbstation.files.fleet_folder import FleetFolder, key_of
 from dbbstation.files.gateway import digest_of
@@ -20,7 +21,6 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.report.fleet_page import fleet_html
 from dbbstation.results.fleet import FleetFound, FleetResult, FleetSession, StoredFiles
-from dbbstation.results.serialise import read_plain
 from dbbstation.sisters.unlike import FALSE_ALARMS
 from dbbstation.tasks.executors import Ended, WorkPool
 from dbbstation.tasks.fleet_compare import Sister, compared

@@ -13,6 +13,7 @@ import numpy as np
 
 from dbbstation import __version__
 from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import model_text
 from dbbstation.files.formats.settings import Settings
 from dbbstation.files.gateway import content_of, digest_of
@@ -22,7 +23,6 @@ from dbbstation.files.places import name_of
 from dbbstation.files.provenance import Provenance
 from dbbstation.files.recordings.folder_of_sessions import reason_of
 from dbbstation.results.fleet import FleetCause, FleetFound, FleetValue
-from dbbstation.results.serialise import plain
 from dbbstation.tasks.calibrate import calibrate
 from dbbstation.tasks.circles import circle_figures
 from dbbstation.tasks.diagnose import diagnose

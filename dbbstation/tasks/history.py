@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.computing.processes import each
 from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.facts.serialise import json_of, read_json
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_known
 from dbbstation.files.kept import Kept, NotedAnchor, Stamp, stamp_of
@@ -22,7 +23,6 @@ from dbbstation.history.order import date_faults
 from dbbstation.history.record import ModelFigures, SessionFigures
 from dbbstation.history.trend import histories
 from dbbstation.results.of_history import history_result
-from dbbstation.results.serialise import json_of, read_json
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 from textual.content import Content
 
 from dbbstation.errors import StationError
-from dbbstation.results.serialise import read_plain
+from dbbstation.facts.serialise import read_plain
 from dbbstation.service.answers import AcceptanceAnswer, ReportAnswer
 from dbbstation.service.background import Background
 from dbbstation.service.former_sessions import before_and_now

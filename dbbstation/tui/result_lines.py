@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.results.serialise import read_plain
+from dbbstation.facts.serialise import read_plain
 from dbbstation.service.answers import (
     AcceptanceAnswer,
     CalibrationAnswer,

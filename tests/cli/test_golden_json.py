@@ -6,9 +6,9 @@ import json
 
 import pytest
 
+from dbbstation.facts.serialise import read_plain
 from dbbstation.results.demo import DemoCalibration, DemoDiagnosis, DemoEvaluation, DemoReport
 from dbbstation.results.schemas import RESULTS
-from dbbstation.results.serialise import read_plain
 from dbbstation.service.answers import AcceptanceAnswer, CalibrationAnswer, DiagnosisAnswer, ProgramsAnswer
 from tests.cli.golden_json import GOLDEN, keys_of, lines_of, without_place
 from tests.cli.json_schema import faults

@@ -9,17 +9,17 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import default_sources
 from dbbstation.calibration.reporting.evaluation import evaluate
+from dbbstation.calibration.reporting.figures import calibration_figures
 from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.workspace import workspace
+from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import pose_errors, position_uncertainty_mm, predicted_poses
 from dbbstation.report.model_part import parameters
-from dbbstation.results.of_calibration import calibration_figures
 from dbbstation.results.of_diagnosis import diagnosis_figures
-from dbbstation.results.serialise import plain
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import sources_named
 from dbbstation.virtual.truth import random_kinematics

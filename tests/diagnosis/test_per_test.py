@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.per_test import TRACE_SECTORS, gains_by_test
+from dbbstation.facts.serialise import plain
 from dbbstation.results.of_diagnosis import diagnosis_figures
-from dbbstation.results.serialise import plain
 from tests.diagnosis.joint_fits import joint_fit
 
 

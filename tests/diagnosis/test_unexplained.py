@@ -13,11 +13,11 @@ from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.shapes import READING, Follows
 from dbbstation.diagnosis.unexplained_model import keep_unexplained
 from dbbstation.errors import ModelError
+from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import read_model, write_model
 from dbbstation.model.compensation import compensated
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.results.of_diagnosis import diagnosis_figures
-from dbbstation.results.serialise import plain
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnose import default_candidates

@@ -13,16 +13,16 @@ RMS = np.sqrt(0.5)
 
 
 def test_three_effects_that_explain_less_than_each_of_them():
-    found = cancelling({"a": 5.8 * ONCE, "b": -4.6 * ONCE, "c": 0.3 * TWICE})
+    found = cancelling({"a": 5.8 * ONCE, "b": -4.6 * ONCE, "c": 0.3 * TWICE}, "mm")
     assert found.rms == pytest.approx({"a": 5.8 * RMS, "b": 4.6 * RMS})
     assert found.rms_of_sum == pytest.approx(np.hypot(1.2, 0.3) * RMS)
 
 
 @pytest.mark.parametrize("second", [TWICE, ONCE, -0.2 * ONCE, 3.0 + TWICE])
 def test_effects_that_have_little_to_do_with_each_other_or_add_up(second):
-    assert cancelling({"a": ONCE, "b": second}) is None
+    assert cancelling({"a": ONCE, "b": second}, "mm") is None
 
 
 def test_one_effect_or_none():
-    assert cancelling({"a": ONCE}) is None
-    assert cancelling({}) is None
+    assert cancelling({"a": ONCE}, "mm") is None
+    assert cancelling({}, "mm") is None

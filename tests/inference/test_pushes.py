@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dbbstation.facts.value import Value
 from dbbstation.inference.pushes import distinct_sizes, most_of_one_size, too_many, within_a_step
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle
-from dbbstation.inference.verdict import Value, Verdict
+from dbbstation.inference.verdict import Verdict
 from tests.inference.tables import table
 from tests.inference.test_channel import channel
 

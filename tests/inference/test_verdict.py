@@ -8,6 +8,7 @@ from math import comb
 import numpy as np
 import pytest
 
+from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import (
     ABSENT,
     OUT,
@@ -16,7 +17,6 @@ from dbbstation.inference.verdict import (
     Acts,
     DensityGains,
     Gains,
-    Value,
     Verdict,
     claim,
     is_worse,

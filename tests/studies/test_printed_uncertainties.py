@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-import dbbstation.results
+import dbbstation
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
 from dbbstation.circles.budget import OF_BOTH, OF_ONE, RANGES
 from dbbstation.circles.quantity import BudgetQuantity
@@ -17,8 +17,15 @@ from dbbstation.plan.tolerance import CircleFigure
 from studies import coverage_calibration, coverage_feed
 from studies.coverage_circles import CELLS, GAUSSIAN, SHARP, _drawn
 
-MODULES = ("circle_figures", "circles", "report", "calibration", "prediction", "evaluation", "effects")
-"""Of results: what the tables and the JSON of `circles`, `report`, `calibrate`, `predict` and `evaluate` are made of."""
+MODULES = (
+    *(f"results/{name}" for name in ("circle_figures", "circles", "report", "prediction", "evaluation", "effects")),
+    *(f"circles/{name}" for name in ("reversals", "budget", "quick_look")),
+    *(
+        f"calibration/{name}"
+        for name in ("outliers/outlier", "checks/scatter", "checks/visibility", "reporting/figures")
+    ),
+)
+"""What the tables and the JSON of `circles`, `report`, `calibrate`, `predict` and `evaluate` are made of."""
 
 UNCERTAIN = re.compile(r"(^|_)(u|below|sigma)(_|$)|uncertaint|interval")
 """Names of fields that say how well another one is known."""
@@ -41,13 +48,13 @@ OF_TOLERANCES = {
 PREDICTED = ["predicted X", "predicted Y", "predicted Z"]
 
 PRINTED = {
-    "circle_figures.ReversalStepResult.u_um": ["reversal step", "closure"],
+    "reversals.ReversalStep.u_um": ["reversal step", "closure"],
     "circle_figures.ShownFeed.u": [coverage_feed.FIGURE],
-    "circle_figures.FigureBudget.u_um": BUDGETED,
+    "budget.Budget.u_um": BUDGETED,
     "circle_figures.CircleFiguresResult.uncertainty": BUDGETED,
     "circle_figures.PairFigures.uncertainty": BUDGETED,
-    "circle_figures.SymptomResult.u": [str(one) for one in Signature],
-    "circle_figures.SymptomResult.below": [f"{Signature.CYCLIC}, not seen: below"],
+    "quick_look.Symptom.u": [str(one) for one in Signature],
+    "quick_look.Symptom.below": [f"{Signature.CYCLIC}, not seen: below"],
     "report.MeasuredSize.u_um": [row for rows in OF_TOLERANCES.values() for row in rows],
     "prediction.PredictionResult.greatest_uncertainty_um": PREDICTED,
     "prediction.PredictionResult.greatest_uncertainty_by_axis_um": PREDICTED,
@@ -58,9 +65,14 @@ PRINTED = {
 """Rows of the study by module, class and field."""
 
 NO_FIGURE = {
-    "calibration.OutlierResult.uncertainty_um": "beside a run that is left out, not beside a figure of the machine",
-    "calibration.ScatterResult.interval_um": "of what balls scatter by: the interval itself is the answer",
-    "calibration.WeakDirectionResult.uncertainty": "says how little a direction is seen; no value stands beside it",
+    **{
+        f"budget.SetUpKnowledge.u_{stated}_um": "stated by the session: it goes into budgets"
+        for stated in ("bar", "temperature", "ball", "ball_z")
+    },
+    "quick_look.QuickLook.sigma_um": "noise of a sample, not printed",
+    "outlier.Outlier.uncertainty_um": "beside a run that is left out, not beside a figure of the machine",
+    "scatter.ScatterCheck.interval_um": "of what balls scatter by: the interval itself is the answer",
+    "visibility.WeakDirection.uncertainty": "says how little a direction is seen; no value stands beside it",
     "effects.CauseContribution.g_u_um": "of a cause that was named: the studies of hidden effects count those",
     "effects.CauseContribution.centre_u_um": "as above",
     "effects.CauseContribution.workspace_u_um": "as above",
@@ -70,9 +82,9 @@ NO_FIGURE = {
 
 def printed():
     """Fields of the results that say how well something is known."""
-    folder = Path(dbbstation.results.__file__).parent
+    folder = Path(dbbstation.__file__).parent
     return {
-        f"{module}.{kind.name}.{field.target.id}"
+        f"{module.rpartition('/')[2]}.{kind.name}.{field.target.id}"
         for module in MODULES
         for kind in ast.parse((folder / f"{module}.py").read_text(encoding="utf-8")).body
         if isinstance(kind, ast.ClassDef)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -58,3 +59,23 @@ def _by_sector(
 def is_missing_physics(found: Misfit) -> bool:
     """Return whether chance does not explain it."""
     return found.probability < SIGNIFICANT
+
+
+@dataclass(frozen=True)
+class LeftByFit:
+    """The residual beyond noise and mountings, by an F test of low harmonics.
+
+    Attributes:
+        probability: of that much by chance.
+        missing_physics: whether chance does not explain it.
+    """
+
+    probability: float
+    rms_um: float
+    missing_physics: bool
+
+
+def left_by(calibration: Calibration) -> LeftByFit:
+    """Return what a fit leaves beyond noise and mountings."""
+    found = misfit_of(calibration)
+    return LeftByFit(found.probability, 1e3 * found.rms, is_missing_physics(found))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pydantic import computed_field
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.square_root import lost_directions
@@ -36,11 +37,13 @@ class PlanCheck:
     identified: int
     of_one_test: int
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def left(self) -> int:
         """Degrees of freedom that are left to check the plan."""
         return self.determined - self.identified
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def enough(self) -> bool:
         """Whether the tests can show a wrong plan.

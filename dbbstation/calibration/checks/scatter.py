@@ -65,28 +65,23 @@ class ScatterVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class ScatterCheck:
-    """Balls of one stated size.
+    """Whether balls of one stated size scatter as stated.
 
     Attributes:
         stated_um: standard deviation per axis, mounting and CMM together [µm].
-        found_um: what they scatter by [µm].
-        low_um: lower end of the 95 % interval of that [µm].
-        high_um: upper end [µm].
+        found_um: what they scatter by; None where the runs cannot tell [µm].
+        interval_um: 95 % interval of that; None likewise [µm].
         mountings: puttings-up of that size.
+        fits: whether balls stand as well as stated, or better; None where the runs say too little.
         finding: where the stated size lies beside that interval; untold where the runs say too little.
     """
 
     stated_um: float
-    found_um: float
-    low_um: float
-    high_um: float
+    found_um: float | None
+    interval_um: tuple[float, float] | None
     mountings: int
+    fits: bool | None
     finding: ScatterVerdict
-
-    @property
-    def fits(self) -> bool | None:
-        """Whether balls stand as well as stated, or better; None where the runs say too little."""
-        return None if self.finding is ScatterVerdict.UNTOLD else self.finding is not ScatterVerdict.MORE
 
 
 def seats_of(calibration: Calibration) -> list[MountingOffset]:
@@ -142,15 +137,10 @@ def check_scatter(seats: Sequence[MountingOffset]) -> list[ScatterCheck]:
 def _checked(stated_um: float, group: Sequence[MountingOffset]) -> ScatterCheck:
     square, freedom = sum(seat.square for seat in group), sum(seat.freedom for seat in group)
     if freedom == 0:
-        return ScatterCheck(stated_um, float("nan"), 0.0, float("inf"), len(group), ScatterVerdict.UNTOLD)
+        return ScatterCheck(stated_um, None, None, len(group), None, ScatterVerdict.UNTOLD)
     tail = (1.0 - CONFIDENCE) / 2.0
     low, high = (stated_um * float(np.sqrt(square / chdtri(freedom, p))) for p in (tail, 1.0 - tail))
     within = ScatterVerdict.LESS if high < stated_um else ScatterVerdict.AS_STATED
-    return ScatterCheck(
-        stated_um=stated_um,
-        found_um=stated_um * float(np.sqrt(square / freedom)),
-        low_um=low,
-        high_um=high,
-        mountings=len(group),
-        finding=ScatterVerdict.MORE if low > stated_um else within,
-    )
+    finding = ScatterVerdict.MORE if low > stated_um else within
+    found_um = stated_um * float(np.sqrt(square / freedom))
+    return ScatterCheck(stated_um, found_um, (low, high), len(group), finding is not ScatterVerdict.MORE, finding)

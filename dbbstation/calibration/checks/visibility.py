@@ -67,30 +67,30 @@ ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Visibility:
+class Observability:
     """What the circles see of the machine's parameters.
 
     Attributes:
-        singular: of the readings' sensitivity to parameters in units of their usual size, falling, without those
-            that are lost, shape (L,) [mm].
+        singular_values_mm: of the readings' sensitivity to parameters in units of their usual size, falling, without those
+            that are lost [mm].
         condition: greatest over least of them.
         indices: O1 to O5 of them.
-        weak: least seen directions, the weakest first.
+        weak_directions: least seen directions, the weakest first.
         correlations: largest first.
         leverage: by test, how many parameters' worth of what is known it brings; they add up to the parameters
             identified, but for what tests share.
     """
 
-    singular: NDArray[np.float64]
+    singular_values_mm: tuple[float, ...]
     condition: float
     indices: Indices
-    weak: tuple[WeakDirection, ...]
+    weak_directions: tuple[WeakDirection, ...]
     correlations: tuple[Correlation, ...]
     leverage: dict[str, float]
 
 
 @with_one_thread
-def visibility(calibration: Calibration) -> Visibility:
+def visibility(calibration: Calibration) -> Observability:
     """Look at the matrix that a calibration solved."""
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
@@ -100,11 +100,11 @@ def visibility(calibration: Calibration) -> Visibility:
     singular = np.asarray(np.linalg.svd(whole @ free.T, compute_uv=False), dtype=np.float64)
     singular = singular[singular > ROUNDING * singular[0]]  # circles see nothing of what moves currents only
     readings = sum(block.count for block in calibration.circle_blocks)
-    return Visibility(
-        singular=singular,
+    return Observability(
+        singular_values_mm=tuple(singular.tolist()),
         condition=float(singular[0] / singular[-1]),
         indices=indices(singular, readings),
-        weak=_weakest(calibration),
+        weak_directions=_weakest(calibration),
         correlations=_correlations(calibration),
         leverage=_leverage(calibration, fitted),
     )

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from dbbstation.facts.serialise import Kept
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -43,19 +45,18 @@ SOURCE_OF = {
 """Name of the error source that is out of size; a run that is no circle of this machine is none."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Outlier:
-    """One outlier.
+    """One outlier, which was kept out of the fit.
 
     Attributes:
-        kind: what it is.
         test: name of the test; of the session for a bar.
-        run: label of the run, or of the runs of one putting-up.
+        runs: label of the run, or of the runs of one putting-up.
         size_um: how far off: rms of a run, distance of a ball from its place, error of a bar's length [µm].
+        uncertainty_um: standard uncertainty of the size; None for a run [µm].
         shift_um: where a ball stands, machine axes; None for a run [µm].
         text: what it looks like, in words.
         sure: False where a badly seated ball cannot be told from a wrong CMM row: it was put up once only.
-        uncertainty_um: standard uncertainty of the size; None for a run [µm].
         alike: error sources that would explain the recordings about as well in its place.
         freed: names of the mountings that may stand anywhere, or of the session whose bar may have any length.
         why: end of the text, what it may come from.
@@ -63,12 +64,12 @@ class Outlier:
 
     kind: OutlierKind
     test: str
-    run: str
+    runs: str
     size_um: float
-    shift_um: tuple[float, float, float] | None
-    text: str
-    sure: bool = True
     uncertainty_um: float | None = None
-    alike: tuple[str, ...] = ()
-    freed: tuple[str, ...] = ()
-    why: str = ""
+    shift_um: tuple[float, float, float] | None = None
+    text: str
+    sure: Annotated[bool, Kept] = True
+    alike: Annotated[tuple[str, ...], Kept] = ()
+    freed: Annotated[tuple[str, ...], Kept] = ()
+    why: Annotated[str, Kept] = ""

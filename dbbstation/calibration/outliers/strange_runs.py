@@ -107,7 +107,7 @@ def in_place_after_all(
 
     out = {named(run) for run in runs if named(run) not in kept and not fits(run)}
     labels = {label for _, label in out}
-    staying = tuple(o for o in outliers if o.freed or labels & set(o.run.split(", ")))
+    staying = tuple(o for o in outliers if o.freed or labels & set(o.runs.split(", ")))
     return [run for run in runs if named(run) not in out], staying
 
 
@@ -120,7 +120,8 @@ def leave_out(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> 
     size = rms_um(residual)
     kind, look = _looks_like(again, kept, run, residual)
     labels = ", ".join(runs[k].label for k in strange)
-    return Outlier(kind, run.test, labels, size, None, f"{labels} leaves {size:.1f} µm rms: {look}"), kept, again
+    text = f"{labels} leaves {size:.1f} µm rms: {look}"
+    return Outlier(kind=kind, test=run.test, runs=labels, size_um=size, text=text), kept, again
 
 
 def _looks_like(

@@ -54,7 +54,8 @@ def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) 
         f"the ball of test {run.test} moved by {_towards(shift)} between run {run.label} and {others[0].label}: "
         "holder or cup loose, or touched"
     )
-    return Outlier(OutlierKind.MOVED, run.test, run.label, size, _um(shift), text), apart, again
+    moved = Outlier(kind=OutlierKind.MOVED, test=run.test, runs=run.label, size_um=size, shift_um=_um(shift), text=text)
+    return moved, apart, again
 
 
 def _moved_in(calibration: Calibration) -> int | None:
@@ -178,7 +179,7 @@ def _ball(calibration: Calibration, kind: OutlierKind, freed: tuple[str, ...], w
     return Outlier(
         kind=kind,
         test=of[0].test,
-        run=", ".join(run.label for run in of),
+        runs=", ".join(run.label for run in of),
         size_um=1e3 * distance,
         shift_um=_um(seat.shift_mm),
         text=f"the ball {which} stands {_towards(seat.shift_mm)} from its place{why}",
@@ -199,7 +200,7 @@ def _bar(calibration: Calibration, session: str, why: str) -> Outlier:
     return Outlier(
         kind=OutlierKind.BAR,
         test=session,
-        run="all runs",
+        runs="all runs",
         size_um=offset,
         shift_um=None,
         text=f"the bar of {session} reads {abs(offset):.2f} ± {sigma:.2f} µm too {longer}{why}",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import of_residuals
 from dbbstation.computing.threads import with_one_thread
+from dbbstation.facts.serialise import Absent
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import range_uncertainty_mm
 from dbbstation.sources.contract import Motion
@@ -38,28 +39,61 @@ _ALONG = np.column_stack(
 
 
 @dataclass(frozen=True)
-class RunEvaluation:
-    """One run.
+class CircleDeviations:
+    """Figures of one circle [CAL Table III].
+
+    Attributes:
+        centre_deviation_um: length of the least-squares centre's offset [µm].
+        mean_radial_error_um: mean of length less radius about the commanded centre [µm].
+        circularity_um: greatest less least deviation from the least-squares circle [µm].
+        centre_deviation_from_first_um: distance of the centre from that of the first test in this direction; None of readings
+            themselves [µm].
+    """
+
+    centre_deviation_um: float
+    mean_radial_error_um: float
+    circularity_um: float
+    centre_deviation_from_first_um: Annotated[float | None, Absent] = None
+
+
+@dataclass(frozen=True)
+class LowPassedCircularity:
+    """Circular deviation G of readings low-passed at 30 undulations per revolution.
+
+    Attributes:
+        measured: of the readings [µm].
+        predicted: of what the model makes the bar read [µm].
+        before: of what the nominal machine leaves [µm].
+        after: of what the model leaves [µm].
+    """
+
+    measured: float
+    predicted: float
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class EvaluatedRun:
+    """One run before, under the nominal machine, and after, under the model.
 
     Attributes:
         test: name of the test.
         direction: `ccw` or `cw`.
         repeat: counts runs of this test and direction.
-        measured: of the bar readings themselves.
-        before: of what the nominal machine leaves; the same as measured where a plain circle was commanded.
-        after: of what the model's machine sources leave.
-        before_from_first_um: distance of the centre from that of the first test in the same direction [µm].
-        after_from_first_um: the same under the model [µm].
+        measured: figures of the readings.
+        before: figures of what the nominal machine leaves.
+        after: figures of what the model leaves.
+        circularity_30_upr_um: the circular deviation without the bar's noise; None where it was not asked for.
     """
 
     test: str
     direction: str
     repeat: int
-    measured: CircleFigures
-    before: CircleFigures
-    after: CircleFigures
-    before_from_first_um: float
-    after_from_first_um: float
+    measured: CircleDeviations
+    before: CircleDeviations
+    after: CircleDeviations
+    circularity_30_upr_um: Annotated[LowPassedCircularity | None, Absent] = None
 
 
 @dataclass(frozen=True)
@@ -72,7 +106,7 @@ class Evaluation:
         nominal_rms_um: the same under the nominal machine [µm].
     """
 
-    runs: tuple[RunEvaluation, ...]
+    runs: tuple[EvaluatedRun, ...]
     residual_rms_um: float
     nominal_rms_um: float
 
@@ -89,19 +123,23 @@ def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evalua
     after, left_rms_um = _under(model.of_the_machine(), observations)
     first = [_first_in_direction(observations, k) for k in range(len(observations))]
     runs = tuple(
-        RunEvaluation(
+        EvaluatedRun(
             test=o.test,
             direction=str(o.raw.circle.direction),
             repeat=o.repeat,
-            measured=figures(o.raw),
-            before=before[k],
-            after=after[k],
-            before_from_first_um=apart_um(before[k], before[first[k]]),
-            after_from_first_um=apart_um(after[k], after[first[k]]),
+            measured=_deviations(figures(o.raw)),
+            before=_deviations(before[k], before[first[k]]),
+            after=_deviations(after[k], after[first[k]]),
         )
         for k, o in enumerate(observations)
     )
     return Evaluation(runs, left_rms_um, nominal_rms_um)
+
+
+def _deviations(of: CircleFigures, first: CircleFigures | None = None) -> CircleDeviations:
+    """Figures of a circle, and of its centre beside that of the first one in its direction."""
+    apart = None if first is None else apart_um(of, first)
+    return CircleDeviations(of.centre_deviation_um, of.mean_radial_error_um, of.circularity_um, apart)
 
 
 def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[list[CircleFigures], float]:

@@ -154,7 +154,7 @@ class Comparison:
     @property
     def cancelling(self) -> Cancelling | None:
         """Effects that cancel each other [mm]; None where none do."""
-        return cancelling(effects_by_name(self.settled))
+        return cancelling(effects_by_name(self.settled), "µm", 1e3)
 
     @property
     def noise_mm(self) -> float:

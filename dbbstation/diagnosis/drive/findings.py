@@ -1,78 +1,45 @@
-"""What the diagnosis of a drive answers: verdicts, places, numbers with their uncertainty."""
+"""What is found of one strut drive: verdicts, places, numbers with their uncertainty. Its fields are the keys of the JSON."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Annotated
 
-from dbbstation.diagnosis.drive.naming import source_of
-from dbbstation.inference.cancelling import cancelling, effects_by_name
-from dbbstation.inference.verdict import Verdict
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from dbbstation.diagnosis.drive.explain import ExplainedDrive
-    from dbbstation.diagnosis.drive.held_out import DriveHeldOut
-    from dbbstation.diagnosis.drive.recordings import Recordings
-    from dbbstation.inference.cancelling import Cancelling
-    from dbbstation.inference.verdict import Gains, Value
+from dbbstation.facts.serialise import AsItIs, Kept
+from dbbstation.facts.value import Value
+from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.verdict import Acts, Gains, Verdict
 
 
 @dataclass(frozen=True)
-class IdentifiedValue:
-    """A parameter of the model.
+class DriveValue(Value):
+    """A parameter of the drive.
 
     Attributes:
-        value: with its standard uncertainty and unit.
         identifiable: False where this recording cannot tell it; the value then means nothing by itself.
     """
 
-    value: Value
     identifiable: bool
 
 
 @dataclass(frozen=True)
-class DriveFinding:
-    """What is said of one cause.
+class CausePart:
+    """One wave, pulse or form of a cause.
 
     Attributes:
-        name: of the cause.
-        verdict: what can be said.
-        probability: that it is there, or one that nothing recorded here tells from it.
-        ambiguous_with: causes that would explain the recording about as well in its place.
-        gain: log Bayes factor of it beside the others.
-        concealed: share of its signature's sum of squares that mass and viscous friction take up.
-        whole_n: root mean square of its signature [N].
-        rest_n: of what the base leaves of it [N].
-        parameters: as fitted; for a cause that was not, best amplitudes, whose uncertainty says how much could hide.
-        parts: where it is there more than once (waves, pulses, forms), each with its numbers.
-        text: sentences for people.
-        at_end: names of parameters that lie at the end of the values that are tried.
-        complement: stretches of time that explain as much in the place of `parts`.
-        gains: what it brought in held-out parts; None: not asked for.
+        label: which; empty where there is one only.
+        t_s: first and last time of a pulse [s]; None where it is none.
+        parameters: of it.
     """
 
-    name: str
-    verdict: Verdict
-    probability: float
-    ambiguous_with: tuple[str, ...]
-    gain: float
-    concealed: float
-    whole_n: float
-    rest_n: float
-    parameters: dict[str, Value]
-    parts: tuple[DrivePart, ...]
-    text: str
-    at_end: tuple[str, ...] = ()
-    complement: Complement | None = None
-    gains: Gains | None = None
-
-    @property
-    def persists(self) -> bool:
-        """Whether it happened once, such as friction that drifts, and held-out parts tell of it, too."""
-        return self.verdict is Verdict.HAPPENED and self.gains is not None and self.gains.predicts
+    label: str
+    t_s: tuple[float, float] | None
+    parameters: Mapping[str, Value]
 
 
 @dataclass(frozen=True)
@@ -80,33 +47,59 @@ class Complement:
     """The other way to read pulses of one size: the opposite force in the rest of the time, and a constant load.
 
     Attributes:
-        force_n: in these stretches.
+        force_n: in these stretches [N].
         t_s: first and last time of each [s].
         pulses: how many pulses are of that size.
     """
 
     force_n: Value
     t_s: tuple[tuple[float, float], ...]
-    pulses: int
+    pulses: Annotated[int, Kept]
 
 
-@dataclass(frozen=True)
-class DrivePart:
-    """One wave, pulse or form of a cause.
+@dataclass(frozen=True, kw_only=True)
+class DriveFinding:
+    """What is said of one cause.
 
     Attributes:
-        label: which; empty where there is one only.
-        parameters: of it.
-        t_s: first and last time of a pulse [s]; None where it is none.
+        name: of the cause.
+        verdict: what can be said.
+        ambiguous_with: causes that would explain the recording about as well in its place.
+        concealed: share of its signature's sum of squares that mass and viscous friction take up.
+        signature_rms_n: of its signature [N].
+        unconcealed_rms_n: of what mass and viscous friction leave of it [N].
+        probability: that it is there, or one that nothing recorded here tells from it.
+        gain: log Bayes factor of it beside the others.
+        parameters: as fitted; for a cause that was not, best amplitudes, whose uncertainty says how much could hide.
+        parts: where it is there more than once (waves, pulses, forms), each with its numbers.
+        at_end: names of parameters that lie at the end of the values that are tried.
+        complement: stretches of time that explain as much in the place of `parts`.
+        acts: when it is at work.
+        persists: it happened once, such as friction that drifts, and held-out parts tell of it, too.
+        gains: what it brought in held-out parts [N²]; None: not asked for.
+        text: sentences for people.
     """
 
-    label: str
-    parameters: dict[str, Value]
-    t_s: tuple[float, float] | None = None
+    name: str
+    verdict: Verdict
+    ambiguous_with: tuple[str, ...]
+    concealed: float
+    signature_rms_n: float
+    unconcealed_rms_n: float
+    probability: float
+    gain: float
+    parameters: Mapping[str, Value]
+    parts: tuple[CausePart, ...]
+    at_end: tuple[str, ...]
+    complement: Complement | None
+    acts: Acts
+    persists: bool
+    gains: Gains | None
+    text: str
 
 
 @dataclass(frozen=True)
-class UnmodelledForce:
+class UnexplainedForce:
     """An unmodelled force.
 
     Attributes:
@@ -114,7 +107,7 @@ class UnmodelledForce:
         variable: that it follows.
         probability: that it is there.
         rms_n: of it beside mass and viscous friction [N].
-        low, high: range of the variable in which it is at least half as large as anywhere.
+        low, high: range of the variable in which it is at least half as large as anywhere; `from` and `to` in JSON.
         unit: of the variable.
     """
 
@@ -122,66 +115,159 @@ class UnmodelledForce:
     variable: str
     probability: float
     rms_n: float
-    low: float
-    high: float
+    low: Annotated[float, Field(serialization_alias="from")]
+    high: Annotated[float, Field(serialization_alias="to")]
     unit: str
 
 
 @dataclass(frozen=True)
-class DriveLocation:
+class ForceLocation:
     """A stretch of the recording in which a misfit stands out.
 
     Attributes:
         t_s: start, end [s].
         position_mm: at start and end [mm].
-        direction: +1 towards greater positions, -1 the other way.
+        direction: `forwards` or `backwards`.
         at_reversal: a reversal or stop lies in it or beside it.
+        variable: that it follows; None where nothing does.
         share: of the misfit's sum of squares.
         peak_n: greatest deviation, measured minus model [N].
+        text: in words.
     """
 
     t_s: tuple[float, float]
     position_mm: tuple[float, float]
-    direction: int
+    direction: str
     at_reversal: bool
+    variable: str | None
     share: float
     peak_n: float
+    text: str
 
 
 @dataclass(frozen=True)
-class DriveStep:
+class ModelStep:
     """A model on the way from the base to the last one, and how it predicts the stretch that was held back.
 
     Attributes:
-        added: cause that this step adds; empty for the base.
+        added: cause that this step adds; None for the base.
         relative_force_error: |F - F_model| / |F| on the stretch, fitted without it.
         fitted_error: the same on what was fitted.
         parameters: values fitted without the stretch, by name.
     """
 
-    added: str
+    added: str | None
     relative_force_error: float
     fitted_error: float
-    parameters: dict[str, float]
+    parameters: Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Rest:
+class ForceErrors:
+    """A figure with mass and viscous friction alone (before), and with everything found (after)."""
+
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class HeldBack:
+    """How models predict a stretch that was held back.
+
+    Attributes:
+        t_s: its first and last time [s].
+        relative_force_error: |F - F_model| / |F| there.
+        steps: from mass and viscous friction to the last model.
+        not_in_model: causes that were fitted beside it and are not in it, since nothing decides on them.
+    """
+
+    t_s: tuple[float, float]
+    relative_force_error: ForceErrors
+    steps: tuple[ModelStep, ...]
+    not_in_model: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ParameterBias:
+    """How far what was left out had pulled a parameter: before, after, before less after, uncertainty of the value after."""
+
+    parameter: str
+    before: float
+    after: float
+    shift: float
+    uncertainty: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class UnexplainedForces:
     """The unmodelled residual.
 
     Attributes:
         rms_n: beyond noise [N].
         probability: of such a rest or a larger one by noise alone.
+        significant: whether that is improbable.
         variable: what organises it; None where nothing does clearly.
-        effects: without a name that the comparison found, largest first.
         text: one sentence for people.
+        effects: without a name that the comparison found, largest first.
+        locations: where it is large.
     """
 
     rms_n: float
     probability: float
+    significant: bool
     variable: str | None
-    effects: tuple[UnmodelledForce, ...]
     text: str
+    effects: tuple[UnexplainedForce, ...]
+    locations: tuple[ForceLocation, ...]
+
+
+@dataclass(frozen=True)
+class HeldOutForce:
+    """Predictions of parts that were held out, everything chosen anew without each of them.
+
+    Attributes:
+        parts: how many were held out.
+        reference: root mean square error of the law of mass, viscous and Coulomb friction [N].
+        corrected: of everything that was chosen, but for what happens in time [N].
+        worse: whether everything together predicts worse than mass and friction alone.
+        gains: of each source that was chosen without some part, by name, in N².
+    """
+
+    parts: int
+    reference: float
+    corrected: float
+    worse: bool
+    gains: Annotated[Mapping[str, Gains], Kept]
+
+
+@dataclass(frozen=True)
+class RecordedSignals:
+    """What was recorded.
+
+    Attributes:
+        recordings: how many.
+        samples: in all.
+        samples_compared: within the band.
+        rate_hz: of the samples [Hz].
+        cutoff_hz: band in which force and model are compared [Hz].
+        shortest_wave_mm: shortest wave over the position that could be seen [mm]; None where none could.
+        t_s: first and last time [s].
+        reversals: in all.
+        greatest_speed_mm_s: greatest speed [mm/s].
+        force_rms_n: of the force [N].
+    """
+
+    recordings: int
+    samples: int
+    samples_compared: int
+    rate_hz: float
+    cutoff_hz: float
+    shortest_wave_mm: float | None
+    t_s: tuple[float, float]
+    reversals: int
+    greatest_speed_mm_s: float
+    force_rms_n: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,85 +285,56 @@ class FrictionCurve:
     uncertainty_n: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class DriveDiagnosis:
-    """Everything found.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DriveFindings:
+    """Everything found of one strut drive.
 
     Attributes:
-        explained: channel, comparison and fits.
-        mismatch: the recording differs from the base model beyond noise.
-        misfit_rms_n: of the base model beyond noise [N].
-        probability: of such a misfit by chance.
-        before: parameters of the base model.
-        after: of the last model, base parameters first.
-        friction: Coulomb and viscous friction per direction, `forwards` and `backwards`; empty where not identifiable.
-        chosen: causes in the last model, those first that move the force most beside mass and viscous friction.
-        vague: causes that were fitted beside it and are not in it, since they are ambiguous and no named cause stands for them.
-        base_n: force of the base model at the samples compared, shape (m,) [N].
-        model_n: of the last model [N].
-        whole_n: of the last model with the forces that have no name [N].
-        held_back_s: start and end of the stretch that was held back [s].
-        steps: from the base to the last model.
+        mismatch: the recording differs from mass and viscous friction beyond noise.
+        probability: of as much by chance.
+        noise_n: standard deviation of the force's noise [N].
+        noise_correlation_samples: neighbours that count as one.
+        misfit_rms_n: of mass and viscous friction beyond noise [N].
+        residual_rms_n: before and after [N].
+        held_back: how models predict a stretch that was held back.
+        parameters: of the last model, base parameters first.
+        parameter_shift: how far what was left out had pulled them.
+        friction: Coulomb and viscous friction per direction; empty where not identifiable.
         locations: of the base model's misfit, largest share first.
-        findings: best first.
-        rest: the residual.
-        rest_locations: where, largest share first.
-        cannot_tell: sentences.
-        held_out: predictions of parts that took no part; None: not asked for.
+        sources: causes, best first.
+        unexplained: the residual.
+        cancelling: forces that cancel each other; None where none do.
+        cannot_tell: what these recordings cannot tell, a sentence each.
+        held_out: `tested` or `not-tested`.
+        held_out_rms_n: errors of held-out parts; None where not tested.
+        signals: what was recorded.
+        noticed: in the recordings; `notes` in JSON.
+        table: what was compared, sample by sample, by column.
+        before: parameters of the base model.
+        chosen: causes in the last model, those first that move the force most beside mass and viscous friction.
         curve: friction against speed.
     """
 
-    explained: ExplainedDrive
     mismatch: bool
-    misfit_rms_n: float
     probability: float
-    before: dict[str, IdentifiedValue]
-    after: dict[str, IdentifiedValue]
-    friction: dict[str, dict[str, Value]]
-    chosen: tuple[str, ...]
-    vague: tuple[str, ...]
-    base_n: NDArray[np.float64]
-    model_n: NDArray[np.float64]
-    whole_n: NDArray[np.float64]
-    held_back_s: tuple[float, float]
-    steps: tuple[DriveStep, ...]
-    locations: tuple[DriveLocation, ...]
-    findings: tuple[DriveFinding, ...]
-    rest: Rest
-    rest_locations: tuple[DriveLocation, ...]
+    noise_n: float
+    noise_correlation_samples: float
+    misfit_rms_n: float
+    residual_rms_n: ForceErrors
+    held_back: HeldBack
+    parameters: Mapping[str, DriveValue]
+    parameter_shift: tuple[ParameterBias, ...]
+    friction: Mapping[str, Mapping[str, Value]]
+    locations: tuple[ForceLocation, ...]
+    sources: tuple[DriveFinding, ...]
+    unexplained: UnexplainedForces
+    cancelling: Cancelling | None
     cannot_tell: tuple[str, ...]
-    curve: FrictionCurve
-    held_out: DriveHeldOut | None = None
-
-    @property
-    def recordings(self) -> Recordings:
-        """What was recorded."""
-        return self.explained.drive.recordings
-
-    @property
-    def force_n(self) -> NDArray[np.float64]:
-        """In the band, shape (m,) [N]."""
-        return self.recordings.force_n
-
-    @property
-    def cancelling(self) -> Cancelling | None:
-        """Forces of mass, friction and causes that cancel each other [N]; None where none do."""
-        settled, drive = self.explained.settled, self.explained.drive
-        base, patterns = settled.channel.base, settled.bank.patterns
-        shown = {name: source_of(drive, patterns, name) for name in settled.best.names}
-        forces = zip(base.names, settled.base_values(), strict=True)
-        of_base = {name: base.samples[:, k] * value for k, (name, value) in enumerate(forces)}
-        return cancelling(effects_by_name(settled, shown) | of_base)
-
-    def table(self) -> dict[str, NDArray[np.float64]]:
-        """What was compared, sample by sample in the band, by column name with its unit."""
-        recordings = self.recordings
-        return {
-            "t_s": recordings.time_s,
-            "position_mm": 1e3 * recordings.at(lambda s: s.position_m),
-            "speed_mm_s": 1e3 * recordings.motion[:, 1],
-            "acceleration_mm_s2": 1e3 * recordings.motion[:, 0],
-            "force_n": self.force_n,
-            "base_force_n": self.base_n,
-            "model_force_n": self.model_n,
-        }
+    held_out: str
+    held_out_rms_n: HeldOutForce | None
+    signals: RecordedSignals
+    noticed: Annotated[tuple[str, ...], Field(serialization_alias="notes")]
+    table: Annotated[Mapping[str, NDArray[np.float64]], AsItIs, Kept]
+    before: Annotated[Mapping[str, DriveValue], AsItIs, Kept]
+    chosen: Annotated[tuple[str, ...], AsItIs, Kept]
+    curve: Annotated[FrictionCurve, AsItIs, Kept]

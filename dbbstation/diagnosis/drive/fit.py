@@ -10,9 +10,10 @@ from scipy.sparse.linalg import spsolve_triangular
 from scipy.special import log_ndtr
 
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
+from dbbstation.facts.value import Value
 from dbbstation.inference.settle import growth, moved
 from dbbstation.inference.triangle import triangle_of
-from dbbstation.inference.verdict import OUT, Value
+from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
     from collections.abc import Container, Sequence

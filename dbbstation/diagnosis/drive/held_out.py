@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.drive.findings import HeldOutForce
 from dbbstation.diagnosis.drive.fit import RowsKept
 from dbbstation.diagnosis.drive.moving import within
 from dbbstation.diagnosis.drive.naming import COULOMB, source_of
@@ -24,29 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 
-@dataclass(frozen=True)
-class DriveHeldOut:
-    """Predictions of parts that were held out, everything chosen anew without each of them.
-
-    Attributes:
-        gains: of each source that was chosen without some part, by name, in N².
-        parts: how many were held out.
-        reference_n: root mean square error of the law of mass, viscous and Coulomb friction [N].
-        corrected_n: of everything that was chosen, but for what happens in time [N].
-    """
-
-    gains: dict[str, Gains]
-    parts: int
-    reference_n: float
-    corrected_n: float
-
-    @property
-    def is_worse(self) -> bool:
-        """Whether everything together predicts worse than mass and friction alone."""
-        return is_worse(self.corrected_n, self.reference_n)
-
-
-def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> DriveHeldOut:
+def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> HeldOutForce:
     """Hold back parts in turn, whole recordings from five on, else ten stretches, and predict them.
 
     Samples as far from a part as the low-pass reaches take no part either: they contain some of its force.
@@ -84,7 +62,8 @@ def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> DriveHeldO
     count = len(channel.residual)
     lengths = tuple(int(rows.sum()) for _, rows in parts)
     gains = {source: Gains(tuple(each), lengths) for source, each in brought.items() if any(each)}
-    return DriveHeldOut(gains, len(parts), float(np.sqrt(reference / count)), float(np.sqrt(corrected / count)))
+    errors = float(np.sqrt(reference / count)), float(np.sqrt(corrected / count))
+    return HeldOutForce(len(parts), *errors, is_worse(errors[1], errors[0]), gains)
 
 
 GAP_PERIODS = 0.5

@@ -11,30 +11,40 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS, METHOD_SHARE, VISCOUS
 from dbbstation.diagnosis.drive.explain import explain
 from dbbstation.diagnosis.drive.findings import (
-    DriveDiagnosis,
     DriveFinding,
-    DriveStep,
+    DriveFindings,
+    DriveValue,
+    ForceErrors,
     FrictionCurve,
-    IdentifiedValue,
-    Rest,
+    HeldBack,
+    ModelStep,
+    ParameterBias,
+    RecordedSignals,
+    UnexplainedForces,
 )
 from dbbstation.diagnosis.drive.fit import DriveFit, base_values, fit
 from dbbstation.diagnosis.drive.held_out import held_out
 from dbbstation.diagnosis.drive.limits import VAGUE, DriveLimits, limits_of, mass_is_known, sentences
 from dbbstation.diagnosis.drive.locate import locate
+from dbbstation.diagnosis.drive.naming import source_of
 from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.verdicts import Verdicts
+from dbbstation.facts.value import Value
+from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.hypotheses import Hypothesis
 from dbbstation.inference.left_over import SIGNIFICANT, left_over
-from dbbstation.inference.verdict import Value, Verdict
+from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
+    from dbbstation.diagnosis.drive.findings import UnexplainedForce
+    from dbbstation.diagnosis.drive.recordings import Recordings
+    from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.trace.drive_recording import DriveRecording
 
@@ -57,7 +67,7 @@ def identify(
     progress: Callable[[str], None] = lambda _: None,
     *,
     hold_out: bool = False,
-) -> DriveDiagnosis:
+) -> DriveFindings:
     """Identify a drive and find what a model of mass and viscous friction leaves out.
 
     Args:
@@ -87,43 +97,108 @@ def identify(
         and _is_known(values[VISCOUS], put_together.scale.speed_m_s, put_together.scale.force_n),
     }
     named, predicting = verdicts.named, verdicts.predicting
-    whole = after.force_n()
     misfit = _left_of_base(explained)
     progress("held-back stretch")
     time = put_together.time_s
     held_back = time > np.quantile(time, 1.0 - HELD_BACK)
     ends = time[held_back][[0, -1]]
     mismatch = not misfit.is_noise or bool(named)
-    model = after.force_n(named)
-    rest = _rest(explained, verdicts, model)
-    noise = explained.settled.noise
-    return DriveDiagnosis(
-        explained=explained,
+    noise, force = explained.settled.noise, put_together.force_n
+    base_n, model_n = before.force_n(), after.force_n(predicting)
+    chosen = tuple(dict.fromkeys(verdicts.source_of(name) for name in predicting))
+    rest = _rest(explained, verdicts, after.force_n(named))
+    follows = explained.drive.sources[chosen[0]].varies_with if chosen else rest.variable
+    steps = tuple(_steps(explained, verdicts, held_back))
+    at_first = {name: _number(value, is_known=known[name]) for name, value in before.base.items()}
+    numbers = _numbers(explained, values, known, limits)
+    return DriveFindings(
         mismatch=mismatch,
-        misfit_rms_n=_beyond(put_together.force_n - before.force_n(), noise.sigma),
         probability=misfit.probability,
-        before={name: IdentifiedValue(value, known[name]) for name, value in before.base.items()},
-        after=_numbers(explained, values, known, limits),
+        noise_n=noise.sigma,
+        noise_correlation_samples=noise.correlation_samples,
+        misfit_rms_n=_beyond(force - base_n, noise.sigma),
+        residual_rms_n=ForceErrors(*(float(np.sqrt(np.mean((force - one) ** 2))) for one in (base_n, model_n))),
+        held_back=HeldBack(
+            (float(ends[0]), float(ends[1])),
+            ForceErrors(steps[0].relative_force_error, steps[-1].relative_force_error),
+            steps,
+            tuple(dict.fromkeys(verdicts.source_of(name) for name in named if name not in predicting)),
+        ),
+        parameters=numbers,
+        parameter_shift=tuple(_biases(at_first, numbers)) if chosen else (),
         friction=_per_direction(after, values)
         if limits.several_speeds and limits.reverses and VISCOUS in values
         else {},
-        chosen=tuple(dict.fromkeys(verdicts.source_of(name) for name in predicting)),
-        vague=tuple(dict.fromkeys(verdicts.source_of(name) for name in named if name not in predicting)),
-        base_n=before.force_n(),
-        model_n=after.force_n(predicting),
-        whole_n=whole,
-        held_back_s=(float(ends[0]), float(ends[1])),
-        steps=tuple(_steps(explained, verdicts, held_back)),
-        locations=locate(put_together, put_together.force_n - before.force_n(), noise) if mismatch else (),
-        findings=tuple(_with_weight(finding, values) for finding in verdicts.findings()),
-        rest=rest,
-        rest_locations=locate(put_together, put_together.force_n - model, noise)
-        if rest.probability < SIGNIFICANT
-        else (),
+        locations=locate(put_together, force - base_n, noise, follows) if mismatch else (),
+        sources=tuple(_with_weight(finding, values) for finding in verdicts.findings()),
+        unexplained=rest,
+        cancelling=_cancelling(explained),
         cannot_tell=sentences(limits, explained, known),
+        held_out="not-tested" if held is None else "tested",
+        held_out_rms_n=held,
+        signals=_signals(explained),
+        noticed=tuple(put_together.notes),
+        table=_table(put_together, base_n, model_n),
+        before=at_first,
+        chosen=chosen,
         curve=_curve(explained),
-        held_out=held,
     )
+
+
+def _table(
+    recordings: Recordings, base_n: NDArray[np.float64], model_n: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """What was compared, sample by sample in the band, by column name with its unit."""
+    return {
+        "t_s": recordings.time_s,
+        "position_mm": 1e3 * recordings.at(lambda s: s.position_m),
+        "speed_mm_s": 1e3 * recordings.motion[:, 1],
+        "acceleration_mm_s2": 1e3 * recordings.motion[:, 0],
+        "force_n": recordings.force_n,
+        "base_force_n": base_n,
+        "model_force_n": model_n,
+    }
+
+
+def _cancelling(explained: ExplainedDrive) -> Cancelling | None:
+    """Forces of mass, friction and causes that cancel each other [N]; None where none do."""
+    settled, drive = explained.settled, explained.drive
+    base, patterns = settled.channel.base, settled.bank.patterns
+    shown = {name: source_of(drive, patterns, name) for name in settled.best.names}
+    forces = zip(base.names, settled.base_values(), strict=True)
+    of_base = {name: base.samples[:, k] * value for k, (name, value) in enumerate(forces)}
+    return cancelling(effects_by_name(settled, shown) | of_base, "N")
+
+
+def _signals(explained: ExplainedDrive) -> RecordedSignals:
+    recordings, shortest = explained.drive.recordings, explained.drive.shortest_wave_mm
+    signals, scale = recordings.signals, recordings.scale
+    return RecordedSignals(
+        recordings=len(signals),
+        samples=sum(len(one.t_s) for one in signals),
+        samples_compared=len(recordings.force_n),
+        rate_hz=signals[0].rate_hz,
+        cutoff_hz=scale.cutoff_hz,
+        shortest_wave_mm=shortest if np.isfinite(shortest) else None,
+        t_s=(float(signals[0].t_s[0]), float(signals[-1].t_s[-1])),
+        reversals=sum(len(one.reversals) for one in signals),
+        greatest_speed_mm_s=1e3 * scale.speed_m_s,
+        force_rms_n=scale.force_n,
+    )
+
+
+def _biases(before: Mapping[str, DriveValue], after: Mapping[str, DriveValue]) -> Iterator[ParameterBias]:
+    for name, alone in before.items():
+        beside = after[name]
+        if alone.identifiable and beside.identifiable:
+            shift = alone.value - beside.value
+            yield ParameterBias(name, alone.value, beside.value, shift, beside.uncertainty, alone.unit)
+
+
+def _number(value: Value, *, is_known: bool) -> DriveValue:
+    """A value, which is not known where its uncertainty is not."""
+    known = value.value if np.isfinite(value.uncertainty) else float("nan")
+    return DriveValue(known, value.uncertainty, value.unit, is_known)
 
 
 def _is_known(viscous: Value, speed_m_s: float, force_n: float) -> bool:
@@ -143,36 +218,40 @@ def _beyond(residual: NDArray[np.float64], sigma: float) -> float:
     return float(np.sqrt(max(float(np.mean(residual**2)) - sigma**2, 0.0)))
 
 
-def _rest(explained: ExplainedDrive, verdicts: Verdicts, model_n: NDArray[np.float64]) -> Rest:
+def _rest(explained: ExplainedDrive, verdicts: Verdicts, model_n: NDArray[np.float64]) -> UnexplainedForces:
     """The unmodelled residual of the force."""
     recordings, settled = explained.drive.recordings, explained.settled
     least = METHOD_SHARE * recordings.scale.force_n
     effects = tuple(effect for effect in verdicts.effects() if effect.rms_n > least)
     left = left_over(settled)
-    rms = _beyond(recordings.force_n - model_n, settled.noise.sigma)
+    residual = recordings.force_n - model_n
+    rms = _beyond(residual, settled.noise.sigma)
+
+    def rest(
+        rms: float, probability: float, variable: str | None, effects: tuple[UnexplainedForce, ...], text: str
+    ) -> UnexplainedForces:
+        significant = probability < SIGNIFICANT
+        where = locate(recordings, residual, settled.noise, variable) if significant else ()
+        return UnexplainedForces(rms, probability, significant, variable, text, effects, where)
+
     if effects:
         variable = effects[0].variable
-        return Rest(
-            rms,
-            1.0 - effects[0].probability if left.is_noise else left.probability,
-            variable,
-            effects,
-            f"A force without a known name, organised by {variable}.",
-        )
+        probability = 1.0 - effects[0].probability if left.is_noise else left.probability
+        return rest(rms, probability, variable, effects, f"A force without a known name, organised by {variable}.")
     if left.is_noise or rms <= least:
-        return Rest(0.0 if left.is_noise else rms, 1.0, None, (), "Nothing is left beyond noise.")
+        return rest(0.0 if left.is_noise else rms, 1.0, None, (), "Nothing is left beyond noise.")
     look = left.worst
     where = f" ({look.where})" if look.where else ""
     text = f"Something is left beyond noise, which no form describes; it shows most in {look.name}{where}."
-    return Rest(rms, left.probability, None, (), text)
+    return rest(rms, left.probability, None, (), text)
 
 
 def _numbers(
     explained: ExplainedDrive, values: dict[str, Value], known: dict[str, bool], limits: DriveLimits
-) -> dict[str, IdentifiedValue]:
+) -> dict[str, DriveValue]:
     """Base parameters, and what shifts the force of both directions."""
     nothing = {name: Value(float("nan"), float("inf"), unit) for name, unit in BASE_UNITS.items()}
-    numbers = {name: IdentifiedValue((nothing | values)[name], known[name]) for name in (MASS, VISCOUS)}
+    numbers = {name: _number((nothing | values)[name], is_known=known[name]) for name in (MASS, VISCOUS)}
     after = explained.after
     for member in after.members:
         if member.cause.name not in explained.drive.of_law:
@@ -180,7 +259,7 @@ def _numbers(
         # Whether it is a load or asymmetric friction, it is what the drive needs more one way than the other.
         found = after.parameters(member.cause.name)
         for parameter in OFFSETS & set(found):
-            numbers["offset_n"] = IdentifiedValue(found[parameter], limits.reverses)
+            numbers["offset_n"] = _number(found[parameter], is_known=limits.reverses)
     return numbers
 
 
@@ -210,7 +289,7 @@ def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict
     return sides
 
 
-def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: NDArray[np.bool_]) -> list[DriveStep]:
+def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: NDArray[np.bool_]) -> list[ModelStep]:
     """Base and one source after another, each fitted without the held-back stretch and judged on it."""
     drive, settled = explained.drive, explained.settled
     by_name = {member.cause.name: member for member in settled.best.members}
@@ -225,7 +304,7 @@ def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: NDArray[np.
         out, inside = (
             float(np.linalg.norm(left[rows]) / np.linalg.norm(force[rows])) for rows in (held_back, ~held_back)
         )
-        steps.append(DriveStep(added, out, inside, fitted.all_values()))
+        steps.append(ModelStep(added or None, out, inside, fitted.all_values()))
     return steps
 
 

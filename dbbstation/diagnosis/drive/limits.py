@@ -13,7 +13,7 @@ from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
-    from dbbstation.inference.verdict import Value
+    from dbbstation.facts.value import Value
 
 ACCELERATES = 5.0
 """Root mean square of the acceleration, over its noise, from which the mass can be determined."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.findings import DriveLocation
+from dbbstation.diagnosis.drive.findings import ForceLocation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,28 +25,31 @@ SLOW = 0.1
 """Share of the greatest speed below which a stretch lies at a reversal or stop."""
 
 
-def locate(recordings: Recordings, residual_n: NDArray[np.float64], noise: Coloured) -> tuple[DriveLocation, ...]:
-    """Stretches in which a residual, shape (m,) [N], exceeds the noise, largest share first."""
+def locate(
+    recordings: Recordings, residual_n: NDArray[np.float64], noise: Coloured, variable: str | None
+) -> tuple[ForceLocation, ...]:
+    """Stretches in which a residual, shape (m,) [N], exceeds the noise, largest share first, and what it follows."""
     smooth = np.convolve(residual_n, np.full(SMOOTHED, 1.0 / SMOOTHED), mode="same")
     together = min(noise.correlation_samples, float(SMOOTHED))
     threshold = COUNTS_SIGMA * noise.sigma * np.sqrt(together / SMOOTHED)
     total = max(float(smooth @ smooth), 1e-300)
-    found: list[DriveLocation] = []
+    found: list[ForceLocation] = []
     for signals, block in zip(recordings.signals, recordings.blocks, strict=True):
         own, at = smooth[block], signals.kept
         standing = SLOW * float(np.abs(signals.speed_m_s[at]).max())
         for rows in _stretches(np.abs(own) > threshold, signals.direction[at]):
             first, last = int(at[rows[0]]), int(at[rows[-1]])
-            found.append(
-                DriveLocation(
-                    t_s=(float(signals.t_s[first]), float(signals.t_s[last])),
-                    position_mm=(1e3 * float(signals.position_m[first]), 1e3 * float(signals.position_m[last])),
-                    direction=int(signals.direction[first]),
-                    at_reversal=float(np.abs(signals.speed_m_s[first : last + 1]).min()) < standing,
-                    share=float(own[rows] @ own[rows]) / total,
-                    peak_n=float(own[rows][np.argmax(np.abs(own[rows]))]),
-                )
+            t_s = float(signals.t_s[first]), float(signals.t_s[last])
+            mm = 1e3 * float(signals.position_m[first]), 1e3 * float(signals.position_m[last])
+            way = "forwards" if signals.direction[first] > 0 else "backwards"
+            turns = float(np.abs(signals.speed_m_s[first : last + 1]).min()) < standing
+            peak = float(own[rows][np.argmax(np.abs(own[rows]))])
+            text = (
+                f"{t_s[0]:.2f} to {t_s[1]:.2f} s, {mm[0]:.1f} to {mm[1]:.1f} mm {way}"
+                f"{', at a reversal or stop' if turns else ''}: up to {peak:+.3g} N{f', by {variable}' if variable else ''}"
             )
+            share = float(own[rows] @ own[rows]) / total
+            found.append(ForceLocation(t_s, mm, way, turns, variable or None, share, peak, text))
     found.sort(key=lambda location: -location.share)
     return tuple(found[:MOST_LOCATIONS])
 

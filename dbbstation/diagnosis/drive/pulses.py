@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import betaincc, betaln, expit
 
-from dbbstation.diagnosis.drive.findings import Complement, DrivePart
+from dbbstation.diagnosis.drive.findings import CausePart, Complement
 from dbbstation.diagnosis.drive.fit import fit
+from dbbstation.facts.value import Value
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.curves import Stretches
 from dbbstation.inference.pushes import distinct_sizes, most_of_one_size, pooled
-from dbbstation.inference.verdict import Value
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -56,7 +56,7 @@ class Edges:
         return float(expit(anywhere - more_often - NAMED_ODDS))
 
 
-def edges_of(recordings: Recordings, parts: Sequence[DrivePart]) -> Edges:
+def edges_of(recordings: Recordings, parts: Sequence[CausePart]) -> Edges:
     """Where stretches of time begin and end.
 
     Args:
@@ -82,7 +82,7 @@ def _at_turns(recordings: Recordings, times: NDArray[np.float64]) -> NDArray[np.
     return found
 
 
-def distinct_pushes(parts: Sequence[DrivePart]) -> int:
+def distinct_pushes(parts: Sequence[CausePart]) -> int:
     """How many pushes stretches of time are, those of one size counted once: a machine that pushes again pushes as hard.
 
     Args:
@@ -91,16 +91,16 @@ def distinct_pushes(parts: Sequence[DrivePart]) -> int:
     return distinct_sizes(_sizes_of(parts))
 
 
-def equal_pushes(parts: Sequence[DrivePart]) -> list[DrivePart]:
+def equal_pushes(parts: Sequence[CausePart]) -> list[CausePart]:
     """The most stretches of time that can be of one size together, in their order."""
     return [parts[k] for k in most_of_one_size(_sizes_of(parts))]
 
 
-def _sizes_of(parts: Sequence[DrivePart]) -> list[Value]:
+def _sizes_of(parts: Sequence[CausePart]) -> list[Value]:
     return [part.parameters["force_n"] for part in parts]
 
 
-def complement_of(parts: Sequence[DrivePart], first_s: float, last_s: float) -> Complement | None:
+def complement_of(parts: Sequence[CausePart], first_s: float, last_s: float) -> Complement | None:
     """The stretches between pulses of one size, with the opposite force; None where there are not two such pulses.
 
     Args:
@@ -117,7 +117,7 @@ def complement_of(parts: Sequence[DrivePart], first_s: float, last_s: float) -> 
     return Complement(Value(-size.value, size.uncertainty, size.unit), between, len(equal))
 
 
-def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[DrivePart]:
+def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[CausePart]:
     """Stretches of time in which the force differs from what it is before and behind them, or from what it is most of the time.
 
     Stretches that were found may overlap; what they are together has levels, of which neighbours that do not differ by
@@ -150,8 +150,8 @@ def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[DrivePa
         found = size(one - other)
         return abs(found.value) > APART * found.uncertainty
 
-    def part(first: float, last: float, less: NDArray[np.float64]) -> DrivePart:
-        return DrivePart("", {"force_n": size(less), "duration_s": Value(last - first, apart, "s")}, (first, last))
+    def part(first: float, last: float, less: NDArray[np.float64]) -> CausePart:
+        return CausePart("", (first, last), {"force_n": size(less), "duration_s": Value(last - first, apart, "s")})
 
     edges = _distinct(np.concatenate([times[[0, -1]], within.ravel()]), apart)
     levels: list[tuple[float, float, NDArray[np.float64]]] = []

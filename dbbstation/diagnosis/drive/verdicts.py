@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.channel import METHOD_SHARE
-from dbbstation.diagnosis.drive.findings import DriveFinding, DrivePart, UnmodelledForce
+from dbbstation.diagnosis.drive.findings import CausePart, DriveFinding, UnexplainedForce
 from dbbstation.diagnosis.drive.naming import COGGING, COULOMB, TRANSIENT, acts, source_of
 from dbbstation.diagnosis.drive.noise_rival import probability_beside_noise
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, edges_of, pulse_parts
@@ -17,15 +17,15 @@ from dbbstation.inference.patterns import Family
 from dbbstation.inference.pushes import MOST_PUSHES
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.stretches import SHORTEST
-from dbbstation.inference.verdict import OUT, SURE, Gains, Value, Verdict, claim
+from dbbstation.inference.verdict import OUT, SURE, Gains, Verdict, claim
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
-    from dbbstation.diagnosis.drive.findings import Complement
-    from dbbstation.diagnosis.drive.held_out import DriveHeldOut
+    from dbbstation.diagnosis.drive.findings import Complement, HeldOutForce
+    from dbbstation.facts.value import Value
     from dbbstation.inference.read_off import CauseFinding
 
 CLAIMS = frozenset({Verdict.IDENTIFIED, Verdict.AMBIGUOUS})
@@ -41,7 +41,7 @@ class Verdicts:
         held: predictions of held-out parts; None: not asked for.
     """
 
-    def __init__(self, explained: ExplainedDrive, *, several_speeds: bool, held: DriveHeldOut | None = None) -> None:
+    def __init__(self, explained: ExplainedDrive, *, several_speeds: bool, held: HeldOutForce | None = None) -> None:
         self._held = held
         self._explained, self._drive, self._several = explained, explained.drive, several_speeds
         self._raw = read_off(explained.settled)
@@ -86,7 +86,7 @@ class Verdicts:
         """Source that a member belongs to; empty where it has no name."""
         return self._source_of.get(name, "")
 
-    def effects(self) -> tuple[UnmodelledForce, ...]:
+    def effects(self) -> tuple[UnexplainedForce, ...]:
         """Unmodelled forces that are there, largest first."""
         found = []
         for one in self._raw:
@@ -96,7 +96,7 @@ class Verdicts:
                 which = 1.0 + float(np.argmax(one.blocks))
                 text = f"offset of {one.label}" if one.label else "offset of each recording"
                 found.append(
-                    UnmodelledForce(
+                    UnexplainedForce(
                         text, "recording", one.probability, one.rms, which, which, "(number of the recording)"
                     )
                 )
@@ -106,7 +106,7 @@ class Verdicts:
             span = one.spans[0]
             turns = one.family in {Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION}
             variable = f"{span.variable} by direction" if turns else span.variable
-            found.append(UnmodelledForce(one.name, variable, one.probability, one.rms, span.low, span.high, span.unit))
+            found.append(UnexplainedForce(one.name, variable, one.probability, one.rms, span.low, span.high, span.unit))
         return tuple(sorted(found, key=lambda e: -e.rms_n))
 
     def _source(self, finding: CauseFinding) -> str:
@@ -148,6 +148,7 @@ class Verdicts:
         parameters = self._values(best) if best is not None else {}
         if len(there) > 1 and best is not None and best.family is None:
             parameters = {k: v for f in reversed(there) for k, v in self._values(f).items()}
+        gains = None if self._held is None else self._held.gains.get(source.name, Gains(()))
         return DriveFinding(
             name=source.name,
             verdict=verdict,
@@ -155,14 +156,16 @@ class Verdicts:
             ambiguous_with=alike,
             gain=best.log_factor if best is not None else 0.0,
             concealed=best.confounded if best is not None else 0.0,
-            whole_n=best.whole_rms if best is not None else 0.0,
-            rest_n=best.rms if best is not None else 0.0,
+            signature_rms_n=best.whole_rms if best is not None else 0.0,
+            unconcealed_rms_n=best.rms if best is not None else 0.0,
             parameters=parameters,
             parts=parts,
             text=text if complement is None else f"{text} {_in_words(complement)}",
             at_end=tuple(ends),
             complement=complement,
-            gains=None if self._held is None else self._held.gains.get(source.name, Gains(())),
+            acts=acts(source.name),
+            persists=verdict is Verdict.HAPPENED and gains is not None and gains.predicts,
+            gains=gains,
         )
 
     def _claimed(self, source: str) -> Verdict:
@@ -170,7 +173,7 @@ class Verdicts:
         if self._held is None:
             return claim(SURE, OUT, acts(source), None)
         gains = self._held.gains.get(source, Gains(()))
-        return claim(SURE, OUT, acts(source), gains, worse=self._held.is_worse)
+        return claim(SURE, OUT, acts(source), gains, worse=self._held.worse)
 
     def _at_end(self, there: Sequence[CauseFinding]) -> dict[str, str]:
         """Numbers of laws that lie at the end of what is tried, and what that is."""
@@ -231,7 +234,7 @@ class Verdicts:
         return probability_beside_noise(self._explained.settled)
 
     @cached_property
-    def _pulses(self) -> tuple[DrivePart, ...]:
+    def _pulses(self) -> tuple[CausePart, ...]:
         """Levels of all stretches of time that are there and do not turn with the travel."""
         names = [
             f.name for f in self._raw if f.family is Family.PULSES and f.verdict in CLAIMS and f.name in self.named
@@ -286,7 +289,7 @@ class Verdicts:
         return f"{there[0].text or 'This recording does not decide it.'} {source.texts.confirm}"
 
     def _brings_nothing(self, source: str) -> str:
-        if self._held is not None and self._held.is_worse:
+        if self._held is not None and self._held.worse:
             return "everything together predicts held-out parts worse than mass and friction do"
         gains = Gains(()) if self._held is None else self._held.gains.get(source, Gains(()))
         return f"brings too little where it was not fitted: something in {gains.with_gain} of {self._held.parts if self._held else 0} held-out parts"
@@ -370,11 +373,11 @@ class Verdicts:
             return self._explained.after.parameters(finding.name)
         return finding.values if finding.family is None else {}
 
-    def _parts(self, finding: CauseFinding) -> list[DrivePart]:
+    def _parts(self, finding: CauseFinding) -> list[CausePart]:
         """Every wave or form by itself."""
         if finding.name in self._drive.of_law:
-            return [DrivePart(self._drive.of_law[finding.name][1].label, self._values(finding))]
-        return [DrivePart(finding.name, dict(finding.values))]
+            return [CausePart(self._drive.of_law[finding.name][1].label, None, self._values(finding))]
+        return [CausePart(finding.name, None, dict(finding.values))]
 
 
 def _in_words(complement: Complement) -> str:

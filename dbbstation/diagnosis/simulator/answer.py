@@ -14,12 +14,13 @@ from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
 from dbbstation.diagnosis.simulator.search import compared, moves, search
 from dbbstation.diagnosis.simulator.separate import separations
 from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns, rms
+from dbbstation.facts.value import Value
 from dbbstation.inference.chosen_anew import LEAST_PARTS
 from dbbstation.inference.folds import Fold
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.read_off import Trial, read_off
-from dbbstation.inference.verdict import Value, Verdict
+from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -10,6 +10,7 @@ import numpy as np
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
+from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.folds import held_out_error, parts_of
 from dbbstation.inference.followed import WithoutPart
@@ -22,7 +23,7 @@ from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import compress, solve, with_random
-from dbbstation.inference.verdict import OUT, Value, Verdict, is_worse
+from dbbstation.inference.verdict import OUT, Verdict, is_worse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -249,7 +250,7 @@ def _found(
         lacking=lacking,
         texts={source.name: source.texts for source in sources},
         second_start=_second_start(settled, findings),
-        cancelling=_cancelling(settled),
+        cancelling=_cancelling(settled, table.unit),
     )
 
 
@@ -343,11 +344,12 @@ def _followed(effect: NDArray[np.float64], columns: NDArray[np.float64]) -> floa
     return 1.0 - float(np.sum((effect - both @ values) ** 2)) / whole if whole > 0.0 else 0.0
 
 
-def _cancelling(settled: Settled) -> Cancelling | None:
+def _cancelling(settled: Settled, unit: str) -> Cancelling | None:
     """Effects and parameters larger than all together, where most of their squares cancel."""
     base = settled.channel.base
     parameters = zip(base.names, settled.base_values(), strict=True)
-    return cancelling(effects_by_name(settled) | {n: base.samples[:, k] * v for k, (n, v) in enumerate(parameters)})
+    of_base = {n: base.samples[:, k] * v for k, (n, v) in enumerate(parameters)}
+    return cancelling(effects_by_name(settled) | of_base, unit)
 
 
 def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[RefittedParameter, ...]:

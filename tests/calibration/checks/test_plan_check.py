@@ -10,8 +10,8 @@ from dbbstation.calibration.checks.missing_physics import is_missing_physics, mi
 from dbbstation.calibration.checks.plan_check import check_plan
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.calibration.reporting.evaluation import evaluate
+from dbbstation.calibration.reporting.figures import calibration_figures
 from dbbstation.cli import main
-from dbbstation.results.of_calibration import calibration_figures
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import subset, table_ii_plan

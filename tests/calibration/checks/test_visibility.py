@@ -39,7 +39,7 @@ def test_singular_values_are_those_of_the_dense_matrix(machine, case):
     scaled = dense.matrix * calibration.layout.known.scale[:24]
     # The plan's matrix has one direction of each circle, 180 angles; the runs have both, 90 angles each.
     expected = np.linalg.svd(scaled, compute_uv=False)[: calibration.parameters_identified]
-    assert seen.singular == pytest.approx(expected, rel=1e-3)
+    assert seen.singular_values_mm == pytest.approx(expected, rel=1e-3)
     assert seen.condition == pytest.approx(expected[0] / expected[-1], rel=1e-3)
 
 
@@ -59,9 +59,11 @@ def test_the_weakest_direction_is_as_uncertain_as_the_covariance_says(case):
     axis = np.linalg.eigh(covariance / np.outer(scale, scale))[1][:, -1]
     # Along an eigenvector of the scaled covariance a parameter moves by its share of the standard deviation.
     sigma = np.sqrt(axis @ (covariance / np.outer(scale, scale)) @ axis)
-    assert seen.weak[0].uncertainty == pytest.approx(1e3 * sigma * np.abs(scale * axis).max())
-    assert {weak.unit for weak in seen.weak} == {"µm"}
-    assert [w.uncertainty for w in seen.weak] == sorted((w.uncertainty for w in seen.weak), reverse=True)
+    assert seen.weak_directions[0].uncertainty == pytest.approx(1e3 * sigma * np.abs(scale * axis).max())
+    assert {weak.unit for weak in seen.weak_directions} == {"µm"}
+    assert [w.uncertainty for w in seen.weak_directions] == sorted(
+        (w.uncertainty for w in seen.weak_directions), reverse=True
+    )
 
 
 def test_correlations_are_the_largest_of_the_covariance(case):

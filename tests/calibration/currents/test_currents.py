@@ -13,12 +13,12 @@ from scipy.stats import chi2
 
 from dbbstation.calibration.fit.calibrate import MEASUREMENT_SOURCES, calibrate
 from dbbstation.calibration.reporting.evaluation import evaluate
+from dbbstation.calibration.reporting.figures import calibration_figures
 from dbbstation.cli import cli
 from dbbstation.errors import CalibrationError, ModelError
+from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import read_model
 from dbbstation.machine.geometry import StrutMasses
-from dbbstation.results.of_calibration import calibration_figures
-from dbbstation.results.serialise import plain
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.load import load_sessions
 from dbbstation.trace.columns import currents

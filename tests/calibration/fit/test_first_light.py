@@ -6,7 +6,7 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, calibrate
 from dbbstation.calibration.reporting.evaluation import evaluate
-from dbbstation.results.of_calibration import calibration_figures
+from dbbstation.calibration.reporting.figures import calibration_figures
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 

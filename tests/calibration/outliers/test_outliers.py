@@ -148,7 +148,7 @@ def test_a_bumped_run_steps(recorded, sound):
     runs = list(recorded.observations)
     runs[k] = replace(run, raw=replace(run.raw, length_mm=length))
     calibration, found = robust(recorded, runs)
-    assert [(o.kind, o.run) for o in found] == [(OutlierKind.RUN, "c ccw 1")]
+    assert [(o.kind, o.runs) for o in found] == [(OutlierKind.RUN, "c ccw 1")]
     assert "steps by 20" in found[0].text
     assert pull(calibration, sound) < 1.5
 
@@ -159,7 +159,7 @@ def test_one_run_filed_under_another_test_is_recognised(recorded, sound):
     k, g = number(recorded, "a", "ccw"), number(recorded, "g", "ccw")
     runs[k] = filed(runs[k], runs[g])
     calibration, found = robust(recorded, runs)
-    assert [(o.kind, o.run) for o in found] == [(OutlierKind.WRONG_PLACE, "a ccw 1")]
+    assert [(o.kind, o.runs) for o in found] == [(OutlierKind.WRONG_PLACE, "a ccw 1")]
     assert "what test g ccw should read" in found[0].text
     assert pull(calibration, sound) < 2.0
     assert 1e3 * fine_noise_mm(calibration) == pytest.approx(0.5, rel=0.05)
@@ -200,7 +200,9 @@ def test_runs_left_out_for_want_of_physics_are_taken_back_with_it_and_bumped_one
     raw = runs[bumped].raw
     runs[bumped] = replace(runs[bumped], raw=replace(raw, length_mm=raw.length_mm + step))
     left_out = tuple(
-        Outlier(OutlierKind.RUN, runs[k].test, runs[k].label, 10.0, None, "no circle of this machine")
+        Outlier(
+            kind=OutlierKind.RUN, test=runs[k].test, runs=runs[k].label, size_um=10.0, text="no circle of this machine"
+        )
         for k in (*strange, bumped)
     )
     kept = [run for k, run in enumerate(runs) if k not in {*strange, bumped}]

@@ -29,7 +29,7 @@ def test_centres_are_counted_from_the_ball_and_from_the_first_position(reference
     a, b = found.runs
     assert a.before.centre_deviation_um == pytest.approx(30.0, abs=0.01)
     assert a.before.mean_radial_error_um == pytest.approx(5.0, abs=0.01)
-    assert (a.before_from_first_um, b.before_from_first_um) == (0.0, pytest.approx(18.0, abs=0.01))
+    assert tuple(run.before.centre_deviation_from_first_um for run in (a, b)) == (0.0, pytest.approx(18.0, abs=0.01))
     assert found.nominal_rms_um == pytest.approx(np.sqrt((30**2 / 2 + 25 + 12**2 / 2) / 2), rel=1e-3)
 
 
@@ -41,7 +41,7 @@ def test_after_is_what_the_model_leaves(reference):
     assert run.before.centre_deviation_um == pytest.approx(30.0, abs=0.01)
     assert run.after.centre_deviation_um == pytest.approx(0.0, abs=0.01)
     assert run.measured.circularity_um == pytest.approx(run.before.circularity_um, abs=1e-6)
-    assert run.measured.centre_mm == pytest.approx(run.before.centre_mm, abs=1e-9)
+    assert run.measured.centre_deviation_um == pytest.approx(run.before.centre_deviation_um, abs=1e-6)
 
 
 def test_a_base_that_is_turned_makes_the_plane_slope(reference):

@@ -14,7 +14,7 @@ from dbbstation.diagnosis.drive.sampling import evenly_sampled
 from dbbstation.diagnosis.drive.signals import signals_of
 from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
 from dbbstation.errors import CalibrationError, ModelError
-from dbbstation.results.of_drive import drive_result
+from dbbstation.results.drive import drive_result
 from dbbstation.trace.drive_recording import DriveRecording
 from tests.diagnosis.drive.plant import Truth, at_constant_speed, record, to_and_fro
 

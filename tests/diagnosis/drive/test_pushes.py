@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.drive.findings import DrivePart
+from dbbstation.diagnosis.drive.findings import CausePart
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, equal_pushes
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
+from dbbstation.facts.value import Value
 from dbbstation.inference.pushes import pooled
-from dbbstation.inference.verdict import Value
-from dbbstation.results.of_drive import drive_result
+from dbbstation.results.drive import drive_result
 from dbbstation.trace.drive_recording import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 
 def pushes(sizes, sigma=0.2):
-    return [DrivePart("", {"force_n": Value(size, sigma, "N")}, (k + 0.2, k + 0.7)) for k, size in enumerate(sizes)]
+    return [CausePart("", (k + 0.2, k + 0.7), {"force_n": Value(size, sigma, "N")}) for k, size in enumerate(sizes)]
 
 
 def test_pushes_of_one_size_count_once():

@@ -9,7 +9,8 @@ import pytest
 
 from dbbstation.diagnosis.table.mismatch import RefittedParameter, find_mismatch
 from dbbstation.errors import InputError
-from dbbstation.inference.verdict import Value, Verdict
+from dbbstation.facts.value import Value
+from dbbstation.inference.verdict import Verdict
 from dbbstation.results.of_mismatch import mismatch_result
 from dbbstation.tasks.tables import TableOptions, load_tables, stated_uncertainties
 

@@ -1,39 +1,53 @@
-"""From an evaluation to its result."""
+"""Tolerances of the shop, held against what a model makes of runs."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.plan.tolerance import OF_A_MODEL, USUAL_UPR, CircleFigure, worst
-from dbbstation.results.evaluation import CircleDeviations, EvaluatedRun, EvaluatedTolerance, WorstRun
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from dbbstation.calibration.reporting.evaluation import RunEvaluation
+    from dbbstation.calibration.reporting.evaluation import CircleDeviations, EvaluatedRun
     from dbbstation.plan.tolerance import Tolerance
-    from dbbstation.trace.analysis import CircleFigures
 
 
-def evaluated_runs(runs: Iterable[RunEvaluation]) -> tuple[EvaluatedRun, ...]:
-    """Return figures of runs, before under the nominal machine and after under the model [CAL Table III]."""
-    return tuple(
-        EvaluatedRun(
-            test=run.test,
-            direction=run.direction,
-            repeat=run.repeat,
-            measured=_deviations(run.measured),
-            before=_deviations(run.before, run.before_from_first_um),
-            after=_deviations(run.after, run.after_from_first_um),
-        )
-        for run in runs
-    )
+@dataclass(frozen=True)
+class WorstRun:
+    """The run with the largest figure that a tolerance is for.
+
+    Attributes:
+        run: test, direction and repeat.
+        worst_um: its figure [µm].
+        within: whether that is within tolerance.
+    """
+
+    run: str
+    worst_um: float
+    within: bool
 
 
-def _deviations(figures: CircleFigures, from_first_um: float | None = None) -> CircleDeviations:
-    return CircleDeviations(
-        figures.centre_deviation_um, figures.mean_radial_error_um, figures.circularity_um, from_first_um
-    )
+@dataclass(frozen=True)
+class EvaluatedTolerance:
+    """A tolerance, and the worst run under the nominal machine and under the model.
+
+    Attributes:
+        quantity: which figure it is for.
+        largest_um: the limit [µm].
+        tests: that it holds for; empty for all.
+        directions: that it holds for; empty for both.
+        before: under the nominal machine; None where it holds for no run.
+        after: under the model; None where it holds for no run.
+    """
+
+    quantity: str
+    largest_um: float
+    tests: tuple[str, ...]
+    directions: tuple[str, ...]
+    before: WorstRun | None
+    after: WorstRun | None
 
 
 def evaluated_tolerances(

@@ -1,16 +1,17 @@
-"""From the motor currents of a calibration to their result."""
+"""What the motor currents of a calibration say."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.facts.value import Value
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import GRAVITY_M_S2
-from dbbstation.results.currents import CurrentsResult, MotorResult
-from dbbstation.results.serialise import Quantified
 from dbbstation.sources.causes.drive_friction import PER_MOTOR, of_motor
 from dbbstation.sources.laws.weights import platform_masses
 
@@ -22,7 +23,57 @@ N_PER_KN = 1e3
 MM_PER_M = 1e3
 
 
-def currents_result(calibration: Calibration) -> CurrentsResult | None:
+@dataclass(frozen=True)
+class Motor:
+    """One motor; None where the recordings leave a number open.
+
+    Attributes:
+        motor: 1 to 6.
+        gain_a_kn: current per force of the strut.
+        coulomb_n: friction at any speed.
+        viscous_ns_mm: friction per speed.
+        load_share_n_kn: friction per load.
+        asymmetry_n: what differs by direction.
+        force_per_current: of the strut [N/A].
+        torque_per_current: at the screw [Nm/A]; None where the machine file does not say its lead.
+        residual_a: root mean square that the model leaves [A].
+        noise_a: of a reading [A].
+        noise_correlation_samples: samples after which noise is new.
+        samples: readings that went in.
+    """
+
+    motor: int
+    gain_a_kn: Value | None
+    coulomb_n: Value | None
+    viscous_ns_mm: Value | None
+    load_share_n_kn: Value | None
+    asymmetry_n: Value | None
+    force_per_current: Value | None
+    torque_per_current: Value | None
+    residual_a: float | None
+    noise_a: float | None
+    noise_correlation_samples: float | None
+    samples: int
+
+
+@dataclass(frozen=True)
+class CurrentsFigures:
+    """Motor currents.
+
+    Attributes:
+        weight_taken_as_known_n: of the platform, on which forces rest [N].
+        motors: one after the other.
+        centre_of_gravity: by coordinate and channel, `circles`, `currents` and `both` [mm]; None where a channel leaves it open.
+        notes: what was left out and what cannot be told, in words.
+    """
+
+    weight_taken_as_known_n: float
+    motors: tuple[Motor, ...]
+    centre_of_gravity: Mapping[str, Mapping[str, Value | None]]
+    notes: tuple[str, ...]
+
+
+def motor_currents(calibration: Calibration) -> CurrentsFigures | None:
     """Gains, friction, noise and what is left of each motor, and the centre of gravity by channel.
 
     None for a calibration from circles alone. A number that the recordings leave open is None.
@@ -31,7 +82,7 @@ def currents_result(calibration: Calibration) -> CurrentsResult | None:
     if found is None:
         return None
     weight_n = platform_masses("drive-friction", calibration.layout.machine).platform_kg * GRAVITY_M_S2
-    return CurrentsResult(
+    return CurrentsFigures(
         weight_taken_as_known_n=weight_n,
         motors=tuple(_motor(calibration, found, motor) for motor in range(STRUTS)),
         centre_of_gravity=_centre_of_gravity(calibration, found),
@@ -46,24 +97,22 @@ def _fitted(calibration: Calibration, source: str) -> dict[str, tuple[float, flo
     return {name: (float(value), float(u)) for (of, _, name), value, u in numbers if of == source}
 
 
-def _motor(calibration: Calibration, found: MotorFindings, motor: int) -> MotorResult:
+def _motor(calibration: Calibration, found: MotorFindings, motor: int) -> Motor:
     term = next(term for term in calibration.layout.terms if term.source.of_currents)
     numbers = _fitted(calibration, term.source.name)
     units = {p.name: p.unit for p in term.parameters}
     names = {kind: of_motor(motor + 1, kind) for kind in PER_MOTOR}
-    told = {
-        kind: None if name in found.held else Quantified(*numbers[name], units[name]) for kind, name in names.items()
-    }
+    told = {kind: None if name in found.held else Value(*numbers[name], units[name]) for kind, name in names.items()}
     gain, gain_u = numbers[names[PER_MOTOR[0]]]
     force = torque = None
     if told[PER_MOTOR[0]] is not None and gain != 0.0:
-        force = Quantified(N_PER_KN / gain, N_PER_KN * gain_u / gain**2, "N/A")
+        force = Value(N_PER_KN / gain, N_PER_KN * gain_u / gain**2, "N/A")
         lead = calibration.layout.machine.screw_lead_mm
         turning = None if lead is None else lead / (2.0 * math.pi * MM_PER_M)
         if turning:
-            torque = Quantified(force.value * turning, (force.uncertainty or 0.0) * turning, "Nm/A")
+            torque = Value(force.value * turning, force.uncertainty * turning, "Nm/A")
     noise = found.noise[motor]
-    return MotorResult(
+    return Motor(
         motor=motor + 1,
         **told,
         force_per_current=force,
@@ -75,14 +124,14 @@ def _motor(calibration: Calibration, found: MotorFindings, motor: int) -> MotorR
     )
 
 
-def _centre_of_gravity(calibration: Calibration, found: MotorFindings) -> dict[str, dict[str, Quantified | None]]:
+def _centre_of_gravity(calibration: Calibration, found: MotorFindings) -> dict[str, dict[str, Value | None]]:
     """Each coordinate's shift by circles alone, by currents alone and by both."""
     together = _fitted(calibration, "cog-shift")
-    shifts: dict[str, dict[str, Quantified | None]] = {}
+    shifts: dict[str, dict[str, Value | None]] = {}
     for name in next(iter(found.alone.values()), {}):
         alone = {channel: by_name[name] for channel, by_name in found.alone.items()}
         shifts[name] = {
-            **{channel: None if number is None else Quantified(*number, "mm") for channel, number in alone.items()},
-            "both": Quantified(*together[name], "mm"),
+            **{channel: None if number is None else Value(*number, "mm") for channel, number in alone.items()},
+            "both": Value(*together[name], "mm"),
         }
     return shifts

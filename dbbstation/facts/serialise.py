@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, GetPydanticSchema, TypeAdapter
+from pydantic import Field, GetPydanticSchema, PlainSerializer, TypeAdapter
 from pydantic_core import core_schema
 
 
@@ -22,6 +21,9 @@ def _is_none(value: object) -> bool:
 
 Absent = Field(exclude_if=_is_none)
 """Marks a field whose key is left out where it is None, as in `Annotated[str | None, Absent]`."""
+
+OrNull = Annotated[str, PlainSerializer(lambda text: text or None, return_type=str | None)]
+"""A text that is null in JSON where it is empty."""
 
 AsItIs = GetPydanticSchema(lambda _source, _handler: core_schema.any_schema())
 Kept = Field(exclude=True)
@@ -38,21 +40,6 @@ Array = Annotated[
     ),
 ]
 """Numbers of any shape: nested lists in JSON."""
-
-
-@dataclass(frozen=True)
-class Quantified:
-    """A number as it was identified.
-
-    Attributes:
-        value: in its unit.
-        uncertainty: standard uncertainty u [GUM], in the same unit; None where it is not known.
-        unit: of both.
-    """
-
-    value: float
-    uncertainty: float | None
-    unit: str
 
 
 _Kind = TypeVar("_Kind")

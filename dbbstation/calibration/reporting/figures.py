@@ -1,0 +1,211 @@
+"""Everything that a fit says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from dbbstation.calibration.checks.gaps import gaps
+from dbbstation.calibration.checks.missing_physics import LeftByFit, left_by
+from dbbstation.calibration.checks.noise_level import fine_noise_mm
+from dbbstation.calibration.checks.plan_check import PlanCheck, check_plan
+from dbbstation.calibration.checks.scatter import ScatterCheck, check_scatter, seats_of
+from dbbstation.calibration.checks.visibility import Observability, visibility
+from dbbstation.calibration.outliers.outlier import Outlier
+from dbbstation.calibration.reporting.evaluation import EvaluatedRun, rms_um
+from dbbstation.calibration.reporting.motors import CurrentsFigures, motor_currents
+from dbbstation.computing.threads import with_one_thread
+from dbbstation.facts.serialise import Absent, Array, plain
+from dbbstation.facts.value import Value
+from dbbstation.model.identified import known_u
+from dbbstation.sources.contract import Owner
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.calibration.layout import ParameterSet
+    from dbbstation.calibration.reporting.evaluation import Evaluation
+    from dbbstation.model.identified import IdentifiedModel
+
+ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost", "covariance"})
+"""Parts of a result that the model file holds in places of their own."""
+
+
+@dataclass(frozen=True)
+class SourceValues:
+    """Parameters of one error source.
+
+    Attributes:
+        name: of the source.
+        shared: what has these values, such as a session or mounting; None of the machine.
+        parameters: by name.
+    """
+
+    name: str
+    shared: Annotated[str | None, Absent]
+    parameters: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class ParameterName:
+    """Name of a row of a covariance.
+
+    Attributes:
+        source: error source that it belongs to.
+        parameter: its name there, with its unit.
+        unit: of its value.
+    """
+
+    source: str
+    parameter: str
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Covariance of the machine's parameters, as identified.
+
+    Along `directions_lost` it has no variance: nothing was identified there, and values stay nominal.
+
+    Attributes:
+        rows: name of each row and column.
+        matrix: in the products of their units, shape (k, k).
+    """
+
+    rows: tuple[ParameterName, ...]
+    matrix: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CalibrationFigures:
+    """Everything that a fit says, and what was kept from pulling it.
+
+    Attributes:
+        runs: figures of every run, under the nominal machine and under the model.
+        nominal_rms_um: measured less predicted length under the nominal machine [µm].
+        residual_rms_um: the same under the model's machine [µm].
+        residual_within_mounting_rms_um: the same after each mounting's shift of the ball [µm].
+        noise_um: of one reading, from differences of neighbours [µm].
+        misfit: the residual beyond noise and mountings.
+        noise_correlation_samples: samples after which noise is new.
+        parameters_identified: how many.
+        directions_lost: what the tests cannot identify, in words.
+        gaps: what is known of these all the same, in words.
+        plan_check: whether the tests are enough to check the plan.
+        directions_regularised: what only tolerances of the machine file tell, in words.
+        parameters_prescribed: held at nominal in place of directions, as `source.parameter`.
+        outliers: kept out of the fit.
+        scatter: whether balls scatter as stated.
+        observability: what the circles see.
+        sources: values of the machine's parameters.
+        measurement_effects: values of what belongs to session, mounting or instrument.
+        motor_currents: what these say; None for circles alone.
+    """
+
+    runs: tuple[EvaluatedRun, ...]
+    nominal_rms_um: float
+    residual_rms_um: float
+    residual_within_mounting_rms_um: float
+    noise_um: float
+    misfit: LeftByFit
+    noise_correlation_samples: float
+    parameters_identified: int
+    directions_lost: tuple[str, ...]
+    gaps: tuple[str, ...]
+    plan_check: PlanCheck
+    directions_regularised: tuple[str, ...]
+    parameters_prescribed: tuple[str, ...]
+    outliers: tuple[Outlier, ...]
+    scatter: tuple[ScatterCheck, ...]
+    observability: Observability
+    sources: tuple[SourceValues, ...]
+    measurement_effects: tuple[SourceValues, ...]
+    motor_currents: Annotated[CurrentsFigures | None, Absent] = None
+
+    @property
+    def parameters(self) -> dict[str, Value]:
+        """The machine's parameters as `source.parameter`, with their standard uncertainties."""
+        return {f"{one.name}.{name}": value for one in self.sources for name, value in one.parameters.items()}
+
+
+@with_one_thread
+def calibration_figures(
+    calibration: Calibration, evaluation: Evaluation, outliers: Sequence[Outlier] = ()
+) -> CalibrationFigures:
+    """Return everything that a fit says.
+
+    Args:
+        calibration: the fit.
+        evaluation: of its model, with the runs that it was made from.
+        outliers: what was kept from pulling it.
+    """
+    u = _uncertainties(calibration)
+    values = [(term, _values(calibration, term, u)) for term in calibration.layout.terms]
+    return CalibrationFigures(
+        runs=evaluation.runs,
+        nominal_rms_um=evaluation.nominal_rms_um,
+        residual_rms_um=evaluation.residual_rms_um,
+        residual_within_mounting_rms_um=rms_um(calibration.residual_mm),
+        noise_um=1e3 * fine_noise_mm(calibration),
+        misfit=left_by(calibration),
+        noise_correlation_samples=calibration.noise.correlation_samples,
+        parameters_identified=calibration.parameters_identified,
+        directions_lost=calibration.directions_lost,
+        gaps=tuple(gaps(calibration)),
+        plan_check=check_plan(calibration),
+        directions_regularised=calibration.directions_regularised,
+        parameters_prescribed=tuple(f"{source}.{name}" for source, name in calibration.prescribed),
+        outliers=tuple(outliers),
+        scatter=tuple(check_scatter(seats_of(calibration))),
+        observability=visibility(calibration),
+        sources=tuple(one for term, one in values if term.source.belongs_to is Owner.MACHINE),
+        measurement_effects=tuple(one for term, one in values if term.source.belongs_to is not Owner.MACHINE),
+        motor_currents=motor_currents(calibration),
+    )
+
+
+def report_of(figures: CalibrationFigures, **more: Any) -> dict[str, object]:  # noqa: ANN401 - what the file takes
+    """Return the numbers that a model file keeps of its fit.
+
+    Args:
+        figures: of the fit.
+        more: further numbers, by name.
+    """
+    return {**more, **{key: value for key, value in plain(figures).items() if key not in ELSEWHERE_IN_MODEL}}
+
+
+def covariance_of(identified: IdentifiedModel) -> Covariance:
+    """Return the covariance of a model's parameters, rows named."""
+    units = {
+        (fitted.source.name, fitted.shared, parameter.name): parameter.unit
+        for fitted in identified.model.sources
+        for parameter in fitted.source.parameters(identified.model.machine)
+    }
+    rows = tuple(ParameterName(row[0], row[2], units[row]) for row in identified.covariance_rows)
+    return Covariance(rows, identified.covariance)
+
+
+def _uncertainties(calibration: Calibration) -> NDArray[np.float64]:
+    """Standard uncertainty of every column, as the model file has it, shape (k,); NaN where not known."""
+    variance = np.maximum(calibration.solution.variance, 0.0)
+    variance += calibration.layout.formula_variance(calibration.x)
+    if calibration.prescribed:  # they define coordinates, and all parameters are known in these
+        return np.sqrt(variance)
+    return known_u(variance, np.sum(calibration.null_space**2, axis=0))
+
+
+def _values(calibration: Calibration, term: ParameterSet, u: NDArray[np.float64]) -> SourceValues:
+    numbers = zip(term.parameters, calibration.x[term.columns], u[term.columns], strict=True)
+    return SourceValues(
+        name=term.source.name,
+        shared=term.shared or None,
+        parameters={
+            parameter.name: Value(float(value), float(known), parameter.unit) for parameter, value, known in numbers
+        },
+    )

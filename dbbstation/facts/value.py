@@ -1,0 +1,39 @@
+"""A number with its standard uncertainty and unit: the one type of it, in whatever is computed and in JSON."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+from pydantic import BeforeValidator, PlainSerializer
+
+OrUnknown = Annotated[
+    float,
+    BeforeValidator(lambda number: math.nan if number is None else number),
+    PlainSerializer(lambda number: number if math.isfinite(number) else None, return_type=float | None),
+]
+"""A number that is nan or infinite where it is not known, and null in JSON."""
+
+
+def finite(number: float | None) -> float | None:
+    """Return a number, or None where it is not finite: JSON has no word for that."""
+    return number if number is not None and math.isfinite(number) else None
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number with its standard uncertainty u [GUM], in one unit."""
+
+    value: OrUnknown
+    uncertainty: OrUnknown
+    unit: str
+
+    @property
+    def is_known(self) -> bool:
+        """Whether its uncertainty is known."""
+        return math.isfinite(self.uncertainty)
+
+    def at_least(self, uncertainty: float) -> Value:
+        """Return it with the larger of its own and another standard uncertainty; one that is not known (nan) changes nothing."""
+        return replace(self, uncertainty=uncertainty) if uncertainty > self.uncertainty else self

@@ -346,7 +346,8 @@ def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> lis
         InputError: nobody is there to say it.
     """
     from dbbstation.errors import InputError, Problem
-    from dbbstation.tasks.importing.plausible import CHANCE, chance_of_runs
+    from dbbstation.tasks.importing.plausible import CHANCE
+    from dbbstation.tasks.importing.runs import chance_of_runs
 
     chance = chance_of_runs(runs, plan)
     if chance is None or chance >= CHANCE:

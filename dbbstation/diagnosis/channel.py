@@ -18,10 +18,10 @@ from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_M
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.parts import parts_of
 from dbbstation.diagnosis.shapes import variables
+from dbbstation.inference.blocks import Block, compress, with_random
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
 from dbbstation.inference.projection import BesideBase, CauseColumns
-from dbbstation.inference.square_root import Block, compress, with_random
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.inference.blocks import Columns
     from dbbstation.inference.harmonics import Spectrum
-    from dbbstation.inference.square_root import Columns
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation

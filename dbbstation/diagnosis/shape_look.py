@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.inference.square_root import Columns
+    from dbbstation.inference.blocks import Columns
 
 STRONGEST = 2
 """Forms of each kind that are kept as shapes."""

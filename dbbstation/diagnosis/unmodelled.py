@@ -10,8 +10,8 @@ import numpy as np
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.shape_look import TemplateScan, looked_for
 from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Samples, Shape, ranges, samples_of, shapes
+from dbbstation.inference.blocks import with_random
 from dbbstation.inference.model_comparison import Cause, Variant
-from dbbstation.inference.square_root import with_random
 from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:

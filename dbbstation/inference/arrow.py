@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.inference.square_root import Block, Columns
+    from dbbstation.inference.blocks import Block, Columns
 
 SMALL = 1e6
 """Multiplications, rows times columns squared, below which looking for groups takes longer than it saves: less than a millisecond."""

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.sparse import diags_array
 from scipy.stats import chi2
 
+from dbbstation.inference.blocks import compress
 from dbbstation.inference.coloured import (
     FEWEST_INDEPENDENT,
     Bands,
@@ -31,7 +32,7 @@ from dbbstation.inference.model_comparison import Cause, ModelComparison, Varian
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, Family, log_odds
 from dbbstation.inference.projection import BesideBase, CauseColumns
-from dbbstation.inference.square_root import compress, solve
+from dbbstation.inference.square_root import solve
 from dbbstation.inference.uneven import (
     has_long_tails,
     log_student,

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from dbbstation.inference.square_root import Block, Columns, compress, lost_directions, solve
+from dbbstation.inference.blocks import Block, Columns, compress
+from dbbstation.inference.square_root import lost_directions, solve
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

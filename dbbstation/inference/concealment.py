@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.square_root import spread
+from dbbstation.inference.blocks import spread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from dbbstation.inference.square_root import Block
+    from dbbstation.inference.blocks import Block
 
 SEEN = 1e-5
 """Relative singular value of fitted columns below which a direction is not identifiable and takes up nothing."""

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.square_root import Block, Columns, Solution, solve, spread
+from dbbstation.inference.blocks import Block, Columns, spread
+from dbbstation.inference.square_root import Solution, solve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

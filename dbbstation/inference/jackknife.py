@@ -11,15 +11,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.square_root import compress, solve, spread, with_random
+from dbbstation.inference.blocks import compress, spread, with_random
+from dbbstation.inference.square_root import solve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from dbbstation.inference.blocks import Block
     from dbbstation.inference.settled import Settled
-    from dbbstation.inference.square_root import Block, Solution
+    from dbbstation.inference.square_root import Solution
 
 
 def jackknife_covariance(blocks: Sequence[Block], size: int) -> NDArray[np.float64]:

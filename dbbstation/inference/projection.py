@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.inference.square_root import Columns
+    from dbbstation.inference.blocks import Columns
 
 MARGIN = 512
 """Columns for which room is made at first, where nobody says how many there will be."""

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.blocks import spread
 from dbbstation.inference.hypotheses import CLOSE, search
 from dbbstation.inference.projection import BesideBase, CauseColumns
-from dbbstation.inference.square_root import spread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from dbbstation.inference.blocks import Block, Columns
     from dbbstation.inference.model_comparison import Cause
-    from dbbstation.inference.square_root import Block, Columns
 
 SHARE = 0.7
 """Of the groups of blocks that each draw keeps."""

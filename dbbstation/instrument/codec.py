@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.damaged import damaged_in
-from dbbstation.instrument.doubt import Written
+from dbbstation.instrument.doubt import Piece, Written
 from dbbstation.instrument.fields import Content, FrameParts, Literally, NotRepresentable, NotUnderstood, Reason
 from dbbstation.instrument.reading import Reading, Status
 
@@ -20,23 +20,6 @@ if TYPE_CHECKING:
 LONGEST_LINE = 256
 """Bytes without a line end after which they count as garbage; no known length gauge sends longer lines. Also the most that
 is kept of bytes in which no frame of fixed width was found yet."""
-
-
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """A reading (`lost` not yet counted, no time) with its bytes.
-
-    Attributes:
-        reading: what they tell.
-        raw: the bytes.
-        after: bytes of the same chunk that follow it.
-        written: how its number stood there; None where it has none in decimal digits.
-    """
-
-    reading: Reading
-    raw: bytes
-    after: int
-    written: Written | None = None
 
 
 @dataclass(frozen=True, slots=True)

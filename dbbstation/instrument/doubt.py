@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 from dbbstation.instrument.reading import DOUBTFUL, OK
 
 if TYPE_CHECKING:
-    from dbbstation.instrument.codec import Piece
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.instrument.reading import Reading
 
@@ -70,6 +69,23 @@ class Written:
             count, place, of = self.before, "before", last.before
         digits = "digit" if count == 1 else "digits"
         return f"its number has {count} {digits} {place} the point, the lines before had {of}"
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A reading (`lost` not yet counted, no time) with its bytes.
+
+    Attributes:
+        reading: what they tell.
+        raw: the bytes.
+        after: bytes of the same chunk that follow it.
+        written: how its number stood there; None where it has none in decimal digits.
+    """
+
+    reading: Reading
+    raw: bytes
+    after: int
+    written: Written | None = None
 
 
 class Doubts:

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.instrument.arrivals import Arrivals
-from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage, Piece
-from dbbstation.instrument.doubt import Doubts
+from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage
+from dbbstation.instrument.doubt import Doubts, Piece
 from dbbstation.instrument.reception import INCOMPLETE
 from dbbstation.instrument.sequence import SampleOrder
 from dbbstation.instrument.stamps import StreamStamps

@@ -7,8 +7,8 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage, Piece
-from dbbstation.instrument.doubt import Doubts
+from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage
+from dbbstation.instrument.doubt import Doubts, Piece
 from dbbstation.instrument.latch import latch_of
 from dbbstation.instrument.reading import Reading
 from dbbstation.instrument.reception import INCOMPLETE

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.instrument.codec import Decoder, Piece
+from dbbstation.instrument.codec import Decoder
+from dbbstation.instrument.doubt import Piece
 from dbbstation.instrument.library import known_instruments, load_variants
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError
-from dbbstation.instrument.codec import Decoder, Piece
-from dbbstation.instrument.doubt import Doubts
+from dbbstation.instrument.codec import Decoder
+from dbbstation.instrument.doubt import Doubts, Piece
 from dbbstation.instrument.sequence import SampleOrder
 
 if TYPE_CHECKING:

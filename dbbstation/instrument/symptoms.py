@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError
-from dbbstation.instrument.codec import Decoder, Piece
+from dbbstation.instrument.codec import Decoder
 from dbbstation.instrument.damaged import damaged_in
+from dbbstation.instrument.doubt import Piece
 from dbbstation.instrument.fields import Content
 from dbbstation.instrument.recognise import looks_like
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.catalogue import in_words, line_in
 from dbbstation.computing.processes import deaf, processes
-from dbbstation.diagnosis.simulator.ports import simulated
+from dbbstation.diagnosis.simulator.contract import simulated
 from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
 from dbbstation.errors import CalibrationError
 from dbbstation.simulators.kept import KeptSimulations

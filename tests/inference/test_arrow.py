@@ -7,15 +7,8 @@ import pytest
 
 from dbbstation.inference import arrow
 from dbbstation.inference.arrow import arrow_of
-from dbbstation.inference.square_root import (
-    Columns,
-    chi2_without,
-    compress,
-    lost_directions,
-    solve,
-    spread,
-    spread_over,
-)
+from dbbstation.inference.blocks import Columns, compress, spread, spread_over
+from dbbstation.inference.square_root import chi2_without, lost_directions, solve
 
 FITTED, MOUNTINGS, OF_EACH = 5, 24, 3
 BARS = 2

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from dbbstation.inference.blocks import compress
 from dbbstation.inference.jackknife import jackknife_covariance, refits_without, weighted_jackknife, widening
 from dbbstation.inference.settle import settle
-from dbbstation.inference.square_root import compress
 from tests.inference.tables import table
 from tests.inference.test_channel import EFFECTS, channel
 

@@ -8,9 +8,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from dbbstation.inference.blocks import Columns, compress
 from dbbstation.inference.model_comparison import Variant
 from dbbstation.inference.selection_frequency import DRAWS, SHARE, renumbered, selection_frequency
-from dbbstation.inference.square_root import Columns, compress
 from tests.inference.dense import Dense, cause, variant
 from tests.inference.subsets import log_posteriors
 

@@ -7,16 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dbbstation.inference.blocks import Columns, compress, joined, spread
 from dbbstation.inference.noise import noise_of
-from dbbstation.inference.square_root import (
-    Columns,
-    compress,
-    joined,
-    lost_directions,
-    solve,
-    spread,
-    unseen_combinations,
-)
+from dbbstation.inference.square_root import lost_directions, solve, unseen_combinations
 
 NOISE = 0.3
 

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbbstation.instrument.codec import Decoder, Garbage, Heard, Piece, decode, encode
+from dbbstation.instrument.codec import Decoder, Garbage, Heard, decode, encode
+from dbbstation.instrument.doubt import Piece
 from dbbstation.instrument.fields import NotUnderstood
 from dbbstation.instrument.library import load_instrument
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dbbstation.instrument.codec import Decoder, Piece, encode
-from dbbstation.instrument.doubt import BELIEVED_AFTER, Doubts, Written
+from dbbstation.instrument.codec import Decoder, encode
+from dbbstation.instrument.doubt import BELIEVED_AFTER, Doubts, Piece, Written
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument, with_zero
 from tests.instrument.scripted_port import expected

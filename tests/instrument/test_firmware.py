@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.instrument.codec import Decoder, Piece, decode, encode
+from dbbstation.instrument.codec import Decoder, decode, encode
+from dbbstation.instrument.doubt import Piece
 from dbbstation.instrument.library import load_instrument
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dbbstation.errors import InstrumentError
-from dbbstation.instrument.codec import Decoder, Garbage, Piece, decode, encode
+from dbbstation.instrument.codec import Decoder, Garbage, decode, encode
+from dbbstation.instrument.doubt import Piece
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import (
     instruments_folder,

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbbstation.instrument.codec import Decoder, Garbage, Piece, decode, encode
+from dbbstation.instrument.codec import Decoder, Garbage, decode, encode
+from dbbstation.instrument.doubt import Piece
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument, read_protocol
 from dbbstation.virtual.wire import VirtualInstrument

@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.instrument.codec import Decoder, Piece, decode, encode
+from dbbstation.instrument.codec import Decoder, decode, encode
 from dbbstation.instrument.damaged import Marks
-from dbbstation.instrument.doubt import Doubts
+from dbbstation.instrument.doubt import Doubts, Piece
 from dbbstation.instrument.library import known_instruments, load_variants, with_zero
 from dbbstation.instrument.polling import PolledReply
 from dbbstation.instrument.reading import OK

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.inference.square_root import Block
+    from dbbstation.inference.blocks import Block
 
 
 @dataclass(frozen=True)

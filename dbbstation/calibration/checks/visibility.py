@@ -9,13 +9,14 @@ import numpy as np
 
 from dbbstation.calibration.fit.directions import in_words
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.inference.square_root import complement, spread_over
+from dbbstation.inference.blocks import spread_over
+from dbbstation.inference.square_root import complement
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.inference.square_root import Block
+    from dbbstation.inference.blocks import Block
 
 WEAKEST = 3
 """Weak directions that are reported."""

@@ -13,8 +13,9 @@ import numpy as np
 
 from dbbstation.calibration.currents.readings import FEWEST, cleaned, one_way
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.blocks import Block, Columns, compress
 from dbbstation.inference.noise import Noise, noise_of
-from dbbstation.inference.square_root import Block, Columns, Solution, compress, lost_directions, solve
+from dbbstation.inference.square_root import Solution, lost_directions, solve
 from dbbstation.machine.compiled import in_parallel
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.motors import motor_currents

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.currents.channel import CurrentChannel
     from dbbstation.calibration.layout import Layout
+    from dbbstation.inference.blocks import Block
     from dbbstation.inference.noise import Noise
-    from dbbstation.inference.square_root import Block, Solution
+    from dbbstation.inference.square_root import Solution
 
 OPEN = 0.1
 """Share of a parameter that may lie in held directions before it counts as left open."""

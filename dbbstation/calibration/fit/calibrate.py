@@ -16,8 +16,9 @@ from dbbstation.calibration.fit.prescription import Name, names_of, prescribed
 from dbbstation.calibration.layout import Layout, lay_out
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.blocks import Block, compress
 from dbbstation.inference.noise import Noise, noise_of_turns
-from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve, unseen_combinations
+from dbbstation.inference.square_root import Solution, lost_directions, solve, unseen_combinations
 from dbbstation.machine.compiled import in_parallel
 from dbbstation.model.observation import Observation
 from dbbstation.sources.contract import Need, Owner

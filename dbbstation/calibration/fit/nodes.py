@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.square_root import compress
+from dbbstation.inference.blocks import compress
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.inference.square_root import Block
+    from dbbstation.inference.blocks import Block
     from dbbstation.model.observation import Observation
 
 SECTORS = 60

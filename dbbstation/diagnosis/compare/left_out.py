@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.blocks import Columns, compress
 from dbbstation.inference.chosen_anew import LEAST_PARTS, ChosenAnew, chosen_anew
 from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn
 from dbbstation.inference.held_out import held_out
@@ -13,7 +14,6 @@ from dbbstation.inference.hypotheses import search
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.read_off import Trial
 from dbbstation.inference.settled import MOST_EXPANDED
-from dbbstation.inference.square_root import Columns, compress
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -1,17 +1,24 @@
-"""The contract of a simulator of one's own: outputs from inputs, parameters and what acts at its ports."""
+"""The contract of a simulator of one's own: outputs from inputs, parameters and what acts at its ports; and one simulation by it."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from dbbstation.diagnosis.simulator.model import SimulationOutcome
+from dbbstation.diagnosis.simulator.ports import Ports, SimulationFault
+from dbbstation.diagnosis.simulator.terms import evaluator
+from dbbstation.inference.memory import lagging
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import numpy as np
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.simulator.ports import Ports
+    from dbbstation.diagnosis.simulator.model import Model, SimulationRequest
+    from dbbstation.diagnosis.simulator.terms import Evaluate
 
 
 class Simulator(ABC):
@@ -32,3 +39,36 @@ class Simulator(ABC):
             parameters: of `model.yaml`, its initial states included, by name.
             ports: of `model.yaml`, by name.
         """
+
+
+def simulated(simulator: Simulator, model: Model, ask: SimulationRequest) -> SimulationOutcome:
+    """Run a simulator once.
+
+    Raises:
+        SimulationFault: its outputs are not those of the model.
+        Exception: whatever the simulator raises.
+    """
+    acting: dict[str, list[Evaluate]] = {}
+    for term in ask.terms:
+        acting.setdefault(term.port, []).append(evaluator(term))
+    ports = Ports(model.ports, acting, records=ask.records)
+    run = model.runs[ask.run]
+    with np.errstate(all="ignore"):
+        try:
+            inputs = run.inputs if ask.trial is None else ask.trial.inputs
+            outputs = simulator.simulate(dict(inputs), dict(ask.parameters), ports)
+        except (ArithmeticError, ValueError) as error:
+            if isinstance(error, ValueError) and "math" not in str(error):
+                raise
+            # Numbers beyond what arithmetic has, or functions of infinity: it ran away.
+            return SimulationOutcome(np.full((len(model.outputs), len(run)), np.nan))
+    found = np.empty((len(model.outputs), len(run)))
+    for k, output in enumerate(model.outputs):
+        if output.name not in outputs:
+            raise SimulationFault(f"`simulate` returns no output `{output.name}`")
+        values = np.asarray(outputs[output.name], dtype=np.float64)
+        if values.shape != (len(run),):
+            raise SimulationFault(f"output `{output.name}` has the shape {values.shape}, {len(run)} rows are expected")
+        finite = output.filter_s > 0.0 and bool(np.isfinite(values).all())
+        found[k] = values + lagging(values, run.inputs["t"], output.filter_s) if finite else values
+    return SimulationOutcome(found, ports.recorded() if ask.records else {})

@@ -1,4 +1,4 @@
-"""Ports as a simulator sees them, and one simulation with terms at them."""
+"""Ports as a simulator sees them."""
 
 from __future__ import annotations
 
@@ -6,17 +6,12 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from dbbstation.diagnosis.simulator.model import SimulationOutcome
-from dbbstation.diagnosis.simulator.terms import evaluator
-from dbbstation.inference.memory import lagging
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.simulator.contract import Simulator
-    from dbbstation.diagnosis.simulator.model import Model, SimulationRequest, SimulatorPort
+    from dbbstation.diagnosis.simulator.model import SimulatorPort
     from dbbstation.diagnosis.simulator.terms import Evaluate
 
 
@@ -106,36 +101,3 @@ def _quickly(acting: Sequence[Evaluate], called: PortCall) -> PortCall:
         return total
 
     return summed
-
-
-def simulated(simulator: Simulator, model: Model, ask: SimulationRequest) -> SimulationOutcome:
-    """Run a simulator once.
-
-    Raises:
-        SimulationFault: its outputs are not those of the model.
-        Exception: whatever the simulator raises.
-    """
-    acting: dict[str, list[Evaluate]] = {}
-    for term in ask.terms:
-        acting.setdefault(term.port, []).append(evaluator(term))
-    ports = Ports(model.ports, acting, records=ask.records)
-    run = model.runs[ask.run]
-    with np.errstate(all="ignore"):
-        try:
-            inputs = run.inputs if ask.trial is None else ask.trial.inputs
-            outputs = simulator.simulate(dict(inputs), dict(ask.parameters), ports)
-        except (ArithmeticError, ValueError) as error:
-            if isinstance(error, ValueError) and "math" not in str(error):
-                raise
-            # Numbers beyond what arithmetic has, or functions of infinity: it ran away.
-            return SimulationOutcome(np.full((len(model.outputs), len(run)), np.nan))
-    found = np.empty((len(model.outputs), len(run)))
-    for k, output in enumerate(model.outputs):
-        if output.name not in outputs:
-            raise SimulationFault(f"`simulate` returns no output `{output.name}`")
-        values = np.asarray(outputs[output.name], dtype=np.float64)
-        if values.shape != (len(run),):
-            raise SimulationFault(f"output `{output.name}` has the shape {values.shape}, {len(run)} rows are expected")
-        finite = output.filter_s > 0.0 and bool(np.isfinite(values).all())
-        found[k] = values + lagging(values, run.inputs["t"], output.filter_s) if finite else values
-    return SimulationOutcome(found, ports.recorded() if ask.records else {})

@@ -11,6 +11,7 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
 from dbbstation.facts.value import Value
+from dbbstation.inference.blocks import compress, with_random
 from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.folds import held_out_error, parts_of
 from dbbstation.inference.followed import WithoutPart
@@ -22,7 +23,7 @@ from dbbstation.inference.patterns import Family, covers_turns, turn
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
-from dbbstation.inference.square_root import compress, solve, with_random
+from dbbstation.inference.square_root import solve
 from dbbstation.inference.verdict import OUT, Verdict, is_worse
 
 if TYPE_CHECKING:

@@ -10,8 +10,6 @@ import numpy as np
 from dbbstation.files.formats.mapping import ANGLE, DEVIATION, LENGTH, TIME, UNITS
 from dbbstation.plan.circle import FULL_TURN_DEG, USUAL_STROKE_MM
 from dbbstation.tasks.importing.travel import UnusableTravelError
-from dbbstation.trace.columns import LENGTH as COLUMN_OF_LENGTH
-from dbbstation.trace.columns import THETA
 from dbbstation.trace.cut import LARGEST_JUMP_MM
 
 if TYPE_CHECKING:
@@ -22,8 +20,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.recordings.table_csv import TableFile
     from dbbstation.plan.circle import Circle
-    from dbbstation.plan.plan import Ball, Plan
-    from dbbstation.tasks.importing.runs import ImportedRun
+    from dbbstation.plan.plan import Ball
 
 LEAST_RANGE_MM = 2e-4
 """Readings of a whole turn that differ by less are none of a bar: bars resolve 0.1 µm, and their noise alone spans more [mm]."""
@@ -201,22 +198,6 @@ def centre_mm(length_mm: NDArray[np.float64], theta_deg: NDArray[np.float64]) ->
     columns = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
     found: NDArray[np.float64] = np.linalg.lstsq(columns, length_mm, rcond=None)[0][1:]
     return found
-
-
-def chance_of_runs(runs: Sequence[ImportedRun], plan: Plan) -> float | None:
-    """Return the probability that runs lie as near to their commanded centres as they do by chance; None where nobody can say.
-
-    Args:
-        runs: as they will be written; those without angles are not looked at.
-        plan: whose circles they are.
-    """
-    centres: dict[tuple[str, int | None], list[NDArray[np.float64]]] = {}
-    for one in runs:
-        columns_of = one.run.columns
-        if THETA in columns_of:
-            found = centre_mm(columns_of[COLUMN_OF_LENGTH], columns_of[THETA])
-            centres.setdefault((one.run.test, one.run.mounting), []).append(found)
-    return chance_of_centres((plan.tests[test].ball, found) for (test, _), found in centres.items())
 
 
 def chance_of_centres(centres: Iterable[tuple[Ball, Sequence[NDArray[np.float64]]]]) -> float | None:

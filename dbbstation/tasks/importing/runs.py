@@ -33,7 +33,7 @@ from dbbstation.plan.circle import Circle, Direction
 from dbbstation.tasks.importing.gaps import held_over_gaps, samples_of
 from dbbstation.tasks.importing.moments import UnclearMomentError, moment_of
 from dbbstation.tasks.importing.names import WORDS, RunName, named_by, run_name
-from dbbstation.tasks.importing.plausible import check_units
+from dbbstation.tasks.importing.plausible import centre_mm, chance_of_centres, check_units
 from dbbstation.tasks.importing.splitting import longest_pause_s, parts_by_direction, parts_by_gaps
 from dbbstation.tasks.importing.travel import (
     UnusableTravelError,
@@ -406,3 +406,19 @@ class Reader:
 
 _STATES = (RunState.ACCEPTED, RunState.REJECTED, RunState.COMPLETE)
 _SAY_IT = "add it to the mapping, as `ignored` where it does not matter"
+
+
+def chance_of_runs(runs: Sequence[ImportedRun], plan: Plan) -> float | None:
+    """Return the probability that runs lie as near to their commanded centres as they do by chance; None where nobody can say.
+
+    Args:
+        runs: as they will be written; those without angles are not looked at.
+        plan: whose circles they are.
+    """
+    centres: dict[tuple[str, int | None], list[NDArray[np.float64]]] = {}
+    for one in runs:
+        columns_of = one.run.columns
+        if columns.THETA in columns_of:
+            found = centre_mm(columns_of[columns.LENGTH], columns_of[columns.THETA])
+            centres.setdefault((one.run.test, one.run.mounting), []).append(found)
+    return chance_of_centres((plan.tests[test].ball, found) for (test, _), found in centres.items())

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dbbstation.diagnosis.simulator.answer import find
-from dbbstation.diagnosis.simulator.contract import Simulator
+from dbbstation.diagnosis.simulator.contract import Simulator, simulated
 from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
-from dbbstation.diagnosis.simulator.ports import simulated
 
 SUBSTEPS = 2
 

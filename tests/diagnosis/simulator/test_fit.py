@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.simulator.contract import Simulator
+from dbbstation.diagnosis.simulator.contract import Simulator, simulated
 from dbbstation.diagnosis.simulator.fit import fit
 from dbbstation.diagnosis.simulator.model import (
     Model,
@@ -12,7 +12,7 @@ from dbbstation.diagnosis.simulator.model import (
     SimulatorPort,
     SimulatorRecording,
 )
-from dbbstation.diagnosis.simulator.ports import Ports, simulated
+from dbbstation.diagnosis.simulator.ports import Ports
 from dbbstation.diagnosis.simulator.terms import Term, TermForm, evaluator
 from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
 

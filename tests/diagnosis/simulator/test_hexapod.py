@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.simulator.answer import find
+from dbbstation.diagnosis.simulator.contract import simulated
 from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
-from dbbstation.diagnosis.simulator.ports import simulated
 from tests.diagnosis.simulator.hexapod import HexapodCircles
 from tests.plant.linear import LinearSession
 from tests.plant.mechanisms.backlash import Backlash

@@ -3,7 +3,7 @@
 import pytest
 
 from dbbstation.diagnosis.simulator.answer import find
-from dbbstation.diagnosis.simulator.ports import simulated
+from dbbstation.diagnosis.simulator.contract import simulated
 from tests.diagnosis.simulator import arm
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.simulator.answer import find
-from dbbstation.diagnosis.simulator.ports import simulated
+from dbbstation.diagnosis.simulator.contract import simulated
 from dbbstation.diagnosis.simulator.search import within_forms
 from dbbstation.diagnosis.simulator.terms import Term, TermForm
 from dbbstation.diagnosis.simulator.work import BudgetSpentError

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from dbbstation.diagnosis.simulator.contract import simulated
 from dbbstation.diagnosis.simulator.fit import fit
 from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
 from dbbstation.diagnosis.simulator.nodes import Nodes, RanAwayError
-from dbbstation.diagnosis.simulator.ports import simulated
 from dbbstation.diagnosis.simulator.terms import Term, TermForm
 from dbbstation.diagnosis.simulator.trials import apart, trial_inputs
 from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import DONE, FAILED
+from tests.cli.conftest import Spoilt
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
 
@@ -25,12 +26,28 @@ def three(_three):
     return _three
 
 
-@pytest.fixture
-def longer(spoilt):
-    """The session with 5 µm on every length."""
+def lengthen(spoilt):
+    """Put 5 µm on every length."""
     for name in RUNS:
         spoilt.column(f"runs/{name}.csv", 1, lambda mm: mm + 0.005)
     return spoilt.folder
+
+
+@pytest.fixture
+def longer(spoilt):
+    """The session with 5 µm on every length."""
+    return lengthen(spoilt)
+
+
+@pytest.fixture(scope="module")
+def compared(run, _three, tmp_path_factory):
+    """The session, the longer one, what was drawn and printed of them, and what JSON says."""
+    folder = tmp_path_factory.mktemp("compared")
+    shutil.copytree(_three, folder / "spoilt")
+    longer, drawn = lengthen(Spoilt(folder / "spoilt")), folder / "figure.svg"
+    printed = run("compare", _three, longer, "--figure", drawn)
+    assert printed.code == DONE
+    return longer, drawn, printed.out, run("compare", _three, longer, "--json").data
 
 
 @pytest.fixture(scope="module")
@@ -41,8 +58,8 @@ def with_angles(tmp_path_factory, errors):
     return folder
 
 
-def test_a_constant_that_was_written_into_the_files(run, three, longer):
-    found = run("compare", three, longer, "--json").data
+def test_a_constant_that_was_written_into_the_files(run, three, compared):
+    longer, _, _, found = compared
     assert found["differ"]
     assert [row["mean_radial_change_um"] for row in found["runs"]] == pytest.approx([5.0] * 6, abs=1e-3)
     best = found["causes"][0]
@@ -68,8 +85,8 @@ def test_a_centre_that_was_written_into_one_run(run, with_angles, tmp_path):
     assert all(row["rms_um"] < 1e-3 for row in others)
 
 
-def test_what_is_printed_is_what_json_says(run, three, longer):
-    printed, found = run("compare", three, longer).out, run("compare", three, longer, "--json").data
+def test_what_is_printed_is_what_json_says(compared):
+    _, _, printed, found = compared
     assert printed.startswith(found["text"])
     for row in found["runs"]:
         line = next(x for x in printed.splitlines() if x.split()[:2] == [row["test"], row["direction"]])
@@ -98,9 +115,8 @@ def test_another_nominal_machine_is_stated_and_compared(run, three, longer, spoi
     assert found["notes"][0].startswith("the nominal machines differ (base joints;")
 
 
-def test_figure(run, three, longer, tmp_path):
-    drawn = tmp_path / "figure.svg"
-    assert run("compare", three, longer, "--figure", drawn).code == DONE
+def test_figure(run, three, compared):
+    longer, drawn, _, _ = compared
     first = drawn.read_bytes()
     assert ET.fromstring(first).tag.endswith("svg")  # noqa: S314 - our own file
     assert b"difference, CCW" in first

@@ -7,7 +7,6 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +22,7 @@ from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.station.preflight import check_plan
 from dbbstation.trace.cut import cut
 from dbbstation.virtual.machine import Sizes
+from tests.cli.conftest import call
 from tests.station.bench import MACHINE_FILE, POLLED, STREAM, bench, lines_of, wait_for
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.virtual.machine import VirtualMachine
+    from tests.station.bench import Bench
 
 QUIET = Sizes(noise_mm=0.0003, bar_uncertainty_mm=0.0005)
 
@@ -61,6 +62,7 @@ def test_a_whole_short_plan_agrees_with_the_truth(plan_file: Path, tmp_path: Pat
             # At this scale a tenth of a degree is a quarter of a millisecond of the computer's attention.
             assert abs(late_deg) < 0.1, run.label
             assert left_um < 0.4, run.label
+        finished_and_another_plan(place, out)
     assert (summary["state"], summary["accepted"], summary["planned"], summary["missing"]) == ("finished", 6, 6, [])
     assert {run["lost"] for run in summary["runs"]} == {0}
     assert [run.mounting for run in session.runs] == [1, 1, 2, 2, 3, 3]
@@ -71,34 +73,30 @@ def test_a_whole_short_plan_agrees_with_the_truth(plan_file: Path, tmp_path: Pat
     assert "\r" not in done.stderr
 
 
-@pytest.mark.slow
-def test_a_finished_session_has_nothing_left_and_another_plan_is_refused(plan_file: Path, tmp_path: Path) -> None:
-    out = tmp_path / "session"
-    text = plan_file.read_text(encoding="utf-8")
-    plan_file.write_text(text.replace("[ccw, cw]", "[ccw]").replace("repeat_at_end: [a]\n", ""), encoding="utf-8")
-    in_turn = ("--order", "drift", "--gate", "first")
-    planned = ordered(read_inline_plan(plan_file), Order.DRIFT, Gate.FIRST).to_domain()
-    with bench(plan_file) as place:
-        assert place.measure(out, *in_turn).returncode == 0
-        before = (out / "session.yaml").read_bytes()
-        again = place.measure(out, *in_turn)
-        assert (again.returncode, (out / "session.yaml").read_bytes()) == (0, before)
-        plan_file.write_text(text, encoding="utf-8")
-        other = place.measure(out)
-    assert other.returncode == 1
-    assert [run.test for run in read_session(out).runs] == [*planned.tests, *planned.repeat_at_end]
-    assert "the plan of this session is another one" in other.stderr
-    assert "Traceback" not in other.stderr
+def finished_and_another_plan(place: Bench, out: Path) -> None:
+    """A finished session has nothing left, and does not go on with another plan."""
+    before = (out / "session.yaml").read_bytes()
+    again = call(*place.command(out)[3:])
+    assert (again.code, (out / "session.yaml").read_bytes()) == (0, before)
+    text = place.plan_file.read_text(encoding="utf-8")
+    place.plan_file.write_text(text.replace("[ccw, cw]", "[ccw]"), encoding="utf-8")
+    other = call(*place.command(out)[3:])
+    assert other.code == 1
+    assert "the plan of this session is another one" in other.err
+    assert "Traceback" not in other.err
 
 
 def test_a_polled_display_is_measured_too(plan_file: Path, tmp_path: Path) -> None:
     text = plan_file.read_text(encoding="utf-8")
     plan_file.write_text(text.replace("[ccw, cw]", "[cw]").replace("repeat_at_end: [a]\n", ""), encoding="utf-8")
     out = tmp_path / "session"
+    planned = ordered(read_inline_plan(plan_file), Order.DRIFT, Gate.FIRST).to_domain()
     with bench(plan_file, instrument=POLLED, scale=20.0, rate_hz=None) as place:
-        done = place.measure(out)
+        done = place.measure(out, "--order", "drift", "--gate", "first")
     assert done.returncode == 0, done.stderr
-    *_, last = read_session(out).runs
+    runs = read_session(out).runs
+    assert [run.test for run in runs] == [*planned.tests, *planned.repeat_at_end]
+    *_, last = runs
     assert last.state is RunState.ACCEPTED
     # Nobody knows when between request and reply it took its length.
     assert (read_run(last.path).recording.logged["t_uncertainty_s"] > 0.0).all()
@@ -152,15 +150,10 @@ def test_a_circle_outside_the_travel_stops_before_anything_starts(plan_file: Pat
     plan_file.write_text(text, encoding="utf-8")
     out = tmp_path / "session"
     words = ["--plan", str(plan_file), "--machine", str(MACHINE_FILE), "--instrument", STREAM]
-    done = subprocess.run(
-        [sys.executable, "-m", "dbbstation", "measure", *words, "--port", "/dev/nothing-here", "--out", str(out)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert "test b ccw" in done.stderr
-    assert "its travel 0 to 300 mm" in done.stderr
+    done = call("measure", *words, "--port", "/dev/nothing-here", "--out", str(out))
+    assert done.code == 1
+    assert "test b ccw" in done.err
+    assert "its travel 0 to 300 mm" in done.err
     assert not out.exists()
 
 
@@ -168,11 +161,9 @@ def test_a_circle_outside_the_travel_stops_before_anything_starts(plan_file: Pat
 def test_only_machines_on_this_computer_are_started(url: str, plan_file: Path, tmp_path: Path) -> None:
     words = ["--plan", str(plan_file), "--machine", str(MACHINE_FILE), "--instrument", STREAM]
     words += ["--port", "/dev/nothing-here", "--out", str(tmp_path / "session"), "--auto", url]
-    done = subprocess.run(
-        [sys.executable, "-m", "dbbstation", "measure", *words], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 1
-    assert "no control address of a virtual machine on this computer" in done.stderr
+    done = call("measure", *words)
+    assert done.code == 1
+    assert "no control address of a virtual machine on this computer" in done.err
 
 
 def test_the_shipped_plans_can_be_measured() -> None:
@@ -209,10 +200,8 @@ def test_balls_under_the_spindle_from_the_plan_to_the_figures(tmp_path: Path) ->
     )
     noted = (out / "session.yaml").read_text(encoding="utf-8").replace("runs:\n", f"set_up_errors:\n{readings}runs:\n")
     (out / "session.yaml").write_text(noted, encoding="utf-8")
-    checked = subprocess.run(
-        [sys.executable, "-m", "dbbstation", "check", str(out)], capture_output=True, text=True, check=False
-    )
-    assert checked.returncode == 0, checked.stderr
+    checked = call("check", out)
+    assert checked.code == 0, checked.err
     for run in read_session(out).runs:
         setup = read_session(out).setup(run)
         assert setup.set_up_errors is not None

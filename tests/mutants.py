@@ -1,6 +1,7 @@
 """What tests detect: sampled mutants of the package, each against the tests of its own folder.
 
     python -m tests.mutants --count 300 --seed 1 --out mutants.csv [--workers 2]
+    python -m tests.mutants --core --count 150 --near --out core.csv     # the core, as many of each of its parts
 
 A mutant is a copy of the package in which one operator, comparison, number, condition or returned value is another
 [DeMillo, Lipton and Sayward, Computer 11 (1978) 34]. It is killed where a test fails. The default tier runs first, then the
@@ -8,7 +9,8 @@ slow one, with `--nightly` that one too, so that the table shows what the defaul
 
 Which tests run a line is recorded once, into a file beside the table (mutants.coverage), and a mutant is shown to these tests only.
 Where none was seen to run it, as with constants of a module, compiled kernels and programs that a test starts, the whole folder
-runs. Rows that the table has are not run again: a study that was interrupted goes on where it stopped.
+runs. With `--near` nothing is recorded: a mutant is shown to the test files that name its module, which takes
+minutes in place of hours and lets more mutants live. Rows that the table has are not run again: a study that was interrupted goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import ast
 import copy
 import csv
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -59,6 +62,16 @@ OTHERS = {
     ast.IsNot: ast.Is,
 }
 """What takes the place of an operator."""
+
+CORE = {
+    "kinematics": ("machine/", "model/"),
+    "calibration": ("calibration/",),
+    "engine": ("inference/", "diagnosis/"),
+    "judging": ("quality/", "circles/", "station/judging.py"),
+    "NC": ("nc/",),
+    "files": ("files/",),
+}
+"""Parts of the core, by the beginnings of their files; every part gives as many mutants."""
 
 FIELDS = ("file", "line", "what", "killed_by", "seconds")
 
@@ -116,8 +129,21 @@ class _Exchange(ast.NodeTransformer):
         return self._new if node is self._old else self.generic_visit(node)
 
 
-def sampled(count: int, seed: int) -> list[Mutant]:
-    """Draw mutants, every changeable place of the package alike."""
+def sampled(count: int, seed: int, *, core: bool) -> list[Mutant]:
+    """Draw mutants, every changeable place of the package alike, or of the core, one part after the other."""
+    drawn = np.random.default_rng(seed)
+    every = changeable()
+    if not core:
+        return [every[k] for k in drawn.permutation(len(every))[:count]]
+    parts = [[one for one in every if one.file.startswith(begins)] for begins in CORE.values()]
+    orders = [drawn.permutation(len(part)) for part in parts]
+    return [part[order[k]] for k in range(-(-count // len(parts))) for part, order in zip(parts, orders, strict=True)][
+        :count
+    ]
+
+
+def changeable() -> list[Mutant]:
+    """Every mutant of the package, in the order of its files."""
     every = []
     for path in sorted((ROOT / PACKAGE).rglob("*.py")):
         tree = ast.parse(path.read_text())
@@ -127,8 +153,7 @@ def sampled(count: int, seed: int) -> list[Mutant]:
             assert other is not None
             what = f"{ast.unparse(node)[:60]} -> {ast.unparse(other)[:60]}".replace("\n", " ")
             every.append(Mutant(file, place, getattr(node, "lineno", 0), what))
-    chosen = np.random.default_rng(seed).permutation(len(every))[:count]
-    return [every[k] for k in chosen]
+    return every
 
 
 def tests_of(file: str) -> list[str]:
@@ -139,6 +164,17 @@ def tests_of(file: str) -> list[str]:
     if str(folder) == ".":
         return ["tests/cli"]
     return [f"tests/{folder}"] + (["tests/cli"] if folder.parts[0] == "cli" else [])
+
+
+def near(mutant: Mutant) -> list[str]:
+    """Test files of a mutant's folder that name its module; of all folders where none does; the folder where nobody does."""
+    module = ".".join((PACKAGE, *Path(mutant.file).with_suffix("").parts)).removesuffix(".__init__")
+    named = re.compile(rf"{re.escape(module)}\b(?!\.)")
+    files = (path for path in sorted((ROOT / "tests").rglob("test_*.py")) if named.search(path.read_text()))
+    found = [str(path.relative_to(ROOT)) for path in files]
+    folders = tests_of(mutant.file)
+    own = [path for path in found if any(path.startswith(f"{folder}/") for folder in folders)]
+    return own or found or folders
 
 
 def record(out: Path, workplace: Path) -> None:
@@ -165,6 +201,16 @@ def running(mutant: Mutant, recorded: CoverageData) -> list[str]:
         if any(test.startswith(f"{folder}/") for folder in folders):
             seen.add(test if phase == "run" else test.partition("::")[0])
     return sorted(test for test in seen if "::" not in test or test.partition("::")[0] not in seen) or folders
+
+
+def shown(mutants: list[Mutant], out: Path, workplace: Path) -> dict[Mutant, list[str]]:
+    """Tests that run the line of each mutant, recorded beside the table where that was not done yet."""
+    lines = out.with_suffix(".coverage")
+    if not lines.exists():
+        record(lines, workplace)
+    recorded = CoverageData(str(lines))
+    recorded.read()
+    return {mutant: running(mutant, recorded) for mutant in mutants}
 
 
 def killed_by(mutant: Mutant, tests: list[str], tiers: list[str], workplace: Path) -> str:
@@ -223,6 +269,8 @@ def main() -> None:
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--out", type=Path, required=True)
     options.add_argument("--nightly", action="store_true")
+    options.add_argument("--core", action="store_true")
+    options.add_argument("--near", action="store_true")
     options.add_argument("--workers", type=int, default=1)
     chosen = options.parse_args()
     if not chosen.out.exists():
@@ -230,7 +278,7 @@ def main() -> None:
     with chosen.out.open(newline="") as file:
         known = {(row["file"], row["line"], row["what"]) for row in csv.DictReader(file)}
     tiers = list(TIERS) if chosen.nightly else list(TIERS)[:2]
-    mutants = sampled(chosen.count, chosen.seed)
+    mutants = sampled(chosen.count, chosen.seed, core=chosen.core)
     mutants = [one for one in mutants if (one.file, str(one.line), one.what) not in known]
     writing = Lock()
     with tempfile.TemporaryDirectory() as temporary, ThreadPoolExecutor(chosen.workers) as workers:
@@ -238,12 +286,7 @@ def main() -> None:
         for number in range(chosen.workers):
             free.append(Path(temporary) / str(number))
             shutil.copytree(ROOT, free[-1], ignore=shutil.ignore_patterns(".venv", "_build", "__pycache__", ".*_cache"))
-        lines = chosen.out.with_suffix(".coverage")
-        if not lines.exists():
-            record(lines, free[0])
-        recorded = CoverageData(str(lines))
-        recorded.read()
-        tests = {mutant: running(mutant, recorded) for mutant in mutants}
+        tests = {mutant: near(mutant) for mutant in mutants} if chosen.near else shown(mutants, chosen.out, free[0])
 
         def run(mutant: Mutant) -> None:
             workplace = free.pop()

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import main
+from tests.once import made_once
 from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import elevated, subset, table_ii_plan
 from tests.plant.session import record
@@ -56,9 +57,12 @@ def errors() -> Kinematics:
 @pytest.fixture(scope="session")
 def fifteen(tmp_path_factory, errors) -> Path:
     """Fifteen circles, five of them raised: all 24 parameters show."""
-    folder = tmp_path_factory.mktemp("recorded") / "fifteen"
-    record(folder, seed=1, plan=elevated(table_ii_plan(1), 5.0, "abcde"), mechanisms=[errors], rate_hz=10.0)
-    return folder
+
+    def make(folder: Path) -> None:
+        plan = elevated(table_ii_plan(1), 5.0, "abcde")
+        record(folder / "fifteen", seed=1, plan=plan, mechanisms=[errors], rate_hz=10.0)
+
+    return made_once(tmp_path_factory, "recorded", make) / "fifteen"
 
 
 @pytest.fixture(scope="session")
@@ -72,10 +76,16 @@ def elsewhere(tmp_path_factory, errors) -> Path:
 @pytest.fixture(scope="session")
 def calibrated(tmp_path_factory, fifteen) -> tuple[Path, Outcome]:
     """The model of the fifteen circles, and what the command printed."""
-    model = tmp_path_factory.mktemp("calibrated") / "model.yaml"
-    outcome = call("calibrate", fifteen, "--out", model, "--json")
-    assert outcome.code == 0, outcome.err
-    return model, outcome
+
+    def make(folder: Path) -> None:
+        outcome = call("calibrate", fifteen, "--out", folder / "model.yaml", "--json")
+        assert outcome.code == 0, outcome.err
+        (folder / "printed.json").write_text(outcome.out, encoding="utf-8")
+        (folder / "said.txt").write_text(outcome.err, encoding="utf-8")
+
+    folder = made_once(tmp_path_factory, "calibrated", make)
+    printed, said = ((folder / name).read_text(encoding="utf-8") for name in ("printed.json", "said.txt"))
+    return folder / "model.yaml", Outcome(0, printed, said)
 
 
 @pytest.fixture(scope="session")
@@ -85,9 +95,11 @@ def model(calibrated) -> Path:
 
 @pytest.fixture(scope="session")
 def _three(tmp_path_factory, errors) -> Path:
-    folder = tmp_path_factory.mktemp("recorded") / "three"
-    record(folder, seed=5, plan=subset(table_ii_plan(5), "agl"), mechanisms=[errors], rate_hz=5.0)
-    return folder
+
+    def make(folder: Path) -> None:
+        record(folder / "three", seed=5, plan=subset(table_ii_plan(5), "agl"), mechanisms=[errors], rate_hz=5.0)
+
+    return made_once(tmp_path_factory, "three", make) / "three"
 
 
 class Spoilt:

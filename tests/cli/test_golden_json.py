@@ -12,12 +12,16 @@ from dbbstation.results.schemas import RESULTS
 from dbbstation.service.answers import AcceptanceAnswer, CalibrationAnswer, DiagnosisAnswer, ProgramsAnswer
 from tests.cli.golden_json import GOLDEN, keys_of, lines_of, without_place
 from tests.cli.json_schema import faults
+from tests.once import OF_TABLES, computed_once
 
 
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory, run):
     """Keys of what every command printed, by the name of its golden file; in their order, since some take what others wrote."""
-    return {name: run(*arguments, "--json") for name, arguments in lines_of(tmp_path_factory.mktemp("golden")).items()}
+    lines = lines_of(tmp_path_factory.mktemp("golden"))
+    with pytest.MonkeyPatch.context() as patch:
+        computed_once(tmp_path_factory, patch, *OF_TABLES)
+        return {name: run(*arguments, "--json") for name, arguments in lines.items()}
 
 
 @pytest.mark.slow

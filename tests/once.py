@@ -1,0 +1,95 @@
+"""What several tests look at is made once a run, and kept in a folder that all workers share."""
+
+from __future__ import annotations
+
+import fcntl
+import functools
+import hashlib
+import os
+import pickle
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    import pytest
+
+OF_TABLES = ("dbbstation.tasks.mismatch.mismatch",)
+"""Tasks on tables of the package, which documents show and tests look at; what `drive` found cannot be written down."""
+
+TELLING = {"progress", "stop", "say"}
+"""Arguments of a task by which it tells, and that are no part of what it is asked."""
+
+
+def of_the_run(factory: pytest.TempPathFactory) -> Path:
+    """A folder that all workers of this run share."""
+    base = factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "once"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+@contextmanager
+def alone(place: Path) -> Iterator[None]:
+    """Let one worker at a time make what stands at a place."""
+    with place.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
+    """Return the folder of this name, made by the first who asks; nobody may write into it."""
+    folder = of_the_run(factory) / name
+    with alone(folder):
+        if not folder.exists():
+            new = folder.with_suffix(".new")
+            new.mkdir()
+            make(new)
+            new.rename(folder)
+    return folder
+
+
+def computed_once(factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, *tasks: str) -> None:
+    """Compute the answer of a task once for the same request and the same files; what a command prints and draws of it is not kept."""
+    for task in tasks:
+        module, _, name = task.rpartition(".")
+        patch.setattr(task, _kept(getattr(import_module(module), name), of_the_run(factory)))
+
+
+def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
+    @functools.wraps(task)
+    def ask(*words: object, **more: Any) -> Any:
+        wanted = {name: value for name, value in more.items() if name not in TELLING}
+        asked = repr((task.__module__, task.__name__, _request(words), _request(wanted)))
+        place = folder / f"{hashlib.sha256(asked.encode()).hexdigest()}.pickle"
+        with alone(place):
+            if not place.exists():
+                told: list[str] = []
+                answer = task(*words, **{**more, "say": told.append})
+                try:
+                    place.write_bytes(pickle.dumps((told, answer)))
+                except AttributeError:  # it holds functions that were made on the way: everybody computes it anew
+                    place.unlink(missing_ok=True)
+                    return _told(told, more, answer)
+        told, answer = pickle.loads(place.read_bytes())  # noqa: S301 - written above
+        return _told(told, more, answer)
+
+    return ask
+
+
+def _told(told: list[str], more: dict[str, Any], answer: object) -> object:
+    for text in told:
+        more["say"](text)
+    return answer
+
+
+def _request(value: object) -> object:
+    """What is asked, a file by its name and content wherever it lies."""
+    if isinstance(value, str | Path) and value and Path(value).is_file():
+        return Path(value).name, hashlib.sha256(Path(value).read_bytes()).hexdigest()
+    if isinstance(value, dict):
+        return sorted((name, _request(one)) for name, one in value.items())
+    return [_request(one) for one in value] if isinstance(value, tuple | list) else value

@@ -71,7 +71,11 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
                 answer = task(*words, **{**more, "say": told.append})
                 try:
                     place.write_bytes(pickle.dumps((told, answer)))
-                except AttributeError:  # it holds functions that were made on the way: everybody computes it anew
+                except (
+                    AttributeError,
+                    TypeError,
+                    pickle.PicklingError,
+                ):  # it holds functions that were made on the way: everybody computes it anew
                     place.unlink(missing_ok=True)
                     return _told(told, more, answer)
         told, answer = pickle.loads(place.read_bytes())  # noqa: S301 - written above

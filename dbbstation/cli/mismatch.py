@@ -146,7 +146,7 @@ def mismatch(
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.files.recordings.table_csv import table_csv
-    from dbbstation.tasks.mismatch import STAGES, STAGES_WHOLE
+    from dbbstation.tasks.mismatch import STAGES, STAGES_WHOLE, require_size
     from dbbstation.tasks.mismatch import mismatch as compared
     from dbbstation.tasks.tables import stated_uncertainties, stated_variables
 
@@ -154,9 +154,10 @@ def mismatch(
     _refuse_mixed(
         simulator,
         {"--measured": measured, "--simulated": simulated, "--variables": variables, "--run": run, "--time": time}
-        | {"--known": known, "--free": free, "--no-offset": no_offset or None, "--matters": matters},
+        | {"--known": known, "--free": free, "--no-offset": no_offset or None},
         {"--most-runs": most_runs, "--corrected": corrected, "--anew": anew or None},
     )
+    require_size(matters)
     if simulator is not None:
         from dbbstation.cli.mismatch_simulator import mismatch_with_simulator
 
@@ -165,6 +166,7 @@ def mismatch(
             simulator,
             source_files,
             numbers,
+            matters=matters,
             most_runs=most_runs,
             hold_out=not no_held_out,
             keeps=not anew,

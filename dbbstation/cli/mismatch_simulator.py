@@ -23,6 +23,7 @@ def mismatch_with_simulator(
     own_files: Sequence[Path],
     numbers: NumberLanguage | None,
     *,
+    matters: float | None,
     most_runs: int | None,
     hold_out: bool,
     keeps: bool,
@@ -69,7 +70,7 @@ def mismatch_with_simulator(
                 )
                 progress(spent, done, of)
 
-            answer = find(model, runs, own=loaded.own, hold_out=hold_out, progress=told)
+            answer = find(model, runs, own=loaded.own, hold_out=hold_out, matters=matters, progress=told)
         result = simulator_result(answer, SimulationsRun(runs.ran, runs.most, one_s, runs.found))
     if out is not None:
         write_text(out, missing_code(answer), force=force)
@@ -122,6 +123,9 @@ def _corrected(answer: SimulatorComparison) -> str:
 
 def _print(result: SimulatorResult) -> None:
     unit, held_out = result.unit, result.held_out_rms
+    from dbbstation.report.levels_text import level_sentences
+
+    echo("\n".join((*level_sentences(result.levels, unit), "")))
     _print_whether(result)
     findings = result.findings
     there = [f for f in findings if f.verdict in SURELY_FOUND]

@@ -92,6 +92,8 @@ class Law:
             residual; None: amplitudes have their `plausible` size at all of them.
         family: of patterns that it belongs to; None for physics of a client.
         variables: that it follows, where it belongs to a family.
+        followed: names of what it follows, where these are no variables of the channel, such as a signal at a port.
+        way: how it follows them, `direction` or `late`, where it belongs to no family; empty: by value.
         acts_once: no other rows can show it: a ball that was put up badly.
     """
 
@@ -111,6 +113,8 @@ class Law:
     reach: float | None = None
     family: Family | None = None
     variables: tuple[Variable, ...] = ()
+    followed: tuple[str, ...] = ()
+    way: str = ""
     acts_once: bool = False
 
     def plausible_of(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -44,11 +44,11 @@ def detectable(settled: Settled) -> tuple[Detectable, ...]:
     asked: dict[str, Cause] = {}
     for cause in settled.causes:
         family = _family(settled.bank, cause.name)
-        curve = family is Family.CURVE and len(cause.variants[0].columns) <= CURVES
-        if not curve and family not in (Family.LINEAR, Family.DRIFT, None):
+        bends = len(cause.variants[0].columns)
+        if family not in (Family.CURVE, Family.LINEAR, Family.DRIFT, None) or bends > CURVES:
             continue
         key = ", ".join(sorted(followed_by(settled.bank, cause.name)))
-        if curve or key not in asked:
+        if key not in asked or bends > len(asked[key].variants[0].columns):
             asked[key] = cause
     found = [_detectable(settled, key, cause) for key, cause in asked.items()]
     return tuple(sorted(found, key=lambda one: -np.inf if one.size is None else -one.size))

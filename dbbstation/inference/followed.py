@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from scipy.special import logsumexp
@@ -61,9 +61,11 @@ class WithoutPart:
 
 def followed_by(bank: Bank, name: str) -> frozenset[str]:
     """Variables that a cause follows; physics of a user has its own name."""
-    of = bank.patterns.get(name) or bank.laws.get(name)
+    of, law = bank.patterns.get(name) or bank.laws.get(name), bank.laws.get(name)
     if of is None:
         return frozenset({name})
+    if law is not None and law.followed:
+        return frozenset(law.followed)
     if of.family is Family.BLOCKS:
         return frozenset({RUN})
     if of.family in IN_TIME and not of.variables:
@@ -73,7 +75,9 @@ def followed_by(bank: Bank, name: str) -> frozenset[str]:
 
 def way_of(bank: Bank, name: str) -> str:
     """How a cause follows its variables."""
-    of = bank.patterns.get(name) or bank.laws.get(name)
+    of, law = bank.patterns.get(name) or bank.laws.get(name), bank.laws.get(name)
+    if law is not None and law.way:
+        return law.way
     return VALUE if of is None or of.family is None else WAYS.get(of.family, VALUE)
 
 
@@ -253,6 +257,37 @@ class ClassGain:
 
 MOST_PARTS = 0.5
 """Share of the held-out rows that must be in parts with a gain: what happened in a few parts goes on in no others."""
+
+
+class PartGains(Protocol):
+    """What held-out parts say of classes."""
+
+    @property
+    def rows(self) -> Sequence[NDArray[np.bool_]]:
+        """Of the parts, shape (n,) each."""
+
+    def of(self, wanted: Collection[str] | None) -> ClassGain:
+        """What all that follows some variables brings there; all that was chosen if None."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChosenWithoutParts:
+    """Parts of a table.
+
+    Attributes:
+        parts: everything chosen anew without each.
+    """
+
+    parts: Sequence[WithoutPart]
+
+    @property
+    def rows(self) -> Sequence[NDArray[np.bool_]]:
+        """Of the parts, shape (n,) each."""
+        return [part.rows for part in self.parts]
+
+    def of(self, wanted: Collection[str] | None) -> ClassGain:
+        """What all that follows some variables brings there; all that was chosen if None."""
+        return gain_of(self.parts, wanted)
 
 
 def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None) -> ClassGain:

@@ -12,7 +12,6 @@ from dbbstation.inference.detectable import detectable
 from dbbstation.inference.followed import (
     VariableProbabilities,
     classes_of,
-    gain_of,
     probability_of_any,
     way_probability,
 )
@@ -21,10 +20,8 @@ from dbbstation.inference.levels import TIME, Followed, Follows, Levels, differe
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from dbbstation.inference.folds import HeldOutError
-    from dbbstation.inference.followed import ClassGain, VariableClass, WithoutPart
+    from dbbstation.inference.followed import ClassGain, PartGains, VariableClass
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Detectable
     from dbbstation.inference.settled import Settled
@@ -42,7 +39,7 @@ WAYS = ("value", "direction", "late", "in_time")
 def levels_of(
     settled: Settled,
     left: LeftOver,
-    parts: Sequence[WithoutPart],
+    parts: PartGains | None,
     held_out: HeldOutError | None,
     matters: float | None = None,
 ) -> Levels:
@@ -51,7 +48,7 @@ def levels_of(
     Args:
         settled: what the comparison came to.
         left: tests of the residual.
-        parts: everything chosen anew without each part; none where that was not asked for.
+        parts: what held-out parts say; None where these were not asked for.
         held_out: errors of these parts.
         matters: size of an effect that matters, in the unit of the residual; None: what the base leaves of the rows.
     """
@@ -63,7 +60,7 @@ def levels_of(
     differs = difference_of(
         probability_of_any(settled),
         classes,
-        gain_of(parts, None).gains if parts else None,
+        None if parts is None else parts.of(None).gains,
         _doubts(settled, left, sizes, size),
         (size, matters is not None, samples, sizes),
     )
@@ -110,15 +107,15 @@ def slow_chance(settled: Settled) -> float:
 
 
 def _followed(
-    settled: Settled, one: VariableClass, probabilities: VariableProbabilities, parts: Sequence[WithoutPart]
+    settled: Settled, one: VariableClass, probabilities: VariableProbabilities, parts: PartGains | None
 ) -> Followed:
     probability = min(probabilities.of(each) for each in one.each)
-    gain = gain_of(parts, one.wanted) if parts else None
+    gain = None if parts is None else parts.of(one.wanted)
     answer = _answer(probability, gain, in_time=one.wanted <= {TIME})
     effect = settled.effect(sorted(one.members))[settled.channel.kept]
     form = None
-    if answer is Follows.FOLLOWS and len(parts) > 1:
-        form = law_form(settled, one, [part.rows for part in parts])
+    if answer is Follows.FOLLOWS and parts is not None:
+        form = law_form(settled, one, parts.rows)
     return Followed(
         variables=one.each,
         or_variables=one.others,

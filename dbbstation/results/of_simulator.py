@@ -48,6 +48,7 @@ def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -
             )
         ),
         runs=tuple(SimulatedRun(run.name, len(run)) for run in model.runs),
+        levels=answer.levels,
         mismatch=answer.is_there,
         rms=SimulationRms(*answer.rms),
         noise=SimulationNoise(

@@ -9,6 +9,7 @@ from typing import Annotated
 from dbbstation.facts.serialise import Absent
 from dbbstation.facts.value import Value
 from dbbstation.inference.left_over import LeftOver
+from dbbstation.inference.levels import Levels
 from dbbstation.inference.verdict import Gains
 from dbbstation.results.frame import Framed
 
@@ -220,6 +221,7 @@ class SimulatorResult(Framed):
         unit: of its first output.
         outputs: of it.
         runs: recordings.
+        levels: whether anything differs, which signals at which ports it follows, which term it is.
         mismatch: whether it lacks anything.
         rms: of all residuals.
         noise: of one row.
@@ -242,6 +244,7 @@ class SimulatorResult(Framed):
     unit: str
     outputs: tuple[SimulatedOutput, ...]
     runs: tuple[SimulatedRun, ...]
+    levels: Levels
     mismatch: bool
     rms: SimulationRms
     noise: SimulationNoise

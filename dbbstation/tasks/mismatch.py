@@ -88,10 +88,7 @@ def mismatch(
         CalibrationError: the difference is so much larger than its noise that rounding hides what it follows.
         StoppedError: `stop` returned True.
     """
-    if matters is not None and not (math.isfinite(matters) and matters > 0.0):
-        raise StationError(
-            f"a size that matters must be above zero, not {matters:g}", where="--matters", remedy=MATTERS
-        )
+    require_size(matters)
     telling = Telling(progress, stop, say)
     asked = TableOptions(
         measured,
@@ -114,6 +111,18 @@ def mismatch(
     return mismatch_result(
         found, table=_corrected(tabulated, found), drawing=partial(_drawn, found), notes=tuple(telling.notes)
     )
+
+
+def require_size(matters: float | None) -> None:
+    """Refuse a size that matters of zero, which no recording could say "no" to.
+
+    Raises:
+        StationError: it is not above zero.
+    """
+    if matters is not None and not (math.isfinite(matters) and matters > 0.0):
+        raise StationError(
+            f"a size that matters must be above zero, not {matters:g}", where="--matters", remedy=MATTERS
+        )
 
 
 def _meanings(

@@ -11,6 +11,7 @@ from scipy.special import logsumexp
 from dbbstation.inference.detectable import MARGIN, POWER, detectable, least_seen
 from dbbstation.inference.folds import parts_of
 from dbbstation.inference.followed import (
+    ChosenWithoutParts,
     VariableProbabilities,
     WithoutPart,
     classes_of,
@@ -50,7 +51,7 @@ def nothing():
 
 def test_both_variables_are_followed_each_with_its_law(both):
     _, settled, parts = both
-    found = levels_of(settled, left_over(settled), parts, None)
+    found = levels_of(settled, left_over(settled), ChosenWithoutParts(parts), None)
     assert found.differs.answer is Differs.YES
     assert found.differs.gain_without_best > np.log(19.0)
     by_name = {one.name: one for one in found.follows}
@@ -112,13 +113,13 @@ def test_probabilities_are_sums_over_sets(both):
 
 
 def test_no_effect_is_no_with_the_size_from_which_it_holds(nothing):
-    found = levels_of(nothing, left_over(nothing), [], None)
+    found = levels_of(nothing, left_over(nothing), None, None)
     assert found.differs.answer is Differs.NO
     assert found.differs.matters == pytest.approx(nothing.channel.size)
     assert not found.follows
     worst = found.differs.detectable[0]
     assert 0.0 < worst.size < found.differs.matters
-    strict = levels_of(nothing, left_over(nothing), [], None, matters=0.1 * worst.size)
+    strict = levels_of(nothing, left_over(nothing), None, None, matters=0.1 * worst.size)
     assert strict.differs.answer is Differs.CANNOT_TELL
     assert worst.follows in strict.differs.why
     assert strict.differs.matters_stated
@@ -126,7 +127,7 @@ def test_no_effect_is_no_with_the_size_from_which_it_holds(nothing):
 
 def test_rows_without_an_order_have_no_no(nothing):
     unordered = replace(nothing, channel=replace(nothing.channel, time=None))
-    answer = levels_of(unordered, left_over(unordered), [], None).differs
+    answer = levels_of(unordered, left_over(unordered), None, None).differs
     assert answer.answer is Differs.CANNOT_TELL
     assert "order" in answer.why
 
@@ -146,7 +147,7 @@ def test_what_the_base_conceals_wholly_has_no_size(nothing):
     concealed = settle(replace(nothing.channel, base=wide, static=None), thorough=False, beginnings=ONE)
     sizes = {one.follows: one for one in detectable(concealed)}
     assert sizes["load"] == Detectable("load", None, 1.0)
-    assert levels_of(concealed, left_over(concealed), [], None).differs.answer is Differs.CANNOT_TELL
+    assert levels_of(concealed, left_over(concealed), None, None).differs.answer is Differs.CANNOT_TELL
 
 
 def test_the_least_size_is_found_in_nine_of_ten_draws(rng):
@@ -213,6 +214,6 @@ def test_time_and_single_rows_are_the_time():
     inside = (np.arange(600) >= 200) & (np.arange(600) < 300)
     whole = channel(data, blocks=1)
     settled = settle(replace(whole, residual=whole.residual + 0.4 * inside))
-    (one,) = levels_of(settled, left_over(settled), [], None).follows
+    (one,) = levels_of(settled, left_over(settled), None, None).follows
     assert one.name == TIME
     assert one.answer is Follows.HAPPENED

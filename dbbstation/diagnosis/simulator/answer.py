@@ -9,16 +9,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.fit import not_told_apart
-from dbbstation.diagnosis.simulator.held import PredictedPartsError, parts, predicted_parts
+from dbbstation.diagnosis.simulator.held import (
+    PredictedGains,
+    PredictedPart,
+    PredictedPartsError,
+    parts,
+    predicted_parts,
+)
 from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
 from dbbstation.diagnosis.simulator.search import compared, moves, search
 from dbbstation.diagnosis.simulator.separate import separations
 from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns, rms
 from dbbstation.facts.value import Value
 from dbbstation.inference.chosen_anew import LEAST_PARTS
-from dbbstation.inference.folds import Fold
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.verdict import Verdict
 
@@ -36,6 +42,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.work import Run
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.left_over import LeftOver
+    from dbbstation.inference.levels import Levels
     from dbbstation.inference.read_off import CauseFinding
 
 
@@ -71,6 +78,7 @@ class SimulatorComparison:
         findings: of terms that are there or that the recordings cannot exclude, those that are there first.
         parameters: of the simulator.
         left: tests of the residual.
+        levels: whether anything differs, which signals at which ports it follows, which term it is.
         held_out: error of parts that took no part; None where it was not asked for.
         as_simulated: measured less simulated values with the parameters as stated, shape (n,).
         nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term; not a number
@@ -86,6 +94,7 @@ class SimulatorComparison:
     findings: tuple[CauseFinding, ...]
     parameters: tuple[Moved, ...]
     left: LeftOver
+    levels: Levels
     held_out: HeldOutError | None
     as_simulated: NDArray[np.float64]
     nonlinear: Mapping[str, float]
@@ -127,6 +136,7 @@ def find(
     *,
     own: Sequence[PortSource] = (),
     hold_out: bool = True,
+    matters: float | None = None,
     progress: Callable[..., None] = lambda *_: None,
 ) -> SimulatorComparison:
     """Find what a simulator lacks, and at which of its ports.
@@ -136,6 +146,7 @@ def find(
         run: simulates.
         own: physics of the user's own.
         hold_out: choose everything anew without each part; takes most of the time.
+        matters: size of an effect that matters, in the unit of the first output; None: what the refitted simulator leaves.
         progress: called with what is being done, and how much of how much where that can be counted.
 
     Raises:
@@ -150,14 +161,15 @@ def find(
     nodes = Nodes(work, own, progress)
     base = nodes.base(stated)
     found = search(nodes, base, lambda channel: compared(channel, progress))
-    stopped, folds = found.stopped, list[Fold]()
+    stopped, folds = found.stopped, list[PredictedPart]()
     if hold_out and not stopped:
         try:
             folds.extend(predicted_parts(nodes, base, found, stated, progress))
         except BudgetSpentError as error:
             stopped = error.what
     held_out = PredictedPartsError(tuple(folds)) if len(folds) >= LEAST_PARTS else None
-    return _said(nodes, base, found, held_out, as_simulated, stopped)
+    gains = None if held_out is None else PredictedGains(tuple(folds))
+    return _said(nodes, base, found, held_out, as_simulated, stopped, gains=gains, matters=matters)
 
 
 def _scales(work: SimulationRuns, stated: FittedState) -> NDArray[np.float64]:
@@ -180,8 +192,12 @@ def _said(
     held_out: HeldOutError | None,
     as_simulated: NDArray[np.float64],
     stopped: str,
+    *,
+    gains: PredictedGains | None,
+    matters: float | None,
 ) -> SimulatorComparison:
     node, settled = found.node, found.settled
+    left = left_over(settled)
     refits = refits_without(settled, [rows for _, rows in parts(nodes.work)])
     try:
         nonlinear = _nonlinear(nodes.work, found)
@@ -200,7 +216,8 @@ def _said(
         found=found,
         findings=findings,
         parameters=_parameters(base, found),
-        left=left_over(settled),
+        left=left,
+        levels=levels_of(settled, left, gains, held_out, matters),
         held_out=held_out,
         as_simulated=as_simulated,
         nonlinear=nonlinear,

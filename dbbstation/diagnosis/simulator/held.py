@@ -6,6 +6,7 @@ refits to all rows; values that predict come from the other rows alone.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -18,10 +19,11 @@ from dbbstation.diagnosis.simulator.search import compared_quickly, search
 from dbbstation.diagnosis.simulator.work import rms
 from dbbstation.diagnosis.table.mismatch import FOLD_ROWS
 from dbbstation.inference.folds import Fold, HeldOutError, beside, part_numbers
+from dbbstation.inference.followed import ClassGain, VariableProbabilities, classes_of, followed_by
 from dbbstation.inference.verdict import DensityGains
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
+    from collections.abc import Callable, Collection, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -33,6 +35,20 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 
+@dataclass(frozen=True)
+class PredictedPart(Fold):
+    """One part, and what classes of signals bring there.
+
+    Attributes:
+        where: its rows, shape (n,).
+        of_classes: by what is followed, log density of the prediction with all that follows it less that without, and root mean square error
+            without it; of everything under no name.
+    """
+
+    where: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    of_classes: Mapping[frozenset[str], tuple[float, float]] = field(default_factory=dict)
+
+
 class PredictedPartsError(HeldOutError):
     """Parts that were held back, and what each term brought there as log density of the prediction."""
 
@@ -40,6 +56,34 @@ class PredictedPartsError(HeldOutError):
         """What terms brought together in each part; nothing where none of them was chosen."""
         gains = super().gains_of(kinds)
         return DensityGains(gains.parts, gains.rows)
+
+
+@dataclass(frozen=True)
+class PredictedGains:
+    """What held-out parts of a simulator say of classes.
+
+    Attributes:
+        parts: each part.
+    """
+
+    parts: tuple[PredictedPart, ...]
+
+    @property
+    def rows(self) -> list[NDArray[np.bool_]]:
+        """Of the parts, shape (n,) each."""
+        return [part.where for part in self.parts]
+
+    def of(self, wanted: Collection[str] | None) -> ClassGain:
+        """What all that follows some signals brings there; all terms if None."""
+        key = frozenset(wanted or ())
+        every = [part.of_classes[key] for part in self.parts]
+        counts = np.array([part.rows for part in self.parts], dtype=np.float64)
+
+        def over_all(errors: list[float]) -> float:
+            return float(np.sqrt(counts @ np.square(errors) / counts.sum()))
+
+        gains = DensityGains(tuple(gain for gain, _ in every), tuple(part.rows for part in self.parts))
+        return ClassGain(gains, over_all([error for _, error in every]), over_all([part.after for part in self.parts]))
 
 
 def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:
@@ -65,7 +109,7 @@ def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:
 
 def predicted_parts(
     nodes: Nodes, base: Node, found: SearchOutcome, stated: FittedState, progress: Callable[[str, int, int], None]
-) -> Iterator[Fold]:
+) -> Iterator[PredictedPart]:
     """Hold parts back in turn; choose terms anew, refit, simulate; one after the other, since simulations may be spent.
 
     Args:
@@ -78,22 +122,40 @@ def predicted_parts(
     work, channel = nodes.work, found.node.channel
     as_simulated = work.residuals([stated])[0]
     every = parts(work)
+    classes = [one.wanted for one in classes_of(found.settled, VariableProbabilities(found.settled))]
     for done, (name, rows) in enumerate(every):
         progress("held-out part", done, len(every))
         out = rows | beside(channel, rows, found.settled.noise.correlation_samples)
 
         one = search(nodes, base, partial(_without, out=out, found=found), refits=False)
-        weigh, sigma = noise_of(one.settled)
         _, refitted = near(work, base.fitted, lambda r, out=out: r[~out], max(base.size, 1e-300))  # type: ignore[misc]  # bound now
         others = channel.without(out)
         with_all = log_density(work, others, rows, one.residual, one.node.fitted.columns)
-        gains: dict[tuple[str, ...], float] = {}
-        for term in one.node.names:
-            less = nodes.without(one.node, term)
-            _, left = near(work, less.fitted, weigh, sigma)
-            gains[(term,)] = with_all - log_density(work, others, rows, left, less.fitted.columns)
+        known: dict[frozenset[str], tuple[float, float]] = {frozenset(): (0.0, rms(one.residual[rows]))}
+
+        def brought(
+            names: frozenset[str],
+            one: SearchOutcome = one,
+            known: dict[frozenset[str], tuple[float, float]] = known,
+            rows: NDArray[np.bool_] = rows,
+            others: Channel = others,
+            with_all: float = with_all,
+        ) -> tuple[float, float]:
+            if names not in known:
+                less = one.node
+                for name in sorted(names):
+                    less = nodes.without(less, name)
+                _, left = near(work, less.fitted, *noise_of(one.settled))
+                known[names] = with_all - log_density(work, others, rows, left, less.fitted.columns), rms(left[rows])
+            return known[names]
+
+        gains = {(term,): brought(frozenset({term}))[0] for term in one.node.names}
+        of_classes = {frozenset[str](): brought(frozenset(one.node.names))}
+        for wanted in classes:
+            own = (name for name in one.node.names if followed_by(one.settled.bank, name) & wanted)
+            of_classes[wanted] = brought(frozenset(own))
         before, middle, after = (rms(values[rows]) for values in (as_simulated, refitted, one.residual))
-        yield Fold(name, int(rows.sum()), before, middle, after, gains)
+        yield PredictedPart(name, int(rows.sum()), before, middle, after, gains, rows, of_classes)
 
 
 def _without(channel: Channel, out: NDArray[np.bool_], found: SearchOutcome) -> Settled:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.simulator.terms import TermForm
+from dbbstation.diagnosis.simulator.terms import MEMORIES, TermForm
 from dbbstation.diagnosis.simulator.work import PerturbedParameter
 from dbbstation.inference.channel import Law
 
@@ -169,6 +169,8 @@ def _law(one: Candidate, columns: NDArray[np.float64], size: float, off: Departu
         reach=size if one.grids else None,
         form_uncertainty=form_uncertainty(one),
         discrepancy=discrepancy(one, off),
+        followed=followed(one),
+        way=way(one),
     )
 
 
@@ -192,7 +194,21 @@ def _in_place(work: SimulationRuns, state: FittedState, one: Candidate, size: fl
         positive=(True,),
         log_odds=one.log_odds,
         form_uncertainty=form_uncertainty(one),
+        followed=followed(one),
+        way=way(one),
     )
+
+
+def followed(one: Candidate) -> tuple[str, ...]:
+    """Signals at its port that a candidate follows; the port where it follows none."""
+    return tuple(f"{signal} at {one.term.port}" for signal in one.term.signals) or (f"port {one.term.port}",)
+
+
+def way(one: Candidate) -> str:
+    """How it follows them; empty: by value."""
+    if one.term.form in {TermForm.SLIP, TermForm.PLAY}:
+        return "direction"
+    return "late" if one.term.form in MEMORIES else ""
 
 
 SHARE = "share"

@@ -14,7 +14,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.blocks import compress, with_random
 from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.folds import held_out_error, parts_of
-from dbbstation.inference.followed import WithoutPart
+from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
@@ -246,7 +246,7 @@ def _found(
         fitted=_fitted(settled, table, refits),
         left=left,
         is_worse_here=is_worse_here,
-        levels=levels_of(settled, left, chosen, held_out, matters),
+        levels=levels_of(settled, left, ChosenWithoutParts(chosen) if hold_out else None, held_out, matters),
         held_out=held_out,
         lacking=lacking,
         texts={source.name: source.texts for source in sources},

@@ -56,7 +56,8 @@ if TYPE_CHECKING:
 @click.option(
     "--variables",
     metavar="A,B=UNIT,...",
-    help="Columns that the difference may follow, each with its unit or kind if its name does not say it [default: all].",
+    help="Columns that the difference may follow, each with its unit or kind if its name does not say it; NAME:result or NAME=UNIT:result results "
+    "from what is simulated and is no cause [default: all].",
 )
 @click.option("--run", metavar="COLUMN", help="Column that tells runs apart; several files are several runs anyway.")
 @click.option(

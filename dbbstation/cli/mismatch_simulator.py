@@ -123,9 +123,6 @@ def _corrected(answer: SimulatorComparison) -> str:
 
 def _print(result: SimulatorResult) -> None:
     unit, held_out = result.unit, result.held_out_rms
-    from dbbstation.report.levels_text import level_sentences
-
-    echo("\n".join((*level_sentences(result.levels, unit), "")))
     _print_whether(result)
     findings = result.findings
     there = [f for f in findings if f.verdict in SURELY_FOUND]
@@ -151,6 +148,8 @@ def _print(result: SimulatorResult) -> None:
 
 def _print_whether(result: SimulatorResult) -> None:
     """Is there a mismatch, how large, beside which noise."""
+    from dbbstation.report.levels_text import level_sentences
+
     unit, rms, held_out = result.unit, result.rms, result.held_out_rms
     if held_out and held_out.worse:
         echo(
@@ -159,6 +158,7 @@ def _print_whether(result: SimulatorResult) -> None:
         )
     if result.stopped:
         echo(f"Ended early: {result.stopped}. Allow more with --most-runs.\n")
+    echo("\n".join((*level_sentences(result.levels, unit), "")))
     if result.mismatch:
         echo(
             f"There is a mismatch: {rms.as_simulated:.3g} {unit} rms as simulated, {rms.refitted:.3g} refitted, "

@@ -30,7 +30,7 @@ from dbbstation.inference.coloured import (
 )
 from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
 from dbbstation.inference.model_form import modulated
-from dbbstation.inference.patterns import NAMED, Family, log_odds
+from dbbstation.inference.patterns import NAMED, Family, log_odds, odds_of_driven
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import solve
 from dbbstation.inference.uneven import (
@@ -465,7 +465,7 @@ class Bank:
         over = {tuple(v.name for v in p.variables) for p in every if p.family is pattern.family}
         names = [variable.name for variable in self.channel.variables]
         rank = sum(names.index(variable.name) for variable in pattern.variables if variable.name in names)
-        return log_odds(len(over), pattern.tried) - TIE * rank
+        return log_odds(len(over), pattern.tried) + odds_of_driven(pattern.variables) - TIE * rank
 
     def _add(self, samples: NDArray[np.float64]) -> NDArray[np.int64]:
         self._everywhere.append(samples)

@@ -24,8 +24,8 @@ POWER = 0.9
 """Share of the effects of a size that must be found."""
 
 MARGIN = 1.25
-"""Factor on the size that is found so often: the noise and the odds of the whole search are known about so well. It was calibrated by
-injected effects in 28 tables, of which 27 were found at the size with the margin; without it 23 would be expected."""
+"""Factor on the size that is found so often: the noise and the odds of the whole search are known about so well. In a trial 27
+of 28 effects injected at the size with the margin were found."""
 
 DRAWS = 100
 """Random effects that are asked about: the share found is known to 3 %."""

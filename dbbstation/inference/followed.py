@@ -36,7 +36,7 @@ LEAST_ADDED = 0.02
 
 INTERCHANGEABLE = 0.9
 """Share of the squares of a fitted effect that one cause over another variable must make for both to be named: what it leaves is less
-than a third of the effect. At 0.8 two variables that correlate by 0.98 are joined in rows that tell them apart."""
+than a third of the effect. How much depends on it was not measured."""
 
 WAYS = {
     **dict.fromkeys((Family.HYSTERESIS, Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION), "direction"),

@@ -126,6 +126,7 @@ class Followed:
         gain: log density of held-out parts with them less that without; None where not tested.
         gain_without_best: the same without the part that gains most.
         parts_with_gain: share of the rows that are in parts with a gain.
+        consequence: whether what is followed results from what is simulated, as the user states: it shows the difference and is no cause.
         form: the law; None where the class is not known to be followed, or is the time.
     """
 
@@ -141,6 +142,7 @@ class Followed:
     gain: float | None = None
     gain_without_best: float | None = None
     parts_with_gain: float | None = None
+    consequence: bool = False
     form: LawForm | None = None
 
     @property

@@ -113,6 +113,7 @@ def _followed(
     gain = None if parts is None else parts.of(one.wanted)
     answer = _answer(probability, gain, in_time=one.wanted <= {TIME})
     effect = settled.effect(sorted(one.members))[settled.channel.kept]
+    driven = {variable.name for variable in settled.channel.variables if variable.driven}
     form = None
     if answer is Follows.FOLLOWS and parts is not None:
         form = law_form(settled, one, parts.rows)
@@ -129,6 +130,7 @@ def _followed(
         gain=None if gain is None else gain.gains.total,
         gain_without_best=None if gain is None else gain.gains.without_best,
         parts_with_gain=None if gain is None else gain.gains.share_with_gain,
+        consequence=any(driven.issuperset(each) for each in one.each),
         form=form,
     )
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.channel import Law
-from dbbstation.inference.patterns import Family, log_odds
+from dbbstation.inference.patterns import Family, log_odds, odds_of_driven
 from dbbstation.inference.variables import Kind
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def memory_laws(
                         time_unit,
                     ),
                     grids=(grid,),
-                    log_odds=log_odds(len(usable)) + float(np.log(LATE / len(kinds))),
+                    log_odds=log_odds(len(usable)) + float(np.log(LATE / len(kinds))) + odds_of_driven([variable]),
                     choices=_choices(2 + starts),
                     reach=size,
                     family=family,

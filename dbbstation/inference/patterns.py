@@ -19,7 +19,7 @@ from dbbstation.inference.forms import Form, SignForm, Wave
 from dbbstation.inference.variables import TRAVELS, Kind
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -160,6 +160,16 @@ def patterns(
     if len(blocks) > 1:
         found.append(_of_blocks(blocks, len(usable[0].values) if usable else max(b.stop for b in blocks)))
     return [pattern for pattern in found if np.ptp(pattern.samples, axis=0).max(initial=0.0) > 0.0]
+
+
+DRIVEN_ODDS = -float(np.log(19.0))
+"""Log odds by which a driven variable is a less probable cause than another: it comes first only where rows prefer it by the odds at which
+something is called sure. How much depends on it was not measured."""
+
+
+def odds_of_driven(variables: Iterable[Variable]) -> float:
+    """Log odds of a cause over variables for what it follows: less where one of them is driven."""
+    return DRIVEN_ODDS if any(variable.driven for variable in variables) else 0.0
 
 
 def log_odds(members: int, tried: float = 1.0) -> float:

@@ -51,6 +51,7 @@ class Variable:
         kind: what it is.
         values: in row order, shape (n,).
         period: of an angle, one turn, in its unit; None for all others.
+        driven: whether it results from what is simulated, so that the difference may cause it and not the other way round.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Variable:
     kind: Kind
     values: NDArray[np.float64]
     period: float | None = None
+    driven: bool = False
 
     @property
     def low(self) -> float:

@@ -71,6 +71,8 @@ def _followed(one: Followed, unit: str) -> Iterator[str]:
     yield f"{what}: {how}.{also}"
     if one.answer in (Follows.FOLLOWS, Follows.GOES_ON) and one.before is not None and one.after is not None:
         yield f"  Correcting it leaves {one.after:.3g} of {_size(one.before, unit)} rms in rows that took no part."
+    if one.consequence:
+        yield f"  {one.name} results from what is simulated: it shows the difference, and is no cause of it."
     if one.form is not None:
         yield f"  {_law(one.form)}"
 

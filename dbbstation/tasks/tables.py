@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -85,8 +85,14 @@ class Tabulated:
     notes: tuple[str, ...]
 
 
+RESULT = "result"
+"""Marks a driven variable."""
+
+
 def stated_variables(text: str) -> dict[str, Meaning | None]:
-    """Variables as the option gives them: `q1=deg,temperature`; None where the meaning is to be guessed.
+    """Variables as the option gives them: `q1=deg,temperature,torque=N m:result`; None where the meaning is to be guessed.
+
+    One with `:result` is driven: it results from what is simulated.
 
     Raises:
         InputError: a unit or kind that is not known.
@@ -94,12 +100,23 @@ def stated_variables(text: str) -> dict[str, Meaning | None]:
     found: dict[str, Meaning | None] = {}
     faults = []
     for part in (part.strip() for part in text.split(",")):
-        name, has, unit = (piece.strip() for piece in part.partition("="))
+        what, marked, result = (piece.strip() for piece in part.partition(":"))
+        name, has, unit = (piece.strip() for piece in what.partition("="))
         meaning = stated_meaning(unit) if has else None
+        if marked and result == RESULT and (meaning or not has):
+            meaning = replace(meaning or meaning_of(name), driven=True)
+        elif marked:
+            name = ""
         if not name or (has and meaning is None):
             remedy = f"a unit such as mm, deg, s, degC, N, or one of {', '.join(Kind)}"
             faults.append(
-                Problem("--variables", 0, 0, f"`{part}` is not understood", f"write NAME or NAME=UNIT, {remedy}")
+                Problem(
+                    "--variables",
+                    0,
+                    0,
+                    f"`{part}` is not understood",
+                    f"write NAME, NAME=UNIT or NAME=UNIT:{RESULT}, {remedy}",
+                )
             )
         found[name] = meaning
     if faults:
@@ -384,8 +401,8 @@ class _Reader:
             if not quiet:
                 self._notes.append(f"`{name}` is the same in all rows and is left out")
             return None
-        meaning = meaning if meaning.unit or meaning.kind is not Kind.ANY else PLAIN
-        return Variable(name, meaning.unit, meaning.kind, values, meaning.period)
+        known = meaning if meaning.unit or meaning.kind is not Kind.ANY else PLAIN
+        return Variable(name, known.unit, known.kind, values, known.period, meaning.driven)
 
     def _is_the_difference(self, variable: Variable, kept: Mapping[str, NDArray[np.float64]]) -> bool:
         """Whether a column is made of measured and simulated value, such as their difference."""

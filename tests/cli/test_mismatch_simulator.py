@@ -211,6 +211,11 @@ def test_physics_of_ones_own_competes_at_its_port(run, decay, tmp_path):
     assert outcome.code == 0, outcome.err
     (found,) = [f for f in outcome.data["findings"] if f["name"].startswith("outlet")]
     assert found["verdict"] == "identified"
+    levels = outcome.data["levels"]
+    assert levels["differs"]["answer"] == "yes"
+    (followed,) = (one for one in levels["follows"] if found["name"] in one["members"])
+    assert followed["variables"] == [["port flow"]]
+    assert followed["answer"] == "not tested" if outcome.data["held_out"] == "not-tested" else "follows"
     # The simulator's Euler steps of 20 ms are off by about a hundredth.
     assert found["values"]["size"]["value"] == pytest.approx(0.3, rel=0.015)
     # The term as code runs where it is pasted: outflow by the root of a level of 4 m.

@@ -20,9 +20,11 @@ from dbbstation.diagnosis.simulator.laws import (
     departing,
     departures,
     discrepancy,
+    followed,
     form_uncertainty,
     laws,
     of_unit_size,
+    way,
 )
 from dbbstation.diagnosis.simulator.noise_left import channel_of, noise_left
 from dbbstation.diagnosis.simulator.work import AGREE, FittedState, RanAwayError
@@ -156,6 +158,8 @@ class Node:
             log_odds=one.log_odds,
             form_uncertainty=form_uncertainty(one),
             discrepancy=discrepancy(one, off),
+            followed=followed(one),
+            way=way(one),
         )
 
     def numbers_of(self, settled: Settled, one: Candidate, beside: Sequence[Member] | None = None) -> tuple[float, ...]:

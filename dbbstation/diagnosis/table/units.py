@@ -17,11 +17,13 @@ class Meaning:
         unit: as printed; empty where none is known.
         kind: of the variable.
         period: one turn of an angle, in its unit; None for all others.
+        driven: whether it results from what is simulated, as a motor's torque does from its motion.
     """
 
     unit: str
     kind: Kind
     period: float | None = None
+    driven: bool = False
 
 
 PLAIN = Meaning("", Kind.ANY)
@@ -83,6 +85,9 @@ UNITS: dict[str, Meaning] = {
 }
 """What a name ends in, or what is stated, in small letters."""
 
+_AMOUNTS = {"l": "l", "ml": "ml", **{name: one.unit for name, one in UNITS.items() if one.kind is not Kind.TIME}}
+"""What a rate may count per time: `flow_l_min`, `speed_v_s`."""
+
 _CLOCKS = {"t", "time", "timestamp", "clock", "elapsed", "date"}
 _CALENDAR = {"year", "years", "day", "days", "jd", "mjd", "bjd"}
 """Columns that count by themselves when a row was measured, and are called no more than that."""
@@ -90,16 +95,15 @@ _THERMOMETERS = ("temp", "temperature")
 _WORDS = re.compile(r"[^a-z0-9µ%]+")
 
 
+RATE_WORDS = 2
+"""Words of a rate, an amount and a time, behind a name."""
+
+
 def meaning_of(name: str) -> Meaning:
     """Guess from a name: `travel_mm`, `t_s`, `oil_temp_c`, `temperature`, `angle_deg`; `PLAIN` where it says nothing."""
     words = [word for word in _WORDS.split(name.lower()) if word]
-    for count in (2, 1):
-        end = "_".join(words[-count:])
-        if len(words) > count and end in UNITS:
-            found = UNITS[end]
-            if found.kind is Kind.TIME and not _CLOCKS & set(words[:-count]):
-                return Meaning(found.unit, Kind.ANY)  # a duration, no clock
-            return found
+    if (found := _unit_at_end(words)) is not None:
+        return found
     if len(words) == 1 and words[0] in _CALENDAR:
         return Meaning("years" if words[0].startswith("year") else "days", Kind.TIME)
     if words and words[-1] in _CLOCKS:
@@ -109,9 +113,22 @@ def meaning_of(name: str) -> Meaning:
     return PLAIN
 
 
+def _unit_at_end(words: list[str]) -> Meaning | None:
+    """What the last words of a name say, one word being the name itself; None where they are no unit."""
+    for count in (2, 1):
+        found = UNITS.get("_".join(words[-count:]))
+        if len(words) <= count or found is None:
+            continue
+        if found.kind is not Kind.TIME or _CLOCKS & set(words[:-1]):
+            return found
+        rate = _AMOUNTS.get(words[-2]) if len(words) > RATE_WORDS else None
+        return Meaning(f"{rate}/{found.unit}" if rate else found.unit, Kind.ANY)  # else a duration, no clock
+    return None
+
+
 def stated_meaning(text: str) -> Meaning | None:
     """Meaning of a unit or kind that somebody states, such as `deg`, `mm/s` or `time`; None where it is neither."""
-    word = text.strip().lower().replace("/", "_").replace("°", "deg")
+    word = text.strip().lower().replace("/", "_").replace(" ", "_").replace("°", "deg")
     if word in UNITS:
         return UNITS[word]
     if word in set(Kind):

@@ -1,0 +1,49 @@
+"""What parts of a simulator's recordings say of the signals that terms follow."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbbstation.diagnosis.simulator.candidates import candidates
+from dbbstation.diagnosis.simulator.held import PredictedGains, PredictedPart
+from dbbstation.diagnosis.simulator.laws import followed, way
+from dbbstation.diagnosis.simulator.model import SimulatorPort
+from dbbstation.diagnosis.simulator.terms import TermForm
+
+
+def test_terms_follow_signals_at_their_port():
+    rng = np.random.default_rng(1)
+    signals = {"joint": {"t": np.arange(60.0), "x": rng.standard_normal(60), "v": rng.standard_normal(60)}}
+    found = {one.term.form: one for one in candidates((SimulatorPort("joint", "N", {"x": "m", "v": "m/s"}),), signals)}
+    assert followed(found[TermForm.PRODUCT]) == ("x at joint", "v at joint")
+    assert followed(found[TermForm.CONSTANT]) == ("port joint",)
+    assert (way(found[TermForm.MEMORY]), way(found[TermForm.SLIP]), way(found[TermForm.LINEAR])) == (
+        "late",
+        "direction",
+        "",
+    )
+
+
+def test_errors_of_parts_are_pooled_by_rows():
+    """Two parts of 10 and 30 rows: root of the mean square over all rows; gains are those of the parts."""
+    key = frozenset({"x at joint"})
+    parts = tuple(
+        PredictedPart(
+            name=str(rows),
+            rows=rows,
+            as_simulated=9.0,
+            before=8.0,
+            after=after,
+            where=np.arange(40) < rows,
+            of_classes={frozenset(): (7.0, 5.0), key: (gain, without)},
+        )
+        for rows, after, gain, without in ((10, 1.0, 4.0, 2.0), (30, 2.0, 6.0, 4.0))
+    )
+    found = PredictedGains(parts).of({"x at joint"})
+    assert found.gains.parts == (4.0, 6.0)
+    assert found.gains.rows == (10, 30)
+    assert found.before == pytest.approx(np.sqrt((10 * 4.0 + 30 * 16.0) / 40))
+    assert found.after == pytest.approx(np.sqrt((10 * 1.0 + 30 * 4.0) / 40))
+    assert found.predicts
+    assert PredictedGains(parts).of(None).gains.total == 14.0

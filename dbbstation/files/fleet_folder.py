@@ -6,7 +6,6 @@ all of it. Two processes at once write the same content under the same name.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from typing import TYPE_CHECKING, Any
@@ -29,11 +28,6 @@ _SHOWN = 16
 
 _LONGEST = 60
 """Characters of a session's name that are in names."""
-
-
-def key_of(what: Mapping[str, Any]) -> str:
-    """Return the key of a result: a SHA-256 over everything that decides what it is."""
-    return hashlib.sha256(json.dumps(what, sort_keys=True, default=str).encode()).hexdigest()
 
 
 class FleetFolder:

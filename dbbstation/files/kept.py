@@ -16,18 +16,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from dbbstation import __version__
+from dbbstation.files.keys import key_of
 from dbbstation.files.places import real_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
 _LOG = logging.getLogger(__name__)
-
-_FORM = 4
-"""Counts changes of what is kept under one version of the program."""
-
-VERSION = f"{__version__}/{_FORM}"
 
 _PATIENCE_S = 5.0
 """How long another process may write; what cannot be kept after that is worked out again another time [s]."""
@@ -54,14 +49,18 @@ class Stamp:
     size: int
 
 
-def stamp_of(path: Path) -> Stamp:
-    """Return the stamp of a file.
+def stamp_of(path: Path, *others: Path) -> Stamp:
+    """Return the stamp of a file, or of several together: all their names, times and sizes.
 
     Raises:
-        OSError: it is not there.
+        OSError: one is not there.
     """
     stat = path.stat()
-    return Stamp(stat.st_mtime_ns, stat.st_size)
+    if not others:
+        return Stamp(stat.st_mtime_ns, stat.st_size)
+    stats = [(str(one), one.stat()) for one in (path, *others)]
+    all_of_it = repr([(name, one.st_mtime_ns, one.st_size) for name, one in stats]).encode()
+    return Stamp(int(hashlib.sha256(all_of_it).hexdigest()[:15], 16), sum(one.st_size for _, one in stats))
 
 
 @dataclass(frozen=True)
@@ -188,11 +187,12 @@ class Kept:
             base.execute("PRAGMA journal_mode = DELETE")
             base.execute("BEGIN IMMEDIATE")
             base.execute("CREATE TABLE IF NOT EXISTS version (text TEXT)")
+            program = key_of({"task": "index"})
             known = [text for (text,) in base.execute("SELECT text FROM version")]
-            if known != [VERSION] or begin_anew:
+            if known != [program] or begin_anew:
                 base.execute("DROP TABLE IF EXISTS kept")
                 base.execute("DELETE FROM version")
-                base.execute("INSERT INTO version VALUES (?)", (VERSION,))
+                base.execute("INSERT INTO version VALUES (?)", (program,))
             base.execute(
                 "CREATE TABLE IF NOT EXISTS kept (name TEXT PRIMARY KEY, modified_ns INTEGER, size INTEGER, sha256 TEXT, text TEXT)"
             )

@@ -15,15 +15,17 @@ import numpy as np
 from scipy.special import logsumexp
 
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, undecided
+from dbbstation.quality.forms import SIZES, by_place, stacked
 from dbbstation.quality.knowledge import COEFFICIENTS, HIGHEST_HARMONIC
 from dbbstation.quality.limits import length_quantile
-from dbbstation.quality.together import SIZES, covariances, expected_um, log_likelihood, read_um
+from dbbstation.quality.together import expected_um, read_um
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from dbbstation.plan.circle import Circle
     from dbbstation.quality.knowledge import Seen
 
 PROBABILITY = 1e-6
@@ -65,6 +67,9 @@ WAYS = (
 )
 """All ways to turn and mirror a plane that leave its axes along its axes, and the other sense of rotation."""
 
+PLANNED = Way("as planned", reverses=False, begin_deg=lambda start: start)
+KEEPING, REVERSING = (tuple(way for way in WAYS if way.reverses is reverses) for reverses in (False, True))
+
 
 def programs_of_all(runs: Sequence[Seen]) -> Finding:
     """Return whether all runs together are likelier those of programs that ran in another way than the plan's.
@@ -77,11 +82,13 @@ def programs_of_all(runs: Sequence[Seen]) -> Finding:
         return undecided(Name.PROGRAMS, f"fewer than {FEWEST_TESTS} tests were measured in both directions")
     planned = [one for one, _ in pairs]
     other_way = [_run_as(one, other) for one, other in pairs]
-    as_planned = _Likelihood(planned, [read_um(one) for one in planned])
-    tried = _otherwise(planned, other_way)
-    way, likeliest = max(tried, key=lambda each: each[1].logarithm)
+    read = [read_um(one) for one in planned]
+    kept, turned = _Likelihood(planned, read, (PLANNED, *KEEPING)), _Likelihood(other_way, read, REVERSING)
+    tried = np.concatenate([kept.logarithms[1:], turned.logarithms])
     # No way is likelier than another before.
-    value = float(logsumexp([each.logarithm for _, each in tried]) - np.log(len(WAYS))) - as_planned.logarithm
+    value = float(logsumexp(tried) - np.log(len(tried)) - kept.logarithms[0])
+    best = int(np.argmax(tried))
+    way = (*KEEPING, *REVERSING)[best]
     limit = -float(np.log(PROBABILITY))
     stated = f"all {len(planned)} runs together"
     if value <= 0.0:
@@ -96,22 +103,11 @@ def programs_of_all(runs: Sequence[Seen]) -> Finding:
     if value <= limit:
         why = f"{stated} are {np.exp(value):.0f} times as likely if programs ran otherwise, best {way.label}: too little to tell"
         return Finding(Name.PROGRAMS, value, limit, "", FindingVerdict.CANNOT_TELL, why)
-    if not likeliest.fits():
+    likeliest = kept.fits(best + 1) if best < len(KEEPING) else turned.fits(best - len(KEEPING))
+    if not likeliest:
         return undecided(Name.PROGRAMS, f"{stated} fit no way in which all programs may have run")
     why = f"{stated} are over a million times as likely if programs ran otherwise, best {way.label}"
     return Finding(Name.PROGRAMS, value, limit, "", FindingVerdict.WRONG, why, f"all programs ran {way.label}")
-
-
-def _otherwise(planned: Sequence[Seen], other_way: Sequence[Seen]) -> list[tuple[Way, _Likelihood]]:
-    """How likely the readings are by each other way."""
-    tried = []
-    known: dict[bool, _Likelihood] = {}
-    for way in WAYS:
-        runs = other_way if way.reverses else planned
-        read = [_begun(one, as_run, way) for one, as_run in zip(planned, runs, strict=True)]
-        known[way.reverses] = _Likelihood(runs, read, known.get(way.reverses))
-        tried.append((way, known[way.reverses]))
-    return tried
 
 
 def bar_of_all(runs: Sequence[Seen], *, by_model: bool) -> Finding:
@@ -129,11 +125,10 @@ def bar_of_all(runs: Sequence[Seen], *, by_model: bool) -> Finding:
     fewest = 1 if by_model else FEWEST_TESTS
     if len({one.run.test for one in known}) < fewest:
         return undecided(Name.BAR, f"fewer than {fewest} tests were measured")
-    as_stated = _Likelihood(known, [read_um(one) for one in known])
-    longer_um = np.tile(np.eye(COEFFICIENTS)[0], len(known))
-    ratio, by_um = as_stated.gained(longer_um, BAR_UM)
+    as_stated = _Likelihood(known, [read_um(one) for one in known], (PLANNED,), longer=True)
+    ratio, by_um = as_stated.gained(BAR_UM)
     limit = -float(np.log(PROBABILITY))
-    if ratio > limit and not as_stated.fits(by_um * longer_um):
+    if ratio > limit and not as_stated.fits(0, by_um):
         return undecided(Name.BAR, "all runs together fit no bar of another length either")
     stated = f"the bar reads {abs(by_um):.0f} µm too {'long' if by_um > 0.0 else 'short'} in all runs"
     if ratio <= limit:
@@ -164,67 +159,71 @@ def _run_as(one: Seen, other: Seen) -> Seen:
     return replace(one, run=replace(one.run, circle=other.run.circle, expected=other.run.expected))
 
 
-def _begun(one: Seen, as_run: Seen, way: Way) -> NDArray[np.float64]:
-    """Coefficients of a run along its travel, counted from the start of the plan, if it began where a way has it, shape (7,) [µm]."""
-    circle = as_run.run.circle
+def _begun(read: NDArray[np.float64], circle: Circle, way: Way) -> NDArray[np.float64]:
+    """Coefficients of a circle along its travel, counted from the start of the plan, if it began where a way has it, shape (7,) [µm]."""
     ahead = np.radians(circle.direction.sign * (way.begin_deg(circle.start_deg) - circle.start_deg))
     angles = ahead * np.arange(1, HIGHEST_HARMONIC + 1)
-    mean, cosines, sines = np.split(read_um(one), [1, HIGHEST_HARMONIC + 1])
+    mean, cosines, sines = np.split(read, [1, HIGHEST_HARMONIC + 1])
     turned = (cosines * np.cos(angles) - sines * np.sin(angles), cosines * np.sin(angles) + sines * np.cos(angles))
     return np.concatenate([mean, *turned])
 
 
 class _Likelihood:
-    """How likely readings are, whatever the size of the machine's errors.
+    """How likely readings are by ways in which programs may have run, whatever the size of the machine's errors.
 
     Args:
         runs: n runs, each with where it should lie.
-        read: coefficients of each along its travel, shape (7,) each [µm].
-        same: of the same runs with other readings, whose covariances are the same; None: there is none.
+        read: coefficients of each along the travel of the plan, shape (7,) each [µm].
+        ways: k ways.
+        longer: whether what a longer bar reads is wanted, too.
+
+    Attributes:
+        logarithms: of the likelihood by each way, shape (k,).
     """
 
     def __init__(
-        self, runs: Sequence[Seen], read: Sequence[NDArray[np.float64]], same: _Likelihood | None = None
+        self, runs: Sequence[Seen], read: Sequence[NDArray[np.float64]], ways: Sequence[Way], *, longer: bool = False
     ) -> None:
-        self._off = np.concatenate([each - expected_um(one.run) for one, each in zip(runs, read, strict=True)])
-        self._machine_um2, self._rest_um2 = covariances(runs) if same is None else same.known_um2
-        self._by_size = np.array([log_likelihood(self._off, self._covariance_um2(size)) for size in SIZES])
-        self.logarithm = float(logsumexp(self._by_size))
+        bar = np.eye(COEFFICIENTS)[:, :1] if longer else np.zeros((COEFFICIENTS, 0))
+        off = [
+            np.column_stack([*(_begun(each, one.run.circle, way) - expected_um(one.run) for way in ways), bar])
+            for one, each in zip(runs, read, strict=True)
+        ]
+        self._dimensions = COEFFICIENTS * len(runs)
+        self._few = stacked(by_place(runs, off)).apart()
+        self._by_size = self._few.log_likelihoods()
+        self.logarithms = logsumexp(self._by_size[:, : len(ways)], axis=0)
 
-    @property
-    def known_um2(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Covariances by the machine's causes and by all else, shape (7 n, 7 n) each [µm²]."""
-        return self._machine_um2, self._rest_um2
-
-    def _covariance_um2(self, size: float) -> NDArray[np.float64]:
-        return float(size) ** 2 * self._machine_um2 + self._rest_um2
-
-    def fits(self, less_um: NDArray[np.float64] | float = 0.0) -> bool:
+    def fits(self, way: int, longer_um: float = 0.0) -> bool:
         """Return whether the readings are as near to what is expected as those of a machine with the causes that are known.
 
         Args:
-            less_um: what is taken off them before, shape (7 n,) [µm].
+            way: which.
+            longer_um: by how much the bar reads too long [µm].
         """
-        off = self._off - less_um
-        likeliest = max((self._covariance_um2(size) for size in SIZES), key=lambda each: log_likelihood(off, each))
-        return float(off @ np.linalg.solve(likeliest, off)) <= length_quantile(len(off)) ** 2
+        off = self._few.off[:, way] - (longer_um * self._few.off[:, -1] if longer_um else 0.0)
+        distances = [float(np.sum(off**2 / self._few.variances(float(size)))) for size in SIZES]
+        unlikeliness = [
+            distance + float(np.sum(np.log(self._few.variances(float(size)))))
+            for distance, size in zip(distances, SIZES, strict=True)
+        ]
+        return distances[int(np.argmin(unlikeliness))] <= length_quantile(self._dimensions) ** 2
 
-    def gained(self, column: NDArray[np.float64], sigma: float) -> tuple[float, float]:
-        """Return by how much a column of unknown amount makes the readings likelier, as a logarithm, and how much of it they have.
+    def gained(self, sigma_um: float) -> tuple[float, float]:
+        """Return by how much a longer bar makes the readings likelier, as a logarithm, and how much longer it is [µm].
 
         Args:
-            column: what the readings are per amount, shape (7 n,).
-            sigma: standard deviation of the amount before.
+            sigma_um: standard deviation of that before.
         """
+        off, column = self._few.off.T
         logarithms, amounts = [], []
         for size in SIZES:
-            covariance = self._covariance_um2(size)
-            pulled = np.linalg.solve(covariance, column)
+            pulled = column / self._few.variances(float(size))
             # Matrix determinant lemma, and the conditional mean of one normal amount [Rasmussen and Williams, eq. A.9, A.10].
-            weight = float(column @ pulled) + sigma**-2
-            amount = float(pulled @ self._off) / weight
-            logarithms.append(0.5 * (amount**2 * weight - float(np.log(weight * sigma**2))))
+            weight = float(column @ pulled) + sigma_um**-2
+            amount = float(pulled @ off) / weight
+            logarithms.append(0.5 * (amount**2 * weight - float(np.log(weight * sigma_um**2))))
             amounts.append(amount)
-        joint = self._by_size + np.array(logarithms)
+        joint = self._by_size[:, 0] + np.array(logarithms)
         amount = float(np.exp(joint - logsumexp(joint)) @ np.array(amounts))
-        return float(logsumexp(joint)) - self.logarithm, amount
+        return float(logsumexp(joint) - self.logarithms[0]), amount

@@ -55,7 +55,7 @@ def copied(one: Seen, others: Sequence[Seen]) -> Finding:
     row = 1 + ceil(log(places / PROBABILITY) / -log(chance))
     share, label = 0.0, ""
     for other, length_mm in them:
-        there = _shared(raw.length_mm, length_mm, row) / len(raw)
+        there = _shared(raw.length_mm, length_mm, row) / len(raw) if _may_share(one, other, row) else 0.0
         if there > share:
             share, label = there, other.run.label
     stated = f"{100.0 * share:.0f} % of the readings are those of run {label}, in their order"
@@ -82,6 +82,25 @@ def _chance(analysis: CircleAnalysis) -> float:
     known = max(1.0 - quantile(np.inf) / float(np.sqrt(2.0 * noise.reading_freedom)), 0.0)
     by_turn = chance_equal(squares_mm2, count, step_mm)
     return max(by_turn, chance_of((1e-3 * known * noise.reading_um) ** 2, step_mm))
+
+
+def _may_share(one: Seen, other: Seen, row: int) -> bool:
+    """Return whether two neighbouring blocks of a run begin with readings that follow one another in another run.
+
+    Otherwise `_shared` is zero. Stretches of the other run are sorted once for each length, which is a power of two.
+    """
+    assert one.analysis is not None  # noqa: S101 - asked before
+    assert other.analysis is not None  # noqa: S101 - asked before
+    own_mm, other_mm, block = one.analysis.raw.length_mm, other.analysis.raw.length_mm, (row + 1) // 2
+    if min(len(own_mm), len(other_mm)) < row:
+        return False
+    length = 1 << (block.bit_length() - 1)
+    if length not in other.stretches:
+        other.stretches[length] = np.sort(_stretches(other_mm, length))
+    known = other.stretches[length]
+    begins = _stretches(own_mm, length)[: len(own_mm) - block + 1 : block]
+    at = known[np.minimum(np.searchsorted(known, begins), len(known) - 1)] == begins
+    return bool(np.any(at[1:] & at[:-1]))
 
 
 def _shared(own_mm: NDArray[np.float64], other_mm: NDArray[np.float64], row: int) -> int:

@@ -65,25 +65,67 @@ def judge(runs: Sequence[Run], progress: Callable[[int, int], None] = lambda _do
     return tuple(session.judge(one) for one in known)
 
 
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Two runs of one test.
+
+    Attributes:
+        one: of them.
+        other: of them.
+    """
+
+    one: Seen
+    other: Seen
+
+    def has(self, run: Seen) -> bool:
+        """Return whether a run is one of them."""
+        return run is self.one or run is self.other
+
+    @cached_property
+    def apart_um(self) -> tuple[float, float]:
+        """As of `knowledge.apart_um`."""
+        return apart_um(self.one, self.other)
+
+    @cached_property
+    def sigmas(self) -> float | None:
+        """As of `stated.sigmas_apart`."""
+        return sigmas_apart(self.one, self.other)
+
+    @cached_property
+    def local_um(self) -> float | None:
+        """How far they differ at places [µm]; None where samples are too few."""
+        known = self.one.local_um.any() and self.other.local_um.any()
+        return locally_apart_um(self.one, self.other) if known else None
+
+
 class SessionRuns:
     """The runs of one session, analysed, with their pairs; judges any of them, and a new one beside them.
 
     Args:
         runs: in the order in which they were recorded.
+        known: other runs of the same session, of which pairs are known.
     """
 
-    def __init__(self, runs: Sequence[Seen]) -> None:
+    def __init__(self, runs: Sequence[Seen], known: SessionRuns | None = None) -> None:
         self._runs = [one for one in runs if one.analysis is not None]
-        pairs = [(one, match) for one in self._runs if (match := self._opposite(one)) is not None]
-        repeats = [(one, match) for one in self._runs if (match := self._earlier(one)) is not None]
+        self._of_test: dict[str, list[Seen]] = {}
+        for one in self._runs:
+            self._of_test.setdefault(one.run.test, []).append(one)
+        self._pairs: dict[tuple[Seen, Seen], _Pair] = {} if known is None else known._pairs  # noqa: SLF001 - the same class
+        self._without: SessionRuns | None = None if known is None else known._without  # noqa: SLF001
         taken: set[int] = set()
-        self._directions: list[tuple[Seen, Seen, tuple[float, float], float | None]] = []
-        for one, other in pairs:
+        self._directions, self._repeats = [], []
+        for one in self._runs:
+            match = self._opposite(one)
             # Another mounting scatters, which says nothing of the machine's own reversal.
-            if id(other) not in taken and other.run.mounting == one.run.mounting:
+            if match is not None and id(match) not in taken and match.run.mounting == one.run.mounting:
                 taken.add(id(one))
-                self._directions.append((one, other, apart_um(one, other), sigmas_apart(one, other)))
-        self._repeats = [(one, other, apart_um(one, other), sigmas_apart(one, other)) for one, other in repeats]
+                self._directions.append(self._pair(one, match))
+            if (earlier := self._earlier(one)) is not None:
+                self._repeats.append(self._pair(one, earlier))
+
+    def _pair(self, one: Seen, other: Seen) -> _Pair:
+        return self._pairs.setdefault((one, other), _Pair(one, other))
 
     @with_one_thread
     def judge(self, one: Seen) -> Judgement:
@@ -106,7 +148,8 @@ class SessionRuns:
 
     @cached_property
     def _without_model(self) -> SessionRuns:
-        return SessionRuns([one.without_model for one in self._runs])
+        self._without = SessionRuns([one.without_model for one in self._runs], self._without)
+        return self._without
 
     def _beside(self, one: Seen, analysis: CircleAnalysis) -> list[Finding]:
         """What is found of a run by what is known of its circle and by the other runs."""
@@ -137,6 +180,8 @@ class SessionRuns:
         return SessionRuns([*self._runs, one])
 
     def _others(self, one: Seen) -> Others:
+        directions = [pair for pair in self._directions if not pair.has(one)]
+        repeats = [pair for pair in self._repeats if not pair.has(one)]
         analyses = [o.analysis for o in self._runs if o is not one and o.analysis is not None]
         return Others(
             noise_um=tuple(a.noise.reading_um for a in analyses),
@@ -145,20 +190,12 @@ class SessionRuns:
                 (a.passes.mean_um, a.passes.u_mean_um(a.noise.sigma_um)) for a in analyses if a.passes is not None
             ),
             longer_s=tuple(o.longer_s for o in self._runs if o is not one and o.longer_s is not None),
-            directions_um=tuple(apart for a, b, apart, _ in self._directions if one is not a and one is not b),
-            repeats_um=tuple(apart for a, b, apart, _ in self._repeats if one is not a and one is not b),
-            directions_stated=_stated(self._directions, one),
-            repeats_stated=_stated(self._repeats, one),
-            across_um=tuple(
-                float(np.linalg.norm(across(a) - across(b)))
-                for a, b, *_ in self._directions
-                if one is not a and one is not b
-            ),
-            local_um=tuple(
-                locally_apart_um(a, b)
-                for a, b, *_ in self._directions
-                if one is not a and one is not b and a.local_um.any() and b.local_um.any()
-            ),
+            directions_um=tuple(pair.apart_um for pair in directions),
+            repeats_um=tuple(pair.apart_um for pair in repeats),
+            directions_stated=tuple(pair.sigmas for pair in directions if pair.sigmas is not None),
+            repeats_stated=tuple(pair.sigmas for pair in repeats if pair.sigmas is not None),
+            across_um=tuple(float(np.linalg.norm(across(pair.one) - across(pair.other))) for pair in directions),
+            local_um=tuple(pair.local_um for pair in directions if pair.local_um is not None),
             opposite=self._opposite(one),
             earlier=self._earlier(one),
             every=tuple(other for other in self._runs if other is not one),
@@ -168,8 +205,8 @@ class SessionRuns:
         """Return the run of the test in the other direction: on the same mounting before another, then of the same repeat."""
         found = [
             other
-            for other in self._runs
-            if other.run.test == one.run.test and other.run.circle.direction is not one.run.circle.direction
+            for other in self._of_test.get(one.run.test, ())
+            if other.run.circle.direction is not one.run.circle.direction
         ]
 
         def nearness(other: Seen) -> tuple[bool, bool, int]:
@@ -181,14 +218,7 @@ class SessionRuns:
         """Return the repeat before, in the same direction."""
         earlier = [
             other
-            for other in self._runs
-            if other.run.test == one.run.test
-            and other.run.circle.direction is one.run.circle.direction
-            and other.run.repeat < one.run.repeat
+            for other in self._of_test.get(one.run.test, ())
+            if other.run.circle.direction is one.run.circle.direction and other.run.repeat < one.run.repeat
         ]
         return max(earlier, key=lambda other: other.run.repeat, default=None)
-
-
-def _stated(pairs: Sequence[tuple[Seen, Seen, tuple[float, float], float | None]], one: Seen) -> tuple[float, ...]:
-    """How far the runs of pairs differ, in standard deviations of what is stated; without those of a run, and where nothing is."""
-    return tuple(sigmas for a, b, _, sigmas in pairs if sigmas is not None and one is not a and one is not b)

@@ -195,14 +195,19 @@ class Seen:
             return self
         return replace(self, run=replace(self.run, expected=self.run.usual, usual=None, planned=()))
 
-    @property
+    @cached_property
+    def stretches(self) -> dict[int, NDArray[np.uint64]]:
+        """Its stretches of readings, sorted, by their length: `copied` enters them."""
+        return {}
+
+    @cached_property
     def u_um(self) -> float:
         """Standard uncertainty of each coefficient by noise [µm]."""
         if self.analysis is None:
             return 0.0
         return self.analysis.noise.sigma_um / float(np.sqrt(len(self.analysis.raw)))
 
-    @property
+    @cached_property
     def drift_um_s(self) -> float:
         """How fast the bar's reading of one place grows, by the overlap; zero where it has none [µm/s]."""
         passes = None if self.analysis is None else self.analysis.passes

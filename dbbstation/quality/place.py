@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.quality.finding import Finding, Name, found, undecided
+from dbbstation.quality.forms import own_um2
 from dbbstation.quality.knowledge import HIGHER
 from dbbstation.quality.limits import length_quantile, quantile
 from dbbstation.quality.stated import limit_along
-from dbbstation.quality.together import own_um2
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis

@@ -16,10 +16,11 @@ import numpy as np
 from scipy.special import logsumexp
 
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
+from dbbstation.quality.forms import SIZES
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN, length_quantile
 from dbbstation.quality.stated import drifted_um, unseen_um2
-from dbbstation.quality.together import SIZES, expected_um, log_likelihood, read_um
+from dbbstation.quality.together import expected_um, read_um
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -82,17 +83,23 @@ def _measured(one: Seen, both: Together | None) -> Iterator[_Explained]:
     """Circles of other tests that were measured; what they show of the machine says what the run's own circle should look like."""
     if both is None:
         return
-    n = COEFFICIENTS
     as_own, without = both.log_likelihoods()
     # How large this machine's errors are nobody knows: the size that suits the run's own circle best, against the mean of all.
     common = float(logsumexp(without)) - float(np.log(len(SIZES))) - float(as_own.max())
-    for other in both.runs[1:]:
-        assert other.run.expected is not None  # noqa: S101 - chosen so
-        signs = along_travel(other.run.circle)
-        alike = signs[:, None] * other.run.expected.again_um2 * signs + unseen_um2(one, other) * np.eye(n)
-        alike[0, 0] += drifted_um(one, other) ** 2
-        apart = read_um(one) - read_um(other)
-        yield _Explained(common + log_likelihood(apart, alike), _fits(apart, alike), f"run {other.run.label}")
+    others = both.runs[1:]
+    noise = np.array([[unseen_um2(one, other), drifted_um(one, other) ** 2] for other in others])
+    alike = np.array([_again_um2(other) for other in others]) + noise[:, 0, None, None] * np.eye(COEFFICIENTS)
+    alike[:, 0, 0] += noise[:, 1]
+    apart = read_um(one) - np.array([read_um(other) for other in others])
+    likelihoods, squares = _density(apart, alike)
+    for other, likelihood, square in zip(others, likelihoods, squares, strict=True):
+        yield _Explained(common + float(likelihood), _near(float(square)), f"run {other.run.label}")
+
+
+def _again_um2(other: Seen) -> NDArray[np.float64]:
+    assert other.run.expected is not None  # noqa: S101 - chosen so
+    signs = along_travel(other.run.circle)
+    return signs[:, None] * other.run.expected.again_um2 * signs
 
 
 def _predicted(one: Seen) -> Iterator[_Explained]:
@@ -104,18 +111,31 @@ def _predicted(one: Seen) -> Iterator[_Explained]:
     # A model knows nothing of this day's drift, which may have gone on since the session began as it does on this turn.
     noise[0, 0] += (one.drift_um_s * (one.run.started_s or 0.0)) ** 2
     as_own = read_um(one) - expected_um(one.run)
-    likelihood = log_likelihood(as_own, _whole(own, one.run.circle) + noise)
+    likelihood, _ = _density(as_own, _whole(own, one.run.circle) + noise)
     for planned in one.run.planned:
         if planned.test == one.run.test:
             continue
         as_other = read_um(one) - expected_um(planned)
         covariance = _whole(planned.expected, planned.circle) + noise
-        ratio = log_likelihood(as_other, covariance) - likelihood
-        yield _Explained(ratio, _fits(as_other, covariance), f"test {planned.label}")
+        as_likely, square = _density(as_other, covariance)
+        yield _Explained(float(as_likely - likelihood), _near(float(square)), f"test {planned.label}")
 
 
-def _fits(off: NDArray[np.float64], covariance: NDArray[np.float64]) -> bool:
-    return float(off @ np.linalg.solve(covariance, off)) <= length_quantile(len(off)) ** 2
+def _density(
+    off: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the logarithm of normal densities, without the constant that all have, and squares of distances.
+
+    Args:
+        off: shape (..., 7).
+        covariance: shape (..., 7, 7).
+    """
+    squares: NDArray[np.float64] = np.sum(off * np.linalg.solve(covariance, off[..., None])[..., 0], axis=-1)
+    return -0.5 * (np.linalg.slogdet(covariance)[1] + squares), squares
+
+
+def _near(square: float) -> bool:
+    return square <= length_quantile(COEFFICIENTS) ** 2
 
 
 def _whole(expected: Expected, circle: Circle) -> NDArray[np.float64]:

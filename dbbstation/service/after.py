@@ -100,10 +100,10 @@ class After:
 
     @property
     def outdated(self) -> bool:
-        """Whether other runs count now than when the first step was done."""
+        """Whether the session, or the program, is another now than when the first step was done."""
         try:
             return self._counted not in {"", counted(self.session)}
-        except InputError:
+        except (InputError, OSError):
             return False
 
     @property
@@ -160,7 +160,7 @@ class After:
             return
         if progress is WorkProgress.DONE:
             result.answer, result.path = work.answer(), self.folder / self._out(step)
-            with suppress(InputError):
+            with suppress(InputError, OSError):
                 now = counted(self.session)
                 keep_steps(self.folder, now, self._done())
                 self._counted = self._counted or now

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.atomic import write_text
 from dbbstation.files.gateway import content_of
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.keys import digests_of, files_of_session, key_of
 from dbbstation.files.recordings.session import read_session
 
 if TYPE_CHECKING:
@@ -41,18 +40,18 @@ class DoneStep(BaseModel):
 class _File(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
-    runs_sha256: str
-    """Of the runs that counted when it was worked out."""
+    key: str
+    """Of what decided it, as `counted` has it."""
     steps: dict[str, DoneStep]
 
 
 @dataclass(frozen=True)
 class StepsBefore:
-    """What was done with the runs that count now.
+    """What was done with a session as it is now.
 
     Attributes:
         folder: of the results.
-        counted: SHA-256 of the runs that count.
+        counted: key of the session.
         steps: what was done, by the name of the step.
     """
 
@@ -61,21 +60,21 @@ class StepsBefore:
     steps: dict[str, DoneStep]
 
 
-def keep_steps(folder: Path, runs_sha256: str, steps: dict[str, DoneStep]) -> None:
+def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
     """Keep what was done beside its results; where that cannot be written, only the next start lacks it.
 
     Args:
         folder: of the results.
-        runs_sha256: of the runs that count, as `counted` has it.
+        key: of the session, as `counted` has it.
         steps: what was done, by the name of the step.
     """
     with suppress(OSError, OutputError):
-        file = _File(runs_sha256=runs_sha256, steps=steps)
+        file = _File(key=key, steps=steps)
         write_text(folder / FILE, file.model_dump_json(indent=1) + "\n", force=True, rewrites=True)
 
 
 def steps_before(session: Path) -> StepsBefore | None:
-    """Return the last folder of results of a session whose counting runs are still the same, and what was done; None where none is.
+    """Return the last folder of results of a session that is still the same, and what was done; None where none is.
 
     A step whose file is gone is left out.
 
@@ -86,14 +85,14 @@ def steps_before(session: Path) -> StepsBefore | None:
     kept = sorted(session.parent.glob(f"{session.name}-results*/{FILE}"), key=lambda file: -file.stat().st_mtime)
     try:
         now = counted(session) if kept else ""
-    except InputError:  # what is wrong with it is said where it is opened
+    except (InputError, OSError):  # what is wrong with it is said where it is opened
         return None
     for file in kept:
         try:
             found = _File.model_validate_json(content_of(file, LARGEST_BYTES))
         except (OSError, ValidationError):
             continue
-        if found.runs_sha256 == now:
+        if found.key == now:
             folder = file.parent
             steps = {name: step for name, step in found.steps.items() if (folder / step.path).exists()}
             return StepsBefore(folder, now, steps)
@@ -101,10 +100,11 @@ def steps_before(session: Path) -> StepsBefore | None:
 
 
 def counted(session: Path) -> str:
-    """Return the SHA-256 of which runs of a session count, and of their files.
+    """Return the key of what is worked out of a session: its files, and the program.
 
     Raises:
         InputError: faults of the session.
+        OSError: one of its files cannot be read.
     """
-    runs = sorted(f"{run.label} {run.sha256}" for run in read_session(session).in_state(RunState.ACCEPTED))
-    return hashlib.sha256("\n".join(runs).encode()).hexdigest()
+    found = read_session(session)
+    return key_of({"task": "steps"}, digests_of(files_of_session(found), found.folder))

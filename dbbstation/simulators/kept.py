@@ -1,7 +1,7 @@
 """Simulations that were run before, kept by their content in the user's cache folder, so that they need not be run again.
 
-What is kept is never the only copy of anything. What counts as content: the simulator's files, what the ports do in this version of
-the program, the inputs, parameters and terms of the simulation. What the simulator reads besides does not count.
+What is kept is never the only copy of anything. What counts as content: the simulator's files, command and names of variables, the
+program, the inputs, parameters and terms of the simulation. What the simulator reads besides does not count.
 """
 
 from __future__ import annotations
@@ -15,11 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation import __version__
-from dbbstation.diagnosis.simulator import ports, terms
 from dbbstation.diagnosis.simulator.model import SimulationOutcome
 from dbbstation.files.kept import folder_problem
-from dbbstation.inference import memory
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -144,9 +141,7 @@ def _kept_at_all(ask: SimulationRequest) -> bool:
 
 def _of_all(content: str, model: Model) -> str:
     """Hash of everything that all simulations have in common."""
-    digest = hashlib.sha256(f"{__version__} {content}".encode())
-    for module in (ports, terms, memory):
-        digest.update(Path(str(module.__file__)).read_bytes())
+    digest = hashlib.sha256(content.encode())
     digest.update(repr([(o.name, o.filter_s) for o in model.outputs]).encode())
     digest.update(repr([(port.name, sorted(port.signals)) for port in model.ports]).encode())
     for run in model.runs:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import sys
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,6 +18,7 @@ from dbbstation.diagnosis.simulator.own import PortSource
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
 from dbbstation.files.gateway import content_of
+from dbbstation.files.keys import digests_of, key_of
 from dbbstation.files.own_classes import classes_in_files, module_name, own_instances
 from dbbstation.files.places import real_path
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
@@ -62,11 +62,9 @@ class LoadedSimulator:
 
     @property
     def content(self) -> str:
-        """Hash of the simulator's files, of Python files beside it that it imports, and of physics of the user's own."""
-        digest = hashlib.sha256()
-        for path in (*self._files, *self.own_files):
-            digest.update(hashlib.sha256(content_of(path)).digest())
-        return digest.hexdigest()
+        """Key of the simulator: its files, Python files beside it, physics of the user's own, and what its command and FMU are given."""
+        given = {"task": "simulate", "program": self.file.program, "variables": self.file.variables}
+        return key_of(given, digests_of((*self._files, *self.own_files), self.path.parent))
 
     @property
     def _files(self) -> list[Path]:
@@ -78,7 +76,15 @@ class LoadedSimulator:
         python = self.path.parent / str(self.file.python)
         folder = real_path(python).parent
         imported = {Path(file) for module in list(sys.modules.values()) if (file := getattr(module, "__file__", None))}
-        return [python, *sorted(one for one in imported if one.is_relative_to(folder) and one.suffix == ".py")]
+        # What is imported late, too: of the simulator's folder and the packages in it.
+        beside = {
+            *folder.glob("*.py"),
+            *(one for package in folder.glob("*/__init__.py") for one in package.parent.rglob("*.py")),
+        }
+        return [
+            python,
+            *sorted({*beside, *(one for one in imported if one.is_relative_to(folder) and one.suffix == ".py")}),
+        ]
 
 
 def load_simulator(

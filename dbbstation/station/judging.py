@@ -64,6 +64,7 @@ class RunJudge:
         self._counting: dict[tuple[str, Direction, int], Seen] = {}
         self._waiting: dict[tuple[str, Direction, int], Seen] = {}
         self._rejected: dict[tuple[str, Direction, int], Seen] = {}
+        self._together = SessionRuns([])
         kept = {RunState.ACCEPTED: self._counting, RunState.REJECTED: self._rejected}
         for entry in writer.runs:
             if entry.state in kept:
@@ -86,7 +87,7 @@ class RunJudge:
 
     def known(self) -> tuple[JudgedRun, ...]:
         """Return what judged runs say, from disk: figures and findings of each beside those that count."""
-        together = SessionRuns(list(self._counting.values()))
+        together = SessionRuns(list(self._counting.values()), self._together)
         found = []
         for entry in self._writer.runs:
             one = self._counting.get(_key(entry)) or self._rejected.get(_key(entry))
@@ -124,7 +125,8 @@ class RunJudge:
         one = run_of(self._writer.session, entry, recording, self._model, self._planned)
         self._waiting[_key(run)] = new = seen(one)
         others = [known for key, known in self._counting.items() if key != _key(run)]
-        return SessionRuns([*others, new]).judge(new).findings
+        self._together = SessionRuns([*others, new], self._together)
+        return self._together.judge(new).findings
 
     def _read(self, entry: RunEntry, into: dict[tuple[str, Direction, int], Seen]) -> None:
         """Take in a run that was recorded before; one that cannot be read is told of by who reads it for its figures."""

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import StationError
 from dbbstation.facts.serialise import read_plain
 from dbbstation.files.atomic import write_bytes
-from dbbstation.files.fleet_folder import FleetFolder, key_of
+from dbbstation.files.fleet_folder import FleetFolder
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book, note_known
+from dbbstation.files.keys import files_of_session, key_of
 from dbbstation.files.places import real_path, text_of_name
 from dbbstation.files.program_identity import program_identity
-from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_name import SESSION_FILE
@@ -138,9 +138,9 @@ def fleet(
         named = [replace(one, apart=apart) for one in _once(_sessions(paths_of(folders), telling), telling)]
         extra = {str(path): digest_of(path) for path in options.source_files}
     program = program_identity()
-    about = {"task": task, "options": _plain(options), "sources": list(extra.values()), "program": program}
+    about = {"task": task, "options": _plain(options), "sources": list(extra.values())}
     keys = {
-        place: key_of({**about, "inputs": {Path(p).name: d for p, d in one.inputs.items()}, "name": one.folder.name})
+        place: key_of({**about, "name": one.folder.name}, [(Path(p).name, d) for p, d in one.inputs.items()])
         for place, one in enumerate(named)
         if one.inputs is not None
     }
@@ -199,10 +199,7 @@ def _read(name: str, folder: Path) -> _Named:
     name = text_of_name(name)
     try:
         session = read_session(folder)
-        runs = [run for run in session.runs if run.state is RunState.ACCEPTED]
-        files = [folder / SESSION_FILE, session.machine_path, session.plan_path, *(run.path for run in runs)]
-        files += [run.program.path for run in runs if run.program is not None]
-        inputs = {str(real_path(path)): digest_of(path) for path in dict.fromkeys(files)}
+        inputs = {str(real_path(path)): digest_of(path) for path in dict.fromkeys(files_of_session(session))}
     except OSError as error:
         return _Named(name, folder, problem=reason_of(error))
     except StationError as error:

@@ -16,6 +16,7 @@ from dbbstation.facts.serialise import json_of, read_json
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_known
 from dbbstation.files.kept import Kept, NotedAnchor, Stamp, stamp_of
+from dbbstation.files.keys import key_of
 from dbbstation.files.recordings.anchors import SHORTEST, links_of
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session_name import SESSION_FILE
@@ -49,8 +50,8 @@ def history(
 ) -> HistoryResult:
     """Return the histories of all machines whose sessions lie in a folder, at most four folders deep.
 
-    A session is read where its session file has another time or size than in the index, and another content than any that is
-    known. One that cannot be read is left out and named.
+    A session is read where one of its files has another time or size than in the index, and they have another content than any
+    that is known. One that cannot be read is left out and named.
 
     Args:
         folder: that holds session folders, and models of `calibrate` or `diagnose`.
@@ -70,12 +71,13 @@ def history(
     found = files_of(folder)
     with Kept(folder, begin_anew=rebuild) as kept:
         reading = _Reading(kept, counted, len(found.sessions) + len(found.models))
-        sessions = [
-            replace(one, name=_called(name))
-            for name, one in reading.every(found.sessions, SessionFigures, _session_data, _processes_for).items()
-        ]
+        read = reading.every(found.sessions, SessionFigures, _session_data, _beside, _processes_for)
+        sessions = [replace(one, name=_called(name)) for name, one in read.items()]
         work = partial(_model_data, source_files=tuple(source_files))
-        models = [replace(one, file=name) for name, one in reading.every(found.models, ModelFigures, work).items()]
+        models = [
+            replace(one, file=name)
+            for name, one in reading.every(found.models, ModelFigures, work, lambda _model: source_files).items()
+        ]
         kept.drop_others([*found.sessions, *found.models])
         moment = now or datetime.now(UTC)
         folders = {_called(name): path.parent for name, path in found.sessions.items()}
@@ -160,6 +162,7 @@ class _Reading:
         files: Mapping[str, Path],
         kind: type[_Kind],
         work: Callable[[Path], _Kind | _Unreadable],
+        others: Callable[[Path], Sequence[Path]],
         processes: Callable[[Sequence[Path]], int] = lambda _paths: 1,
     ) -> dict[str, _Kind]:
         """Return the figures of all files that can be read by their names, in their order; the name in them may be another.
@@ -168,6 +171,7 @@ class _Reading:
             files: by name.
             kind: class of the figures.
             work: works them out, or says why it cannot.
+            others: further files that decide what comes out.
             processes: how many to work such files out with.
         """
         found: dict[str, _Kind] = {}
@@ -175,10 +179,11 @@ class _Reading:
         unknown: dict[str, list[_File]] = {}
         for name, path in files.items():
             try:
-                file = _File(name, path, stamp_of(path))
+                more = others(path)
+                file = _File(name, path, stamp_of(path, *more))
                 one = _understood(kind, self._kept.of(name, file.stamp))
                 if one is None:
-                    digest = digest_of(path)
+                    digest = key_of({"task": kind.__name__}, _contents(path, more))
                     text = self._kept.of_content(digest)
                     one = _understood(kind, text)
                     if text is None or one is None:
@@ -198,7 +203,7 @@ class _Reading:
                     if isinstance(outcome, _Unreadable):
                         reasons[file.name] = outcome.reason
                     else:
-                        found[file.name] = replace(outcome, sha256=digest)
+                        found[file.name] = outcome
                         self._kept.keep(
                             file.name, file.stamp, digest, json_of(found[file.name], indent=None, escaped=True)
                         )
@@ -211,6 +216,25 @@ class _Reading:
     def _count(self) -> None:
         self._done += 1
         self._progress(self._done, self.of)
+
+
+def _beside(session_file: Path) -> list[Path]:
+    """Return all other files of a session: machine, plan, runs, seal."""
+    folder = session_file.parent
+    names = sorted(os.path.join(place, name) for place, _, here in os.walk(folder) for name in here)  # noqa: PTH118 - hundreds of folders
+    return [Path(name) for name in names if name != str(session_file) and os.path.isfile(name)]  # noqa: PTH113 - the same
+
+
+def _contents(path: Path, others: Sequence[Path]) -> list[tuple[str, str]]:
+    """Return names and SHA-256 of a file and others; of one of these that cannot be read its name only."""
+    found = [("", digest_of(path))]
+    for other in others:
+        name = os.path.relpath(other, path.parent)
+        try:
+            found.append((name, digest_of(other)))
+        except OSError:
+            found.append((name, ""))
+    return found
 
 
 RUNS_WORTH_PROCESSES = 300

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.results.report import ReportResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.load import Sessions
+    from dbbstation.tasks.load import Recorded, Sessions
     from dbbstation.tasks.models import Model
     from dbbstation.tasks.telling import Progress
 
@@ -116,8 +116,14 @@ def report(
     if identified is not None:
         for session in found.sessions:
             check_model_is_of(session.machine, identified.model.machine)
-        modelled = _modelled(paths, identified, (tests, exclude), telling)
-        ranked = _ranked(paths if before is None else [Path(before)], identified, (tests, exclude), telling)
+        runs = _read(paths, (tests, exclude), telling)
+        modelled = _modelled(runs, identified, telling)
+        if lacks_physics(identified.report):
+            ranked = Ranked(why_not=_PHYSICS_MISSING)
+        else:
+            nominal = paths if before is None else [Path(before)]
+            of_them = runs if before is None else _read(nominal, (tests, exclude), telling)
+            ranked = _ranked(of_them, [path.name for path in nominal], identified, telling)
     reported = Reported(found, TOLERATED, settings, coverage_factor, former, modelled, job, ranked, place)
     lacking = certified_of(reported).lacking
     if certificate and lacking:
@@ -137,45 +143,57 @@ def report(
     return replace(numbers, pdf=paper)
 
 
-def _modelled(
-    paths: Sequence[Path], identified: IdentifiedModel, chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
-) -> Modelled:
-    """Return what a model leaves; a run that it cannot take leaves the report without that, and says so.
+_PHYSICS_MISSING = (
+    "Physics is missing from the model: its causes cannot be ranked. `dbbstation diagnose` looks for what it lacks."
+)
+
+
+def _read(
+    paths: Sequence[Path], chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
+) -> Recorded | StationError:
+    """Return the runs of sessions, read once for all parts of a report, or why they cannot be read.
 
     Args:
         paths: of the sessions.
-        identified: the model.
         chosen: tests to take, and to leave out.
-        telling: told each stage.
+        telling: told how far it is.
     """
-    tests, exclude = chosen
     try:
-        found = evaluate(paths, identified, tests=tests, exclude=exclude, progress=telling.stage)
+        return loaded(paths, *chosen, telling)
+    except StoppedError:
+        raise
+    except StationError as error:
+        return error
+
+
+def _modelled(runs: Recorded | StationError, identified: IdentifiedModel, telling: Telling) -> Modelled:
+    """Return what a model leaves; a run that it cannot take leaves the report without that, and says so."""
+    if isinstance(runs, StationError):
+        return Modelled(identified, None, str(runs))
+    try:
+        found = evaluate(runs, identified, progress=telling.stage)
     except StoppedError:
         raise
     except StationError as error:
         return Modelled(identified, None, str(error))
-    return Modelled(identified, replace(found, tolerances=None))
+    return Modelled(identified, replace(found, tolerances=None, notes=(*found.notes, *runs.warnings)))
 
 
 def _ranked(
-    paths: Sequence[Path], identified: IdentifiedModel, chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
+    recorded: Recorded | StationError, names: Sequence[str], identified: IdentifiedModel, telling: Telling
 ) -> Ranked:
     """Return what each cause of a model contributes to circles under nominal programs; a session that it cannot take has none, and says so.
 
     Args:
-        paths: of the sessions: those before, where there are some.
+        recorded: runs: those before, where there are some; or why they cannot be read.
+        names: of their sessions.
         identified: the model.
-        chosen: tests to take, and to leave out.
         telling: told each stage.
     """
     telling.stage("effects of causes")
-    if lacks_physics(identified.report):
-        return Ranked(
-            why_not="Physics is missing from the model: its causes cannot be ranked. `dbbstation diagnose` looks for what it lacks."
-        )
     try:
-        recorded = loaded(paths, *chosen, telling)
+        if isinstance(recorded, StationError):
+            raise recorded
         if any(one.commanded is not None for one in recorded.observations):
             return Ranked(
                 why_not="The circles ran under compensated programs, in which the model's causes are taken out already: `--before` ranks them on the "
@@ -198,4 +216,4 @@ def _ranked(
         return Ranked(why_not="The model has no cause that acts on these circles.")
     said = identified.report.get("diagnosis")
     verdicts = said.get("verdicts", {}) if isinstance(said, Mapping) else {}
-    return Ranked(", ".join(dict.fromkeys(path.name for path in paths)), found, verdicts)
+    return Ranked(", ".join(dict.fromkeys(names)), found, verdicts)

@@ -78,7 +78,7 @@ def test_an_index_cut_short_is_begun_anew(folder):
 
 def test_an_index_of_another_version_is_begun_anew(folder, monkeypatch):
     keep(folder)
-    monkeypatch.setattr(module, "VERSION", "another")
+    monkeypatch.setattr(module, "key_of", lambda _request: "another")
     assert known(folder) is None
 
 
@@ -156,6 +156,6 @@ def test_an_anchor_outlasts_an_index_that_is_begun_anew_on_purpose(folder, monke
     with Kept(folder, begin_anew=True) as index:
         assert index.of("a", STAMP) is None
         assert index.noted("a") == NotedAnchor("ab" * 32, "2026-11-23T08:00:00+00:00")
-    monkeypatch.setattr(module, "VERSION", "another")
+    monkeypatch.setattr(module, "key_of", lambda _request: "another")
     with Kept(folder) as index:
         assert index.noted("a").anchor == "ab" * 32

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
@@ -15,9 +16,9 @@ from dbbstation.plan.circle import Circle, Direction
 from dbbstation.quality.all_runs import BAR_UM, bar_of_all, programs_of_all
 from dbbstation.quality.answer import Advice, answer
 from dbbstation.quality.finding import FindingVerdict, Name
+from dbbstation.quality.forms import SIZES
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import COEFFICIENTS, Expected, Seen
-from dbbstation.quality.together import SIZES
 from dbbstation.trace.recording import Recording
 from tests.quality.sessions import Sound, finding_of, sound, spoilt
 from tests.quality.spoilers import elsewhere, larger, mirrored, turned
@@ -93,20 +94,25 @@ def test_another_bar_in_all_runs_is_asked_about_and_wrong_where_a_model_knows_th
 
 def test_how_much_likelier_another_bar_is_follows_from_the_dense_covariance() -> None:
     rng = np.random.default_rng(8)
-    effects = rng.normal(0.0, 20.0, (3, COEFFICIENTS, 4))
+    effects = rng.normal(0.0, 20.0, (2, COEFFICIENTS, 4))[[0, 0, 1, 1]]  # two repeats of two tests
+    seats = {test: rng.normal(0.0, 5.0, (COEFFICIENTS, 2)) for test in "ab"}
     circle = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0.0, 45, 1.5, 0, Direction.CCW)
     runs, off = [], []
-    for test, effect in zip("abc", effects, strict=True):
-        expected = Expected(np.zeros(2), 0.0, np.eye(3), effects_um={("machine", ""): effect})
-        run = SimpleNamespace(test=test, circle=circle, expected=expected, started_s=None, bar_stated=True)
+    for test, effect in zip("aabb", effects, strict=True):
+        known = {("machine", ""): effect, ("ball", test): seats[test]}
+        expected = Expected(np.zeros(2), 0.0, np.eye(3), effects_um=known)
+        run = SimpleNamespace(
+            test=test, mounting=test, circle=circle, expected=expected, started_s=None, bar_stated=True
+        )
         form = rng.normal(0.0, 1.0, COEFFICIENTS) + 300.0 * np.eye(COEFFICIENTS)[0]
         runs.append(SimpleNamespace(run=run, coefficients_um=form, u_um=1.0, drift_um_s=0.0))
         off.append(form)
-    machine, column = np.vstack(list(effects)), np.tile(np.eye(COEFFICIENTS)[0], 3)
+    machine, column = np.vstack(list(effects)), np.tile(np.eye(COEFFICIENTS)[0], 4)
+    seated = block_diag(*(np.vstack([seats[test]] * 2) for test in "ab"))
     with_bar, without = [], []
     for size in SIZES:
         # Noise of each run is half of what two runs of it differ by.
-        covariance = size**2 * machine @ machine.T + np.eye(len(column))
+        covariance = size**2 * machine @ machine.T + seated @ seated.T + np.eye(len(column))
         without.append(multivariate_normal.logpdf(np.concatenate(off), cov=covariance))
         covariance += BAR_UM**2 * np.outer(column, column)
         with_bar.append(multivariate_normal.logpdf(np.concatenate(off), cov=covariance))

@@ -11,6 +11,7 @@ from scipy.stats import binom, chi2
 
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.quality.finding import FindingVerdict, Name
+from dbbstation.quality.forms import Forms
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import COEFFICIENTS, Expected, seen
 from dbbstation.quality.together import Together, expected_beside
@@ -26,6 +27,24 @@ def run(test: str, circle: Circle) -> SimpleNamespace:
     return SimpleNamespace(run=SimpleNamespace(test=test, circle=circle, expected=expected))
 
 
+def beside(runs, off, effects) -> Together:
+    """Forms with a noise of one micrometre, as they are."""
+    tests = tuple(each.run.test for each in runs for _ in range(N))
+    first, others = (
+        Forms(
+            effects[rows],
+            np.zeros((len(off[rows]), 0)),
+            off[rows, None],
+            0.0,
+            tests[rows],
+            dict.fromkeys(tests, N),
+            np.eye(len(off[rows])),
+        )
+        for rows in (slice(N), slice(N, None))
+    )
+    return Together(runs, first, others)
+
+
 @pytest.mark.parametrize("direction", list(Direction))
 def test_a_circle_lies_where_draws_of_the_same_causes_put_it(direction: Direction) -> None:
     """A machine of six causes, 0.3 times their usual size: 95 % of the centres are inside, and the mean is known to a tenth."""
@@ -33,12 +52,11 @@ def test_a_circle_lies_where_draws_of_the_same_causes_put_it(direction: Directio
     start, elevation = np.radians(30.0), 60.0
     circle = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 30.0, 45, 1.5, elevation, direction)
     effects = rng.normal(0.0, 100.0, (N * TESTS, 6))
-    machine, rest = effects @ effects.T, np.eye(N * TESTS)
     runs = tuple(run(str(k), circle) for k in range(TESTS))
     inside, draws, shifts = 0, 300, []
     for _ in range(draws):
         off = effects @ rng.normal(0.0, 0.3, 6) + rng.normal(0.0, 1.0, N * TESTS)
-        found = expected_beside(Together(runs, off, machine, rest))  # type: ignore[arg-type]  # what is asked of runs is there
+        found = expected_beside(beside(runs, off, effects))  # type: ignore[arg-type]  # what is asked of runs is there
         # A shift d along the start of the turn, and one e across it along the travel, move readings by cos 60° (d cos phi + e sin phi).
         along, across = np.sqrt(2.0) * off[1] / 0.5, np.sqrt(2.0) * off[N // 2 + 1] / 0.5 * direction.sign
         turn = np.array([[np.cos(start), -np.sin(start)], [np.sin(start), np.cos(start)]])
@@ -55,13 +73,12 @@ def test_tests_that_stray_widen_what_is_expected() -> None:
     rng = np.random.default_rng(5)
     circle = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0.0, 45, 1.5, 0, Direction.CCW)
     effects = rng.normal(0.0, 100.0, (N * TESTS, 6))
-    machine, rest = effects @ effects.T, np.eye(N * TESTS)
     runs = tuple(run(str(k), circle) for k in range(TESTS))
     of_machine = effects @ rng.normal(0.0, 1.0, 6)
     sizes = []
     for size_um in (1.0, 10.0):
         off = of_machine + rng.normal(0.0, size_um, N * TESTS)
-        found = expected_beside(Together(runs, off, machine, rest))  # type: ignore[arg-type]
+        found = expected_beside(beside(runs, off, effects))  # type: ignore[arg-type]
         sizes.append(float(np.sqrt(np.trace(found.covariance_mm2))))
     assert 5.0 < sizes[1] / sizes[0] < 20.0
 

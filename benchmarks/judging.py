@@ -1,0 +1,71 @@
+"""What the verdicts of a session cost by its number of circles: sixty beside thirty, each judged beside those before it.
+
+    python -m benchmarks.judging [--json]
+
+The fifteen circles of [CAL Table II] in both directions, at 50 Hz, once and with a repeat of each. Processor time of this process.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks.measuring import Row, show  # isort: skip - sets up the environment
+
+from dbbstation.files.recordings.judged import planned_circles, run_of
+from dbbstation.files.recordings.session import read_session
+from dbbstation.quality.judge import SessionRuns
+from dbbstation.quality.knowledge import seen
+from tests.plant.plan import table_ii_plan
+from tests.plant.session import record
+
+if TYPE_CHECKING:
+    from dbbstation.files.recordings.session import SessionFolder
+
+SEED = 8
+RATE_HZ = 50.0
+WANTED = 2.2
+
+
+def cost_s(session: SessionFolder) -> list[float]:
+    """Return what each verdict costs: its circle analysed, and judged beside those before it [s]."""
+    planned = planned_circles(session, None)
+    together, known, costs = SessionRuns([]), [], []
+    for entry in session.runs:
+        recording = session.load(entry).recording
+        begun = time.process_time()
+        one = seen(run_of(session, entry, recording, None, planned))
+        known.append(one)
+        together = SessionRuns(known, together)
+        together.judge(one)
+        costs.append(time.process_time() - begun)
+    return costs
+
+
+def main() -> None:
+    """Measure and print."""
+    plan = table_ii_plan(SEED)
+    again = replace(plan, repeat_at_end=tuple(test.name for test in plan.tests))
+    costs = []
+    with tempfile.TemporaryDirectory() as folder:
+        for k, each in enumerate((plan, again)):
+            place = Path(folder) / str(k)
+            record(place, seed=SEED, plan=each, rate_hz=RATE_HZ)
+            cost_s(read_session(place))
+            costs.append(cost_s(read_session(place)))
+    once, twice = costs
+    rows = [
+        Row(f"{len(once)} circles", sum(once), "s"),
+        Row(f"{len(twice)} circles", sum(twice), "s"),
+        Row(f"  over {len(once)}", sum(twice) / sum(once), "times", f"wanted: {WANTED:g} at the most"),
+        Row("third circle", 1e3 * twice[2], "ms"),
+        Row("last circle", 1e3 * twice[-1], "ms"),
+    ]
+    show("verdicts while a session is measured", rows, "processor time, second of two rounds")
+
+
+if __name__ == "__main__":
+    main()

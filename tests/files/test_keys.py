@@ -109,7 +109,7 @@ def test_a_simulation_is_of_modules_that_are_imported_late(simulator):
     text = "\n".join("python: tank.py" if line.startswith("program") else line for line in YAML.splitlines())
     text = text.replace("time_limit_s: 20", "")
     (simulator / "tank.py").write_text(
-        "from dbbstation.own import Simulator\nclass Tank(Simulator):\n    def simulate(self, inputs, parameters, ports): ...\n"
+        "from dbbstation.own import Simulator\nclass Tank(Simulator):\n    def simulate(self, inputs, parameters, ports):\n        ports.flow(0.0, {})\n"
     )
     before = content(simulator, text)
     for name in ("helper.py", "late/deep.py"):

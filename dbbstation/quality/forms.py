@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.triangle import triangle_of
 from dbbstation.quality.knowledge import COEFFICIENTS, HIGHEST_HARMONIC, along_travel
 from dbbstation.quality.stated import unseen_um2
 
@@ -68,7 +67,7 @@ class Forms:
         p, q = self.machine.shape[1], self.rest.shape[1]
         few = np.hstack([self.machine, self.rest, self.off])
         if len(few) > few.shape[1]:
-            few = triangle_of(few)
+            few = np.linalg.qr(few, mode="r")
         axes, grown = _whitening(few[:, p : p + q])
         few = axes.T @ few / grown[:, None]
         # Rounding leaves 1e-16 of the largest variance, which is some 1e6 times that of noise, beside which all count.

@@ -1,6 +1,6 @@
 """What tests assert, as a list: sentences, exit codes, figures; and what a change to the tests has lost.
 
-    python -m tests.assertions COMMIT [--out docs/validation/assertions.json]
+    python -m tests.assertions COMMIT [--out tests/stored/assertions.json]
 
 Reads the tests of a commit and those of this checkout. An assertion is an `assert`, an expected exception or a call of
 `numpy.testing`, as it is written; a case is a row of `parametrize`. What the commit had in a tier and this checkout has in that tier

@@ -13,16 +13,14 @@ from pathlib import Path
 import pytest
 
 import dbbstation as dbb
-from dbbstation.demo import run_demo
+from dbbstation.demo import QUICK, run_demo
 
 SCRIPT = Path(__file__).parents[1] / "docs" / "examples" / "whole_job.py"
-
-
-TESTS = "abdfhjkn"
+EIGHT = "abdfhjkn"
 """Of the fifteen: all three heights, tilted and level; half of the work."""
 
 
-@pytest.mark.nightly  # fewer circles are in CI
+@pytest.mark.nightly  # the three tests of `demo --quick` are in CI
 def test_the_whole_job(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "dbbstation", "demo", "--out", "job", "--json"],
@@ -37,13 +35,14 @@ def test_the_whole_job(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_whole_job_on_eight_of_its_circles(tmp_path):
+@pytest.mark.parametrize("tests", [QUICK, pytest.param(EIGHT, marks=pytest.mark.nightly)], ids=["quick", "eight"])
+def test_the_whole_job_on_some_of_its_circles(tmp_path, tests):
     told = []
-    result = run_demo(tmp_path / "job", 3, told.append, lambda *_: None, TESTS)
+    result = run_demo(tmp_path / "job", 3, told.append, lambda *_: None, tests)
     steps = [line.removeprefix("dbbstation ").split()[0] for line in told]
     assert steps == ["measure", "calibrate", "diagnose", "program", "measure", "evaluate", "evaluate", "report"]
     printed = {name: json.loads(answer) for name, answer in result.printed.items()}
-    _does_the_whole_job(tmp_path / "job", {"runs": [asdict(run) for run in result.runs], **printed}, len(TESTS))
+    _does_the_whole_job(tmp_path / "job", {"runs": [asdict(run) for run in result.runs], **printed}, len(tests))
 
 
 def _does_the_whole_job(job, result, tests):

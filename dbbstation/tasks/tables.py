@@ -260,7 +260,7 @@ class _Reader:
         variables = [self._variable(name, kept[name]) for name in chosen]
         varying = [v for v in variables if v is not None and not self._is_the_difference(v, kept)]
         at = self._variable(clock, kept[clock], quiet=True) if clock else None
-        others = [v for v in varying if clock is None or v.name != clock]
+        others = self._once([v for v in varying if clock is None or v.name != clock])
         cells = {name: [cell for file in self._files for cell in file.cells[name]] for name in self._names}
         table = Table(
             measured=kept[asked.measured],
@@ -403,6 +403,17 @@ class _Reader:
             return None
         known = meaning if meaning.unit or meaning.kind is not Kind.ANY else PLAIN
         return Variable(name, known.unit, known.kind, values, known.period, meaning.driven)
+
+    def _once(self, variables: Sequence[Variable]) -> list[Variable]:
+        """Variables but for those that have the values of one before them: rows could not tell one from the other."""
+        kept: list[Variable] = []
+        for variable in variables:
+            same = next((one.name for one in kept if np.array_equal(one.values, variable.values)), None)
+            if same is None:
+                kept.append(variable)
+            else:
+                self._notes.append(f"`{variable.name}` has the values of `{same}` in all rows and is left out")
+        return kept
 
     def _is_the_difference(self, variable: Variable, kept: Mapping[str, NDArray[np.float64]]) -> bool:
         """Whether a column is made of measured and simulated value, such as their difference."""

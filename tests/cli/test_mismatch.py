@@ -72,6 +72,16 @@ def test_a_size_that_matters_is_held_against_what_is_found(run, tmp_path):
     assert "a size that matters must be above zero, not 0" in outcome.err
 
 
+def test_a_column_that_is_there_twice_is_taken_once(run, warm, tmp_path):
+    rows = [line.split(",") for line in warm.read_text().splitlines() if not line.startswith("#")]
+    again = rows[0].index("place_mm")
+    path = tmp_path / "twice.csv"
+    path.write_text("\n".join(",".join([*row, "again_mm" if row is rows[0] else row[again]]) for row in rows) + "\n")
+    outcome = run("mismatch", path, *QUICK, "--json")
+    assert "`again_mm` has the values of `place_mm` in all rows and is left out" in outcome.err
+    assert "again_mm" not in {variable["name"] for variable in outcome.data["variables"]}
+
+
 def test_a_program_reads_the_same_and_the_files_hold_it(run, warm, tmp_path):
     out, figure = tmp_path / "out.csv", tmp_path / "figure.svg"
     outcome = run("mismatch", warm, *QUICK, "--json", "--out", out, "--figure", figure)

@@ -106,13 +106,17 @@ def compared(
     lines |= {"demo": (DEMO, True)} if asked.demo else {}
     lines |= {"tests": (TESTS, False)} if asked.tests else {}
     wanted = {name: line for name, line in lines.items() if re.search(asked.only, name)}
+    # Each has a model of its own: their format grew.
+    models = [{**places, "model": f"{places['model']}-{k}"} for k in range(len(checkouts))]
+    for checkout, own in zip(checkouts, models, strict=True):
+        ran(checkout, ("calibrate", "{session}", "--out", "{model}"), own)
     found: dict[str, list[tuple[float, float]]] = {}
     for number in range(asked.rounds):
         for name, (words, module) in wanted.items():
             if name in {"demo", "tests"} and number:
                 continue
             for k, checkout in enumerate(checkouts):
-                used = ran(checkout, otherwise.get(name, words) if k else words, places, module=module)
+                used = ran(checkout, otherwise.get(name, words) if k else words, models[k], module=module)
                 known = found.setdefault(name, [])
                 known[k:] = [used if len(known) <= k else min(known[k], used), *known[k + 1 :]]
                 print(f"{number + 1} {name} {('here', 'there')[k]}: {used[0]:.2f} s, {used[1]:.0f} MB", file=sys.stderr)
@@ -138,7 +142,6 @@ def main() -> None:
             git("worktree", "add", "--detach", str(other), asked.commit)
         try:
             places = prepared(folder)
-            ran(ROOT, ("calibrate", "{session}", "--out", "{model}"), places)
             found = compared((ROOT, other), git("rev-parse", asked.commit), places, asked)
         finally:
             if asked.other is None:

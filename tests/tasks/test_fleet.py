@@ -11,6 +11,7 @@ from dataclasses import replace
 import pytest
 
 from dbbstation.cli import DONE, FAILED, USAGE
+from dbbstation.files import keys
 from dbbstation.results.fleet import TABLE
 from dbbstation.tasks import fleet as fleet_module
 from dbbstation.tasks.fleet import fleet
@@ -124,7 +125,8 @@ def test_what_is_up_to_date_is_not_done_again(sessions, tmp_path, monkeypatch):
     assert set(again().values()) == {"up-to-date"}
     assert set(again(anew=True).values()) == {"done"}
     own = fleet_module.program_identity()
-    monkeypatch.setattr(fleet_module, "program_identity", lambda: {**own, "code": "0" * 64})
+    for module in (fleet_module, keys):
+        monkeypatch.setattr(module, "program_identity", lambda: {**own, "code": "0" * 64})
     with pytest.raises(Exception, match="another program"):
         again()
 

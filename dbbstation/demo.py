@@ -46,8 +46,8 @@ if TYPE_CHECKING:
     from dbbstation.tasks.telling import Progress
 
 INSTRUMENT = "streaming-encoder"
-SPEED = ["--time-scale", "160", "--rate-hz", "20"]
-"""A hundred and sixty times faster than a real machine: 30 circles in twenty seconds instead of three quarters of an hour."""
+RATE = ["--rate-hz", "20"]
+"""Samples of a circle: some 1500."""
 
 COMPLIANCE_UM_KN = 9.68
 """Strut compliance with which the reference machine's circles bend as [GRAV Table 4] reports."""
@@ -167,7 +167,7 @@ class _Job:
     def measure(self, place: _Place, session: str, programs: list[str]) -> None:
         """Measure the virtual machine over its line."""
         arguments = ["measure", *self.what, "--instrument", INSTRUMENT, "--out", session, *programs]
-        line = ["--port", place.port, "--auto", place.control, *SPEED]
+        line = ["--port", place.port, "--auto", place.control, *RATE]
         bar = ["--bar-length-mm", "150", "--bar-uncertainty-um", "0.5"]
         self.tell("dbbstation " + " ".join(_short(argument) for argument in [*arguments, *line]))
         with subprocess.Popen(
@@ -195,7 +195,7 @@ class _Job:
         Raises:
             StationError: it does not start.
         """
-        command = [*_PROGRAM, "emulate", "--instrument", INSTRUMENT, *self.what, *arguments, *SPEED, "--json"]
+        command = [*_PROGRAM, "emulate", "--instrument", INSTRUMENT, *self.what, *arguments, *RATE, "--wait", "--json"]
         process = subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         try:
             first = process.stdout.readline() if process.stdout else ""

@@ -47,6 +47,11 @@ _LOOK_S = 0.2
     help="Factor by which machine and line run faster than real time.",
 )
 @click.option(
+    "--wait",
+    is_flag=True,
+    help="Let machine time pass only in runs, as fast as samples are read: for `measure --auto`, the same on any computer.",
+)
+@click.option(
     "--noise-um",
     type=Finite(min=0.0),
     default=0.3,
@@ -75,6 +80,7 @@ def emulate(
     programs: Path | None,
     rate_hz: float | None,
     time_scale: float,
+    wait: bool,
     noise_um: float,
     bar_um: float,
     baud: int | None,
@@ -102,14 +108,16 @@ def emulate(
     from dbbstation.virtual.control import CellCommands, ControlServer
     from dbbstation.virtual.machine import Sizes, VirtualMachine
     from dbbstation.virtual.wire import VirtualInstrument
-    from dbbstation.virtual.wire_clock import ScaledClock
+    from dbbstation.virtual.wire_clock import ScaledClock, WaitingClock
 
     protocol = at_rate(chosen_protocol(instrument, profile, zero_mm), rate_hz)
     machine, plan = read_machine(machine_file), read_plan(plan_file)
     model = _truth(machine, truth, source_files, seed)
     virtual = VirtualMachine(model, plan, seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))
     virtual.check()
-    clock = ScaledClock(time_scale)
+    if wait and protocol.ask.asked:
+        raise click.UsageError(f"--wait needs an instrument that streams; {protocol.name} is asked for each reading")
+    clock = WaitingClock() if wait else ScaledClock(time_scale)
     cell = VirtualCell(virtual, clock)
     commands = CellCommands(cell, None if programs is None else _programs(programs))
     with ExitStack() as stack:

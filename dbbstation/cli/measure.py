@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 from contextlib import contextmanager
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Direction
     from dbbstation.station.assembly import Workplace
     from dbbstation.station.engine import Station
+
+_WAITING_SCALE = 100.0
+"""About so much faster than real time passes the time of a machine that waits."""
 
 _AUTO_PATIENCE_S = 60.0
 """A virtual machine comes as soon as it has computed the run, or not at all [s of real time]."""
@@ -135,12 +139,12 @@ def _measured(asked: MeasureOptions) -> None:
     from dbbstation.files.recordings.entries import ReadBy
     from dbbstation.instrument.driver import Instrument
     from dbbstation.instrument.library import at_rate
+    from dbbstation.instrument.stamps import MachineTime
     from dbbstation.station.assembly import Job, assemble
     from dbbstation.station.detector import Patience
     from dbbstation.station.programs import load_programs
     from dbbstation.virtual.wire_clock import ScaledClock
 
-    clock = ScaledClock(asked.time_scale)
     machine = read_machine(asked.machine_file)
     plan = in_order(
         with_loss_limit(read_inline_plan(asked.plan_file), asked.largest_loss_percent), asked.order, asked.gate
@@ -149,6 +153,11 @@ def _measured(asked: MeasureOptions) -> None:
         asked.instrument, asked.profile, asked.zero_mm, bar_length_mm=asked.session.stated_length_mm()
     )
     protocol = at_rate(chosen, asked.rate_hz)
+    hands = None if asked.auto is None else VirtualHands(asked.auto)
+    stands_s = -math.inf if hands is None else hands.stands_since_s()
+    waits = math.isfinite(stands_s)
+    time_scale = _WAITING_SCALE if waits else asked.time_scale
+    clock = MachineTime(1.0 / protocol.fastest_hz(asked.baud), stands_s) if waits else ScaledClock(time_scale)
     job = Job(
         machine=machine,
         plan=plan,
@@ -159,20 +168,22 @@ def _measured(asked: MeasureOptions) -> None:
         if asked.auto is None
         else Patience(for_machine_s=_AUTO_PATIENCE_S * max(asked.time_scale, 1.0)),
         clock=clock,
-        time_scale=asked.time_scale,
+        time_scale=time_scale,
         rate_hz=protocol.fastest_hz(asked.baud),
         range_mm=protocol.length.range_mm,
         model=judging_model(asked.model_file, asked.source_files),
         # A real machine neither has a control address of `emulate` nor runs faster than it does.
         instrument=ReadBy(
-            chosen.name, asked.profile or "", asked.port, virtual=asked.auto is not None or asked.time_scale != 1.0
+            chosen.name,
+            asked.profile or "",
+            f"{asked.port}, in machine time" if waits else asked.port,
+            virtual=asked.auto is not None or asked.time_scale != 1.0,
         ),
     )
     job.check(str(asked.plan_file))
     say_sampling(plan.to_domain(), protocol, asked.baud)
     if asked.auto is None:  # a virtual machine has a bar of known length
         require_bar(job, asked.largest_bar_age_h)
-    hands = None if asked.auto is None else VirtualHands(asked.auto)
     with (
         spying(asked.spy, protocol, asked.port) as log,
         Instrument(
@@ -182,7 +193,7 @@ def _measured(asked: MeasureOptions) -> None:
             clock=clock,
             log=log,
             reconnect_s=RECONNECT_S,
-            **driver_patience(asked.time_scale),
+            **driver_patience(time_scale, waits=waits),
         ) as source,
     ):
         workplace = assemble(job, source, source.unreadable, asked=protocol.ask.asked)
@@ -262,6 +273,10 @@ class VirtualHands:
         """Return the name of the ball that stands on the virtual table."""
         ball = self._client.ask("status").get("ball")
         return None if ball is None else str(ball)
+
+    def stands_since_s(self) -> float:
+        """Return the machine time at which the machine stands; minus infinity where it does not wait [s]."""
+        return float(str(self._client.ask("status").get("stands_since_s", -math.inf)))
 
     def mount(self, test: str) -> None:
         """Put up the ball of a test."""

@@ -80,12 +80,14 @@ class Bar:
             at_once: draw it now, and not a moment later.
         """
         left = time_left(done / of, now_s() - self._started_s) if of else ""
-        now = {"completed": done, "total": of, "text": left + on_one_line(text)}
+        beside = left + on_one_line(text)
         if self._drawn is not None:
-            self._drawn.update(self._drawn.task_ids[0], refresh=at_once, **now)
+            task = self._drawn.task_ids[0]
+            self._drawn.update(task, completed=done, total=of, text=beside, refresh=at_once)
         elif _shown() and not (self._passing and os.environ.get("TERM") in _DUMB):
             self._drawn = _rich(self._form, passing=self._passing)
-            self._drawn.add_task(self.label, unit=self._unit, **now)
+            self._drawn.add_task(self.label, total=of, text=beside, unit=self._unit)
+            self._drawn.update(self._drawn.task_ids[0], completed=done)
             self._drawn.start()
 
     def end(self, *, done: bool = False) -> None:

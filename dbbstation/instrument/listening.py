@@ -11,7 +11,7 @@ from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage
 from dbbstation.instrument.doubt import Doubts, Piece
 from dbbstation.instrument.reception import INCOMPLETE
 from dbbstation.instrument.sequence import SampleOrder
-from dbbstation.instrument.stamps import StreamStamps
+from dbbstation.instrument.stamps import MachineTime, StreamStamps
 
 if TYPE_CHECKING:
     from dbbstation.instrument.link import Link
@@ -33,7 +33,11 @@ class Listener:
         self._sequence = SampleOrder[tuple[Piece, float, float]](protocol.counter_modulus, reception.where)
         # Behind the answer to a start command the stream begins with a whole frame.
         self._decoder = Decoder(protocol, joining=not (protocol.ask.start and protocol.ask.start[-1].reply))
-        self._stamps = StreamStamps(1.0 / protocol.fastest_hz(reception.baud), reception.memory_s)
+        self._stamps = (
+            reception.clock
+            if isinstance(reception.clock, MachineTime)
+            else StreamStamps(1.0 / protocol.fastest_hz(reception.baud), reception.memory_s)
+        )
         self._doubts = Doubts(protocol)
         self._arrivals = Arrivals(reception.character_s, 2 * LONGEST_LINE)
         self._good_s = time.monotonic()

@@ -11,6 +11,35 @@ from __future__ import annotations
 from collections import deque
 
 
+class MachineTime:
+    """Clock of a virtual machine that waits until every sample is read: samples are counted, and no arrival is timed.
+
+    As a clock it gives the time of the last sample.
+
+    Args:
+        period_s: between samples.
+        begins_s: machine time before the first sample [s].
+    """
+
+    def __init__(self, period_s: float, begins_s: float) -> None:
+        self._period_s = period_s
+        self._begins_s = begins_s
+        self._number = 0
+
+    def stamp(self, _seen_s: float, lost: int = 0) -> float:
+        """Return the time of the next sample, in s, at most a period early: where in its period it lies is unknown.
+
+        Args:
+            lost: samples missing before it.
+        """
+        self._number += 1 + lost
+        return self()
+
+    def __call__(self) -> float:
+        """Return the time of the last sample [s]."""
+        return self._begins_s + max(self._number - 1, 0) * self._period_s
+
+
 class StreamStamps:
     """Sample times of a stream that is paced by the device.
 

@@ -15,6 +15,10 @@ _SCALED_MEMORY_S, _SCALED_TIMEOUT_S = 60.0, 5.0
 arrival of samples for this long, and waits this long for a line that is silent [s of real time]."""
 
 
+_WAITING_TIMEOUT_S = 600.0
+"""A machine that waits is silent while runs are judged; where its program ends, the line is closed and nobody waits [s]."""
+
+
 class DriverPatience(TypedDict):
     """Arguments of `Instrument`."""
 
@@ -22,8 +26,15 @@ class DriverPatience(TypedDict):
     timeout_s: float | None
 
 
-def driver_patience(time_scale: float) -> DriverPatience:
-    """Return what `Instrument` takes on a clock that runs `time_scale` times faster than real."""
+def driver_patience(time_scale: float, *, waits: bool = False) -> DriverPatience:
+    """Return what `Instrument` takes on a clock that runs `time_scale` times faster than real.
+
+    Args:
+        time_scale: of the clock.
+        waits: the machine sends nothing between runs.
+    """
+    if waits:
+        return {"memory_s": _MEMORY_S, "timeout_s": _WAITING_TIMEOUT_S}
     if time_scale == 1.0:
         return {"memory_s": _MEMORY_S, "timeout_s": None}
     return {"memory_s": _SCALED_MEMORY_S * time_scale, "timeout_s": _SCALED_TIMEOUT_S}

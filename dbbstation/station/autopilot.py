@@ -22,6 +22,9 @@ MOST_REPEATS = 2
 class Hands(Protocol):
     """What moves the machine."""
 
+    def stands_since_s(self) -> float:
+        """Return the machine time at which a machine that waits stands; minus infinity for one that does not wait [s]."""
+
     def standing(self) -> str | None:
         """Return the name of the ball that stands on the table."""
 
@@ -76,7 +79,7 @@ class Autopilot:
             # Another program put something else up since: whatever stands there next is a new mounting.
             self._hands.mount(announced.run.test)
             remounted = True
-        self._send(Start(remounted=remounted))
+        self._send(Start(remounted=remounted, after_s=self._hands.stands_since_s()))
 
     def _act(self, state: State) -> None:
         if self._announced is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -15,9 +16,11 @@ class Start:
 
     Attributes:
         remounted: the holder was touched although the announcement did not ask for it, so this run gets a new mounting.
+        after_s: readings up to this machine time belong to what was before, also where they are read later [s].
     """
 
     remounted: bool = False
+    after_s: float = -math.inf
 
 
 @dataclass(frozen=True)

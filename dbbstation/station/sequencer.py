@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -122,6 +123,7 @@ class Sequencer:
         self._watch: CircleWatch | None = None
         self._reachable: Reachable | None = None
         self._remounted = False
+        self._after_s = -math.inf
         self._held = HeldLength()
         self._unjudged = deque(waiting)
         self._waiting_since_s: float | None = None
@@ -233,7 +235,7 @@ class Sequencer:
     # Commands.
 
     def _arm(self, command: Start) -> None:
-        self._remounted = command.remounted
+        self._remounted, self._after_s = command.remounted, command.after_s
         self._edges = EdgeDetector(self._circle())
         self._watch = CircleWatch(self._circle(), waits_for_feed_in=False)
         self._waiting_since_s = None
@@ -295,7 +297,8 @@ class Sequencer:
     def _take(self, reading: Reading) -> None:
         reading = self._held_against_feed(reading)
         outside = None
-        if self._edges is not None and reading.length_mm is not None and reading.status == OK:
+        new = self.state is not State.ARMED or reading.t_s > self._after_s
+        if new and self._edges is not None and reading.length_mm is not None and reading.status == OK:
             outside = self._edges.outside(reading.length_mm)
         if self._waiting_since_s is None:
             self._waiting_since_s = reading.t_s

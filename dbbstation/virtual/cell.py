@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import MachineError
+from dbbstation.virtual.wire_clock import WaitingClock
 
 if TYPE_CHECKING:
     from dbbstation.plan.circle import Direction
     from dbbstation.virtual.machine import VirtualMachine, VirtualRun
     from dbbstation.virtual.path import CommandedPath
     from dbbstation.virtual.wire_clock import ScaledClock
-
-STAND_S = 0.2
-"""Real time that the bar stands outside before each run: on a fast clock the path's own dwell may pass while the program
-at the other end of the line is not looking [s]."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +77,7 @@ class VirtualCell:
         self._refuse_while_running("put the bar on its calibrator")
         with self._lock:
             self._running, self._block_mm = None, length_mm
+        self._clock.run_until(math.inf)
 
     def start(self, test: str, direction: Direction, path: CommandedPath | None = None) -> VirtualRun:
         """Start a run now; its ball is put up first where another one stands.
@@ -93,11 +92,14 @@ class VirtualCell:
         run = self.machine.run(test, direction, path=path, begin_s=self._clock() - self._origin_s)
         with self._lock:
             self._block_mm = None
-            self._running = _Running(run, self._clock() + STAND_S * self._clock.scale)
+            self.machine.restart_noise()
+            self._running = _Running(run, self._clock() + self._clock.stand_s())
+        self._clock.run_until(self._running.begin_s + run.path.duration_s)
         return run
 
     def stop(self) -> None:
         """Stop the machine where it is and lay the bar aside."""
+        self._clock.settle()
         with self._lock:
             self._running = self._block_mm = None
 
@@ -111,6 +113,7 @@ class VirtualCell:
 
     def status(self) -> dict[str, object]:
         """What the cell does, as plain values."""
+        self._clock.settle()
         with self._lock:
             running = self._running
         ball = self.machine.mounted
@@ -119,6 +122,8 @@ class VirtualCell:
             "ball": None if ball is None else ball.name,
             "mounting": self.machine.mountings or None,
         }
+        if isinstance(self._clock, WaitingClock):
+            told["stands_since_s"] = self._clock()
         if running is not None:
             elapsed_s = min(max(self._clock() - running.begin_s, 0.0), running.run.path.duration_s)
             told |= {
@@ -130,5 +135,6 @@ class VirtualCell:
         return told
 
     def _refuse_while_running(self, what: str) -> None:
+        self._clock.settle()
         if self.running:
             raise MachineError(f"cannot {what} while a run goes on", where="virtual machine", remedy="wait, or stop it")

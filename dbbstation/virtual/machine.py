@@ -84,6 +84,7 @@ class VirtualMachine:
         self._under_spindle: dict[int, tuple[Ball, SetUp, tuple[Fitted, ...]]] = {}
         self._bar = self._scatter.bar(_BAR)
         self._noise = np.random.default_rng([seed, 5])
+        self._restarted = 0
 
     @property
     def bar_error_mm(self) -> float:
@@ -139,6 +140,11 @@ class VirtualMachine:
         measurement = self._of_the_measurement(planned, begin_s)
         model = replace(self.truth, sources=(*self.truth.sources, *measurement))
         return VirtualRun(test, direction, self.mountings, path, model.bar(motion).length_mm)
+
+    def restart_noise(self) -> None:
+        """Begin the noise of a run: it shall not depend on how many samples nobody read before."""
+        self._restarted += 1
+        self._noise = np.random.default_rng([self._scatter.seed, 5, self._restarted])
 
     def noise_mm(self) -> float:
         """Return the error of the next reading [mm]."""

@@ -37,6 +37,10 @@ _BACKLOG = 4096
 each with the length of its own time: on a fast clock a busy computer would otherwise lose thousands at once."""
 
 
+_UNDER_WAY = 64
+"""Frames on the line behind which a clock that waits stands still."""
+
+
 @dataclass(slots=True)
 class _Outgoing:
     """Bytes on their way: the first is complete one character time after `start_s`."""
@@ -188,6 +192,8 @@ class VirtualInstrument:
                     if self.protocol.ask.mode == "stream":
                         self._sample(now_s, connected=end.connected)
                     self._transmit(end, now_s)
+                    if len(self._outgoing) < _UNDER_WAY:
+                        self.clock.advance()
         except Exception as error:  # noqa: BLE001 (raised again by `stop`, in the thread that can be told)
             self._failure = error
 
@@ -202,6 +208,8 @@ class VirtualInstrument:
                 due_s, tick_s = self._next_sample_s, _IDLE_S
             else:
                 return _IDLE_S
+            if len(self._outgoing) >= _UNDER_WAY:
+                return tick_s
             return min(max(self.clock.real_s(due_s - self.clock()), 0.0), tick_s)
 
     def _hear(self, raw: bytes) -> None:

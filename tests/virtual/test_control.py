@@ -13,11 +13,11 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
-from dbbstation.virtual.cell import STAND_S, VirtualCell
+from dbbstation.virtual.cell import VirtualCell
 from dbbstation.virtual.control import CellCommands, ControlServer
 from dbbstation.virtual.control_client import ControlClient
 from dbbstation.virtual.machine import Sizes, VirtualMachine
-from dbbstation.virtual.wire_clock import ScaledClock
+from dbbstation.virtual.wire_clock import STAND_S, ScaledClock
 from tests.instrument.leaks import nothing_left_open
 
 if TYPE_CHECKING:

@@ -14,7 +14,9 @@ from dbbstation import __version__
 from dbbstation.cli.interrupted import politely_ended
 from dbbstation.cli.lazy import LazyGroup
 from dbbstation.cli.output import echo, say
+from dbbstation.cli.progress import Compiling
 from dbbstation.cli.streams import drop_output, drop_unwritable, flush_output, open_missing
+from dbbstation.computing.compiling import tell_of_compiling
 from dbbstation.errors import StationError
 from dbbstation.files.inputs import input_book
 from dbbstation.files.refused import in_a_sentence
@@ -104,6 +106,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # Read when NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     warnings.showwarning = _noted
+    tell_of_compiling(Compiling())
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = _DEBUG in given
     try:

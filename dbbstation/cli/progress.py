@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import click
 
+from dbbstation.cli.output import say
 from dbbstation.text.printable import on_one_line
 
 if TYPE_CHECKING:
@@ -120,6 +121,25 @@ def _rich(form: str, *, passing: bool) -> Progress:
         refresh_per_second=5,
         transient=passing,
     )
+
+
+class Compiling:
+    """Says on a terminal, once, that loops are compiled, and shows a bar meanwhile."""
+
+    def __init__(self) -> None:
+        self._bar = Bar("compiling", ENDLESS, passing=True)
+        self._said = False
+
+    def __call__(self, begun: bool) -> None:  # noqa: FBT001 - as the compiler tells it
+        """Take that a loop begins to be compiled, or that it is."""
+        if not begun:
+            self._bar.end()
+            return
+        if not self._said and _shown():
+            say("compiling the numerical loops, once on this computer: up to half a minute")
+            self._said = True
+        if not hasattr(sys.stderr, "rich_proxied_file"):  # another bar is there already
+            self._bar.show()
 
 
 @contextmanager

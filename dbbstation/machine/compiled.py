@@ -12,6 +12,8 @@ from itertools import pairwise
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+from dbbstation.computing.compiling import listen_to_compiler
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
@@ -81,6 +83,7 @@ class _Kernel:
             if self._dispatcher is None:
                 import numba  # noqa: PLC0415 - takes a third of a second
 
+                _listen()
                 function = cast("FunctionType", self._function)
                 seen = {name: function.__globals__.get(name) for name in function.__code__.co_names}
                 parts = {name: part.dispatcher() for name, part in seen.items() if isinstance(part, _Kernel)}
@@ -93,6 +96,9 @@ class _Kernel:
                     _say_not_kept()
                 self._dispatcher = cast("Callable[..., Any]", made)
             return self._dispatcher
+
+
+_listen = cache(listen_to_compiler)
 
 
 @cache

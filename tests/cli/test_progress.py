@@ -95,6 +95,43 @@ def test_lines_that_are_said_meanwhile_stand_above_the_bar(monkeypatch):
     assert len(last) == 2
 
 
+def test_compiling_is_said_once_with_a_bar_that_goes(monkeypatch):
+    def work() -> None:
+        told = progress.Compiling()
+        for _ in range(2):
+            told(True)  # noqa: FBT003 - as the compiler tells it
+            told(False)  # noqa: FBT003
+
+    seen = watched(work, monkeypatch)
+    assert seen.last == ["compiling the numerical loops, once on this computer: up to half a minute"]
+    assert any(line.startswith("compiling ━") for lines in seen.screens for line in lines)
+
+
+SOME_KERNEL = """
+import sys
+from dbbstation.computing.compiling import tell_of_compiling
+from dbbstation.machine.compiled import compiled
+told = []
+tell_of_compiling(told.append)
+def twice(x):
+    return 2.0 * x
+kernel = compiled(twice)
+assert kernel(1.0) == kernel(1.0) == 2.0
+print(told)
+"""
+
+
+def test_whoever_asks_is_told_of_a_loop_that_is_compiled_and_not_of_one_that_is_kept(tmp_path):
+    script = tmp_path / "some.py"
+    script.write_text(SOME_KERNEL)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    said = [
+        subprocess.run([sys.executable, script], env=environment, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert said == ["[True, False]\n", "[]\n"]
+
+
 def test_in_a_pipe_is_nothing(run):
     outcome = run(*PROGRAM[3:])
     assert outcome.code == DONE

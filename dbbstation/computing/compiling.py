@@ -1,0 +1,40 @@
+"""Who is told when numerical loops are compiled, which takes seconds and happens once on a computer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_told: list[Callable[[bool], None]] = []
+
+
+def tell_of_compiling(tell: Callable[[bool], None]) -> None:
+    """Call `tell` with True when a loop begins to be compiled in this process, and with False when it is."""
+    _told[:] = [tell]
+
+
+def listen_to_compiler() -> None:
+    """Hand on what the compiler says; code that was kept on disk is loaded, and nobody is told."""
+    from numba.core import event  # noqa: PLC0415 - a third of a second, of which the compiler's user has paid already
+
+    class Listener(event.Listener):
+        """Counts compilations that are parts of others."""
+
+        def __init__(self) -> None:
+            self.depth = 0
+
+        def on_start(self, _: object) -> None:
+            self.depth += 1
+            if self.depth == 1:
+                for tell in _told:
+                    tell(True)  # noqa: FBT003 - begun
+
+        def on_end(self, _: object) -> None:
+            self.depth -= 1
+            if self.depth == 0:
+                for tell in _told:
+                    tell(False)  # noqa: FBT003 - ended
+
+    event.register("numba:compile", Listener())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import Motion
 
+
+HELD = 1e-9
+"""Share of its plausible size to which a parameter is known that is at the end of its range."""
 
 GEOMETRY = frozenset({"strut-reference-length", "base-joints"})
 """Sources that are where joints stand and how long struts are: there is no formula of it that a machine could depart from. What these
@@ -85,6 +88,18 @@ class Layout:
         ]
         amplitudes = np.array([number for number, shape in numbered if not shape], dtype=np.int64)
         return amplitudes, np.array([number for number, shape in numbered if shape], dtype=np.int64)
+
+    @property
+    def limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and greatest value of every column, shape (k,) each: parameters of shape stay on their grid and one step beyond it."""
+        each = [p.limits for term in self.terms for p in term.parameters]
+        return np.array([low for low, _ in each]), np.array([high for _, high in each])
+
+    def held_at(self, x: NDArray[np.float64], columns: NDArray[np.int64]) -> Layout:
+        """The same with some columns known to be what they are in x, shape (k,)."""
+        nominal, prior = self.nominal.copy(), self.known.prior.copy()
+        nominal[columns], prior[columns] = x[columns], HELD * self.known.scale[columns]
+        return replace(self, nominal=nominal, known=replace(self.known, prior=prior))
 
     @property
     def bounded(self) -> NDArray[np.bool_]:

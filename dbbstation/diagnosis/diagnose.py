@@ -105,7 +105,7 @@ def diagnose(
         shifts=shifts_between(before, after),
         second_start_agrees=settled.second_start_agrees(),
         cancelling=_cancelling(explained),
-        next_tests=() if settled.at_limit else next_tests(explained, findings, elsewhere),
+        next_tests=next_tests(explained, findings, elsewhere),
     )
 
 
@@ -154,9 +154,9 @@ def doubtful(explained: Explained, findings: Sequence[SourceFinding]) -> set[str
 def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
     """What no named cause explains: the unmodelled effect that brings most, where one is there for sure."""
     settled = explained.settled
-    posterior, shapes = settled.posterior, settled.unmodelled.shapes
-    effects = [m for m in settled.best.members if m.cause.name in shapes]
-    sure = posterior.probability(shapes) >= SURE
+    posterior, unmodelled = settled.posterior, settled.unmodelled
+    effects = [m for m in settled.best.members if unmodelled.of(m)]
+    sure = posterior.probability(unmodelled.follows) >= SURE
     if not effects or not sure:
         found = remainder_of(settled.after, settled.noise)
         if not is_missing_physics(left) and found.probability >= SIGNIFICANT:
@@ -170,18 +170,14 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
         rms_um, where = _where(settled.after.observations, found)
         return Unexplained(max(1e3 * left.rms, rms_um), None, None, 0.0, f"{text} {where}")
     member = max(effects, key=lambda m: settled.best.log_factor(m.cause.name))
-    shape = shapes[member.cause.name]
     curve = curve_of(explained.channel, settled, member)
-    where = f"strut {shape.strut}" if shape.strut else "no single strut"
+    where = "no single strut" if curve.strut is None else f"strut {curve.strut}"
+    if len(unmodelled.of(member)) > 1:
+        where = f"each strut by its own curve, strut {curve.strut} most"
     text = f"An unmodelled effect, organised by {curve.variable}, {where}."
-    if settled.at_limit:
-        text = (
-            "Nothing that is listed explains these recordings down to the noise. The strongest unmodelled effect is organised by "
-            f"{curve.variable}, {where}; other causes are at work beside it, or its curve has another form."
-        )
     rms_um = 1e3 * left.rms if is_missing_physics(left) else curve.unconcealed_um
     gain = settled.best.log_factor(member.cause.name)
-    return Unexplained(rms_um, shape.strut, curve.follows, gain, text, curve)
+    return Unexplained(rms_um, curve.strut, curve.follows, gain, text, curve)
 
 
 def _quick(settled: SettledCircles) -> Unexplained:

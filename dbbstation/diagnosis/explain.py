@@ -17,21 +17,21 @@ from dbbstation.calibration.outliers.strange_runs import in_place_after_all
 from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.explained import MOST_MEMBERS, Explained, SettledCircles
-from dbbstation.diagnosis.unmodelled import Unmodelled
+from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
-from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, Posterior, search
+from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, search
 from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.calibration.outliers.outlier import Fit, Outlier
-    from dbbstation.inference.harmonics import Spectrum
+    from dbbstation.inference.hypotheses import Posterior
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.projection import BesideBase
     from dbbstation.machine.geometry import Machine
@@ -46,6 +46,10 @@ SEEDS = 3
 
 GRID = 0.3
 """Share to which nonlinear parameters are known from the grid of the comparison, about its spacing, in a second try."""
+
+IDLE = 0.9
+"""Share of its prior standard deviation above which a nonlinear parameter is not determined: the runs say less than a quarter of what
+was known before."""
 
 STEPS = 2
 """Times that the nonlinear parameters of a rival are improved."""
@@ -120,7 +124,8 @@ def _settle(channel: CircleChannel, progress: Callable[[str], None]) -> SettledC
     tried: set[frozenset[tuple[str, str]]] = set()
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     refused: dict[str, str] = {}
-    looked, likely = False, CLOSE  # the most probable set alone is wanted, until nothing changes
+    given_up: set[tuple[str, str]] = set()
+    likely = CLOSE  # the most probable set alone is wanted, until nothing changes
     for left in reversed(range(MOST_ROUNDS)):
         channel.give_back()
         target = channel.target(fit)
@@ -128,15 +133,22 @@ def _settle(channel: CircleChannel, progress: Callable[[str], None]) -> SettledC
         noise_mm = float(np.sqrt(noise.power[0]))
         beside = channel.beside_base(noise_mm, scatter)
         comparison = beside.comparison(target)
-        causes = _listed(channel, unmodelled, comparison, refused)
+        causes = _listed(channel, unmodelled, comparison, refused, given_up)
         likely = likely if left else LIKELY
         posterior = search(comparison, causes, seeds.values(), most_members=MOST_MEMBERS, likely=likely)
-        if posterior.at_limit:
-            return _without_a_name(channel, unmodelled, noise, scatter)
         best = _steady(posterior, fitted)
         seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[:SEEDS])}
         settled = SettledCircles(
-            fit, posterior, best, comparison, causes, unmodelled, noise, misfit_of(fit, noise), refused, scatter=scatter
+            fit,
+            posterior,
+            best,
+            comparison,
+            causes,
+            unmodelled,
+            noise,
+            misfit_of(fit, noise),
+            refused,
+            scatter=scatter,
         )
         usual = _usual_scatter(fit) if any(m.cause.setup for m in best.members) else scatter
         rough = [(m, r) for m, r in _with_rivals(settled) if (r.cause.name, r.variant.law) not in laid_out]
@@ -155,16 +167,17 @@ def _settle(channel: CircleChannel, progress: Callable[[str], None]) -> SettledC
         tried.add(named)
         progress("joint fit with " + (", ".join(sorted(name for name, _ in named)) or "nothing more"))
         joint = _joint(channel, comparison, best)
-        impossible = _impossible(joint, settled, channel)
-        if joint is None or impossible:
+        if joint is None:
+            break
+        impossible, idle = _negative(joint, channel), _idle_laws(joint, channel)
+        if impossible or idle:
             refused |= impossible
+            given_up |= idle
             continue
+        if not fitted:
+            unmodelled.look(joint, settled.members, noise_mm)
         fit, fitted = joint, named
-        for name, law in sorted(named):
-            channel.refine(name, law, _values_in(fit, name), fit)
-        if not looked:
-            unmodelled.look(fit, settled.members, noise_mm)
-            looked = True
+        _refine(channel, fit, named)
     return _fitted_as_named(channel, settled)
 
 
@@ -180,43 +193,33 @@ def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
 
 
 def _listed(
-    channel: CircleChannel, unmodelled: Unmodelled, comparison: ModelComparison, refused: Collection[str]
+    channel: CircleChannel,
+    unmodelled: Unmodelled,
+    comparison: ModelComparison,
+    refused: Collection[str],
+    given_up: Collection[tuple[str, str]],
 ) -> tuple[Cause, ...]:
-    """Causes that are compared: those with a name, faults of the set-up, and effects that none of the former has among its forms."""
-    known = named_already(comparison, unmodelled.causes, channel.forms(but_for=refused))
-    nameless = [cause for cause in unmodelled.causes if cause.name not in known]
-    return (*(c for c in channel.named if c.name not in refused), *channel.set_up, *nameless)
+    """Causes that are compared: those with a name, faults of the set-up, and effects that none of the former has among its forms.
 
-
-def _without_a_name(channel: CircleChannel, unmodelled: Unmodelled, noise: Spectrum, scatter: float) -> SettledCircles:
-    """What is said where nothing listed explains the recordings: the base fit, and the strongest unmodelled effect beside it.
-
-    Names of a set that has grown to its limit were wrong wherever that was tried.
+    Laws that were given up are no forms of their cause any more.
     """
-    fit = channel.calibration
-    comparison = channel.beside_base(float(np.sqrt(noise.power[0])), scatter).comparison(channel.target(fit))
-    scan = comparison.scan((), unmodelled.causes)
-    worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
-    strongest = int(worth.argmax())
-    alone = Hypothesis((scan.best[strongest],), float(worth[strongest]), (float(scan.log_factor[strongest]),))
-    posterior = Posterior(
-        (alone, Hypothesis((), 0.0)), {alone.names: alone.log_posterior, frozenset(): 0.0}, at_limit=True
+    forms = [variant for cause in unmodelled.causes for variant in cause.variants]
+    known = dict(zip(map(id, forms), named_already(comparison, forms, channel.forms(but_for=refused)), strict=True))
+    nameless = [cause for cause in map(partial(_but_for, known=known), unmodelled.causes) if cause.variants]
+    lawful = (
+        replace(c, variants=tuple(v for v in c.variants if (c.name, v.law) not in given_up))
+        for c in channel.named
+        if c.name not in refused
     )
-    causes = (*channel.named, *channel.set_up, *unmodelled.causes)
-    left = misfit_of(fit, noise)
-    return SettledCircles(
-        fit, posterior, alone, comparison, causes, unmodelled, noise, left, at_limit=True, scatter=scatter
-    )
+    return (*lawful, *channel.set_up, *nameless)
 
 
-def _impossible(joint: Calibration | None, settled: SettledCircles, channel: CircleChannel) -> dict[str, str]:
-    """Causes that no machine has as these recordings ask for them, and what to say of it."""
-    if joint is not None:
-        return _negative(joint, channel)
-    # An amplitude of next to nothing leaves a nonlinear parameter beside it without a hold, or a step leaves what the machine can
-    # reach: that cause cannot be modelled here.
-    weakest = min(settled.members, key=lambda m: settled.best.log_factor(m.cause.name))
-    return {weakest.cause.name: "No machine with it explains these recordings: the joint fit does not settle."}
+def _but_for(cause: Cause, known: Mapping[int, bool]) -> Cause:
+    """The unmodelled effect without the forms that have a name; one curve for each strut has it where every strut alone has."""
+    kept = [v for v in cause.variants if not known[id(v)]]
+    if [v.label for v in kept] == [EACH]:
+        kept = []
+    return cause if len(kept) == len(cause.variants) else replace(cause, variants=tuple(kept))
 
 
 def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:
@@ -233,6 +236,25 @@ def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:
             why = impossibly_negative(parameter.name, value, sigma, parameter.unit) if parameter.positive else ""
             if why:
                 found[term.source.name] = why
+    return found
+
+
+def _idle_laws(fit: Calibration, channel: CircleChannel) -> set[tuple[str, str]]:
+    """Laws of a joint fit, by cause, whose nonlinear parameters the runs do not determine, and which contain a simpler law.
+
+    Such a parameter is at an end of its range or as uncertain as before, or the fit does not settle with it.
+    """
+    sigma, prior = np.sqrt(fit.solution.variance), fit.layout.known.prior
+    found = set()
+    for term in fit.layout.terms:
+        source = term.source
+        simpler = source.simpler_law
+        if simpler is None or (source.name, simpler) not in channel.sources:
+            continue
+        shapes = fit.layout.columns_of(source.name)[1]
+        idle = np.isin(shapes, fit.at_limit) | (sigma[shapes] > IDLE * prior[shapes])
+        if idle.any() or not fit.settled:
+            found.add((source.name, source.law))
     return found
 
 
@@ -287,7 +309,7 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
         if values is not None
     }
     every = [*default_sources(), *(channel.source_of(m.cause.name, m.variant) for m in members)]
-    for within in (None, GRID):
+    for within, must_settle in ((None, True), (GRID, True), (GRID, False)):
         # A shape that these runs hardly see, such as a decay shorter than their samples, runs away with its amplitude.
         try:
             return calibrate(
@@ -297,6 +319,7 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
                 start,
                 shapes_within=within,
                 amplitudes_within=float(SCALES[-1]),
+                must_settle=must_settle,
             )
         except (CalibrationError, KinematicsError):
             continue
@@ -331,6 +354,12 @@ def _estimated(
 def _values_in(fit: Calibration, name: str) -> dict[str, NDArray[np.float64]]:
     """Values of all parameters of a cause in a fit, by set."""
     return {term.shared: fit.x[term.columns] for term in fit.layout.terms if term.source.name == name}
+
+
+def _refine(channel: CircleChannel, fit: Calibration, named: Collection[tuple[str, str]]) -> None:
+    """Lay out named causes, each by the law that it follows, at their values in a fit."""
+    for name, law in sorted(named):
+        channel.refine(name, law, _values_in(fit, name), fit)
 
 
 def _lay_out(

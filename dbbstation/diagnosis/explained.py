@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
 
 MOST_MEMBERS = 12
-"""Causes of a hypothesis at which the comparison ends without a name. Each takes part of what none of them is, and the next one is
-called in for what they leave: hypotheses grew to 61 members. Sessions that the list explains have at most 8."""
+"""Causes of a hypothesis at the most: it grows no further. Sessions that the list explains have at most 8."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +38,6 @@ class SettledCircles:
         noise: measured on what all causes together leave.
         left: misfit of the joint fit.
         refused: causes that cannot be what these recordings show, and why.
-        at_limit: nothing listed explains the recordings down to the noise: `after` is the base fit, no cause is named, and `best` has
-            the strongest unmodelled effect alone.
         scatter: how many times as much as stated balls scatter.
     """
 
@@ -53,16 +50,10 @@ class SettledCircles:
     noise: Spectrum
     left: Misfit
     refused: Mapping[str, str] = field(default_factory=dict)
-    at_limit: bool = False
     scatter: float = 1.0
 
-    def second_start_agrees(self) -> bool | None:
-        """Whether a search that begins with nothing, about the same fit, comes to the same most probable set of causes.
-
-        None where the comparison ended at its limit: there is no such set.
-        """
-        if self.at_limit:
-            return None
+    def second_start_agrees(self) -> bool:
+        """Whether a search that begins with nothing, about the same fit, comes to the same most probable set of causes."""
         anew = search(self.comparison, self.causes, most_members=MOST_MEMBERS, likely=CLOSE)
         return anew.best.names == self.posterior.best.names
 

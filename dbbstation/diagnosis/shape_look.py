@@ -7,6 +7,7 @@ is still exact but for the width of a piece. The best few of each kind are compa
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -207,7 +208,39 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
     for moves in (BALL, TABLE):
         sums = look.sums("position of the platform", None, moves, _place)
         found += _best("position of the platform", "step", None, moves, sums, _lines(sums.at), _LINES_APART)
-    return found
+    return _shared(found, extent)
+
+
+def _shared(found: Sequence[Shape], extent: Ranges) -> list[Shape]:
+    """The same with each wave and ringing of a strut on all struts, at the form of the strut that shows it most.
+
+    One effect of six struts is then one cause: forms of two struts that no recording tells apart would count as two.
+    """
+    kept: list[Shape] = []
+    for shape in sorted(found, key=lambda one: -one.explained):
+        if shape.strut is None or shape.kind not in {"wave", "ringing"}:
+            kept.append(shape)
+        elif not any(_is_one(shape, other, extent) for other in kept):
+            kept += [replace(shape, strut=strut) for strut in range(1, STRUTS + 1)]
+    return kept
+
+
+def _is_one(one: Shape, other: Shape, extent: Ranges) -> bool:
+    """Whether two forms of struts differ by less than half a wave over the extent of their variable, or a few steps of the scan."""
+    if other.strut is None or one.follows != other.follows:
+        return False
+    if isinstance(one.form, Wave) and isinstance(other.form, Wave):
+        length = float(np.max(extent.high[one.variable] - extent.low[one.variable]))
+        return abs(one.form.frequency - other.form.frequency) * length < HALF
+    if isinstance(one.form, Ringing) and isinstance(other.form, Ringing):
+        step = float(np.log(RINGING_PERIODS_S[1] / RINGING_PERIODS_S[0]))
+        return abs(float(np.log(one.form.period / other.form.period))) < HALF * _RINGS_APART * step
+    return False
+
+
+HALF = 0.5
+"""Of a wave over the extent, and of the neighbours that are about the same: two forms that differ by less lie between the same two
+independent ones."""
 
 
 _FORCES, _TIMES, _STEPS = 200, 100, 40
@@ -258,7 +291,10 @@ def _best(
         return []
     curves = np.stack([form.columns(sums.at) for form in forms], axis=1)
     tried = max(len(forms) / apart, 1.0)
-    return [Shape(variable, kind, strut, moves, forms[k], tried) for k in _peaks(sums.explained(curves), STRONGEST)]
+    explained = sums.explained(curves)
+    return [
+        Shape(variable, kind, strut, moves, forms[k], tried, float(explained[k])) for k in _peaks(explained, STRONGEST)
+    ]
 
 
 def _peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
@@ -284,11 +320,11 @@ def _finer(
     moves: str,
     sums: DirectionalSums,
     grid: NDArray[np.float64],
-    explained: NDArray[np.float64],
+    of_grid: NDArray[np.float64],
 ) -> list[Shape]:
     extent = float(np.ptp(sums.at))
     found = []
-    for k in _peaks(explained, MADE_FINER):
+    for k in _peaks(of_grid, MADE_FINER):
         waves, best = NearbyWaves(sums, float(grid[k])), grid[k]
         for step in FINER:
             near = best + np.arange(-15, 16) * step / extent
@@ -297,7 +333,8 @@ def _finer(
             best = near[int(by_near.argmax())]
         found.append((float(by_near.max()), Wave(float(best))))
     found.sort(key=lambda one: -one[0])
-    return [Shape(variable, "wave", strut, moves, wave, len(grid) / 2.0) for _, wave in found[:STRONGEST]]
+    tried = len(grid) / 2.0
+    return [Shape(variable, "wave", strut, moves, wave, tried, explained) for explained, wave in found[:STRONGEST]]
 
 
 def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArray[np.float64]:

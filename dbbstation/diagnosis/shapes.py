@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dbbstation.inference.forms import Form, LinearSplines, Lobes, Plane, Proportional, SignForm, Spring, Wave
+from dbbstation.inference.forms import Form, LinearSplines, Lobes, Plane, Proportional, SignForm, Spring, Walk, Wave
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
 from dbbstation.sources.contract import Effect
@@ -139,6 +139,7 @@ class Shape:
         moves: what moves; where that is every strut and a strut is given, only that one.
         form: of the curve.
         tried: how many independent forms it was picked from.
+        explained: sum of squares that it explains by itself where it was picked, in units of the noise.
     """
 
     variable: str
@@ -147,6 +148,7 @@ class Shape:
     moves: str
     form: Form
     tried: float = 1.0
+    explained: float = 0.0
 
     @property
     def follows(self) -> Follows:
@@ -354,6 +356,11 @@ def shapes(extent: Ranges) -> list[Shape]:
             Shape("strut-length", "", strut, SIGNED, _usual("strut-length", extent, strut))
             for strut in range(1, STRUTS + 1)
         ]
+    lengths = extent.low["strut-length"], extent.high["strut-length"]
+    found += [
+        Shape("strut-length", "", k + 1, EVERY, LinearSplines(low, high, FINE))
+        for k, (low, high) in enumerate(zip(*lengths, strict=True))
+    ]
     for name in ("time", *warmed):
         if name in extent.low and name not in OF_STRUTS:
             found += [Shape(name, "", None, moves, _usual(name, extent, None)) for moves in (READING, BALL)]
@@ -377,6 +384,23 @@ def shapes(extent: Ranges) -> list[Shape]:
         turned = LinearSplines(extent.low["angle since the start"], extent.high["angle since the start"])
         found.append(Shape("angle since the start", "", None, READING, turned))
     return found
+
+
+FINE = 25
+"""Points of a curve over strut length that may have kinks: the reference machine's struts move by 30 mm from one to the next."""
+
+
+def wander(runs: Sequence[Samples]) -> list[Shape]:
+    """A slow wander of the reading, within runs and from one to the next: a random walk over the time; none without times."""
+    times = [run.values["time"] for run in runs if "time" in run.values]
+    if len(times) < len(runs):
+        return []
+    at = np.unique(np.concatenate([np.linspace(one.min(), one.max(), WALK_STEPS + 1) for one in times]))
+    return [Shape("time", "wander", None, READING, Walk(at, 60.0))]
+
+
+WALK_STEPS = 8
+"""Of a wander within a run, straight between them: what it does within an eighth of a run counts as noise."""
 
 
 def _usual(name: str, extent: Ranges, strut: int | None) -> Form:

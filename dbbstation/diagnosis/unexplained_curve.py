@@ -12,14 +12,15 @@ is a place, along the line on which it changes most.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from dbbstation.diagnosis.findings import Curve, CurvePoint
 from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, READING, TABLE, TOOL, TOWARDS, UNITS
+from dbbstation.diagnosis.unmodelled import EACH
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.forms import SPLINES, LinearSplines, Plane, PlaneStep
+from dbbstation.inference.forms import LinearSplines, Plane, PlaneStep, Walk
 from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.square_root import free_directions
 
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.explained import SettledCircles
     from dbbstation.diagnosis.shapes import Samples, Shape
+
+Number = TypeVar("Number", np.float64, np.int64)
 
 LINE_OUT = "less the straight line that fits it best over the readings: joints and reference length make that"
 MEAN_OUT = {
@@ -66,37 +69,37 @@ def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) ->
         settled: what the comparison came to.
         member: of its most probable hypothesis, the effect.
     """
-    shapes, runs, comparison = settled.unmodelled.shapes, settled.unmodelled.runs, settled.comparison
-    shape = shapes[member.cause.name]
-    together = [m for m in settled.best.members if m is member or _adds(shape, shapes.get(m.cause.name))]
+    unmodelled, runs, comparison = settled.unmodelled, settled.unmodelled.runs, settled.comparison
+    shape = _largest(settled, member)
+    together = [m for m in settled.best.members if m is member or any(_adds(shape, s) for s in unmodelled.of(m))]
     others = [m for m in settled.best.members if m not in together]
     sized = max(
         ([replace(m, scale=size * m.scale) for m in together] for size in SIZES),
         key=lambda some: comparison.log_evidence([*some, *others]),
     )
-    columns = np.concatenate([m.variant.columns for m in together])
     found = comparison.estimates([*sized, *others])
-    ends = np.cumsum([0, *(len(m.variant.columns) for m in together)])
-    pieces = [
-        _along(runs, shapes[m.cause.name], found.values[a:b])
-        for m, a, b in zip(together, ends[:-1], ends[1:], strict=True)
-    ]
+    each = [s for m in together for s in unmodelled.of(m)]
+    ends = np.cumsum([0, *(len(part) for m in together for part in _parts(unmodelled.of(m), m.variant.columns))])
+    own = [k for k, one in enumerate(each) if one is shape or _adds(shape, one)]
+    rows = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in own])
+    columns = np.concatenate([m.variant.columns for m in together])[rows]
+    pieces = [_along(runs, each[k], found.values[ends[k] : ends[k + 1]]) for k in own]
     amplitudes = np.concatenate([piece.amplitudes for piece in pieces])
-    at, to_points = _summed(runs, [shapes[m.cause.name] for m in together], pieces)
-    spread = found.covariance[: ends[-1], : ends[-1]]
+    at, to_points = _summed(runs, [each[k] for k in own], pieces)
+    spread = found.covariance[np.ix_(rows, rows)]
     values, covariance = to_points @ amplitudes, to_points @ spread @ to_points.T
     covariance = covariance + np.eye(len(at)) * _not_followed(settled, together) * np.mean(values**2)
     known, machine = channel.base, np.flatnonzero(~channel.base.random)
     free = free_directions(known, machine, channel.held)
     blocks = channel.blocks(columns, np.zeros(channel.runs[-1].stop))
     signature = concealment(blocks, machine, len(known.prior) + np.arange(len(columns)), amplitudes, free)
-    alone = len(together) == 1
-    alike = len({shapes[m.cause.name].kind for m in together}) == 1
+    alone = len(own) == 1
+    alike = len({each[k].kind for k in own}) == 1
     return Curve(
         follows=shape.follows if alike else replace(shape.follows, kind=""),
         unit=UNITS[shape.variable],
         strut=shape.strut,
-        form=shape.form.text(UNITS[shape.variable]) if alone else f"sum of {len(together)}",
+        form=shape.form.text(UNITS[shape.variable]) if alone else f"sum of {len(own)}",
         period=shape.period if alone else None,
         direction=pieces[0].direction,
         convention=", ".join(dict.fromkeys(piece.words for piece in pieces if piece.words)),
@@ -109,9 +112,22 @@ def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) ->
     )
 
 
-def _adds(one: Shape, other: Shape | None) -> bool:
+def _largest(settled: SettledCircles, member: Member) -> Shape:
+    """Shape of a member, that of the strut with the largest curve where each strut has its own."""
+    shapes = settled.unmodelled.of(member)
+    found = settled.comparison.estimates([member, *settled.best.without(member.cause.name)])
+    parts = _parts(shapes, found.values[: len(member.variant.columns)])
+    return max(zip(shapes, parts, strict=True), key=lambda one: float(one[1] @ one[1]))[0]
+
+
+def _parts(shapes: Sequence[Shape], values: NDArray[Number]) -> list[NDArray[Number]]:
+    """Values of amplitudes, or their columns, by shape: all shapes of a form have as many."""
+    return np.split(values, len(shapes))
+
+
+def _adds(one: Shape, other: Shape) -> bool:
     """Whether two effects are errors of one thing over one variable, so that their sum is a curve as well."""
-    if other is None or one.variable not in OF_STRUTS or one.strut is None:
+    if one.variable not in OF_STRUTS or one.strut is None:
         return False
     return (one.variable, one.strut, one.moves) == (other.variable, other.strut, other.moves)
 
@@ -138,9 +154,11 @@ def _not_followed(settled: SettledCircles, together: Sequence[Member]) -> float:
     scale = max(m.scale for m in together)
     # Those picked from many forms would find something in noise as well: more than one for each amplitude.
     every = [
-        Member(cause, cause.variants[0], scale)
+        Member(cause, variant, scale)
         for cause in unmodelled.causes
-        if unmodelled.shapes[cause.name].tried == 1.0 or cause.name in names
+        for variant in cause.variants
+        if variant.label != EACH
+        and (unmodelled.shapes[cause.name, variant.label][0].tried == 1.0 or cause.name in names)
     ]
     without = comparison.explained(others)
     own = comparison.explained([*together, *others]) - without
@@ -185,6 +203,8 @@ def _along(runs: Sequence[Samples], shape: Shape, found: NDArray[np.float64]) ->
 def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[NDArray[np.float64], str]:
     """Matrix that takes what is conventional out of the amplitudes of a curve, and what that is."""
     count = shape.form.count
+    if isinstance(shape.form, Walk):
+        return np.eye(count), "counted from its first value"
     if not isinstance(shape.form, LinearSplines) or shape.moves not in MEAN_OUT:
         return np.eye(count), ""
     straight = shape.variable == "strut-length"
@@ -230,8 +250,10 @@ def _values(shape: Shape, run: Samples) -> NDArray[np.float64]:
 
 
 def _weights(runs: Sequence[Samples], shape: Shape) -> NDArray[np.float64]:
-    """How many readings lie about each point of a piecewise linear curve, shape (7,)."""
-    return np.asarray(sum(shape.form.columns(_values(shape, run)).reshape(-1, SPLINES).sum(axis=0) for run in runs))
+    """How many readings lie about each point of a piecewise linear curve, shape (p,)."""
+    return np.asarray(
+        sum(shape.form.columns(_values(shape, run)).reshape(-1, shape.form.count).sum(axis=0) for run in runs)
+    )
 
 
 def _extent(runs: Sequence[Samples], shape: Shape, flat: NDArray[np.float64] | None) -> tuple[float, float]:

@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
+from dbbstation.diagnosis.parts import ALIKE
 from dbbstation.diagnosis.shape_look import TemplateScan, looked_for
-from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Samples, Shape, ranges, samples_of, shapes
+from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Follows, Samples, Shape, ranges, samples_of, shapes, wander
 from dbbstation.inference.blocks import with_random
 from dbbstation.inference.model_comparison import Cause, Variant
 from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.channel import CircleChannel
@@ -30,15 +33,19 @@ struts, and the frequencies or places that a kind was picked from."""
 class Unmodelled:
     """Unmodelled effects over a channel; they may become more.
 
+    An effect that any strut may have is one cause: its forms are one curve for all struts, the curve of one strut, and one for each.
+
     Attributes:
         runs: as shapes see them.
-        shapes: by the name of the cause.
+        follows: what each cause is a function of, by its name.
+        shapes: by name of the cause and label of its form; one for each strut where each has its own.
         causes: with their columns in the channel.
     """
 
     channel: CircleChannel
     runs: list[Samples] = field(init=False)
-    shapes: dict[str, Shape] = field(default_factory=dict)
+    follows: dict[str, Follows] = field(default_factory=dict)
+    shapes: dict[tuple[str, str], tuple[Shape, ...]] = field(default_factory=dict)
     causes: list[Cause] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -48,7 +55,7 @@ class Unmodelled:
             samples_of(motion, channel.machine, reading, pivot)
             for motion, reading in zip(channel.motions, channel.readings, strict=True)
         ]
-        self._add(shapes(ranges(self.runs)))
+        self._add([*shapes(ranges(self.runs)), *wander(self.runs)])
 
     def look(self, fit: Calibration, members: Sequence[Member], noise_mm: float) -> None:
         """Look for waves, bumps, steps and pulses in what a fit leaves, beside its base and causes, and take them in.
@@ -67,29 +74,61 @@ class Unmodelled:
         look = TemplateScan(self.runs, list(fit.residual_mm), base, known, channel.held, noise_mm)
         self._add(looked_for(look, ranges(self.runs)))
 
+    def of(self, member: Member) -> tuple[Shape, ...]:
+        """Shapes of an effect in its form; none of a cause that has a name."""
+        return self.shapes.get((member.cause.name, member.variant.label), ())
+
     def _add(self, more: Sequence[Shape]) -> None:
-        """Take in shapes: columns of the channel, and prior odds shared by all kinds, struts and forms tried."""
-        more = [shape for shape in more if _name(shape) not in self.shapes]
+        """Take in shapes: columns of the channel, and one cause for those of one kind that differ in their strut alone."""
+        families: dict[str, list[Shape]] = {}
+        for shape in more:
+            families.setdefault(_name(shape), []).append(shape)
+        families = {name: family for name, family in families.items() if name not in self.follows}
+        more = [shape for family in families.values() for shape in family]
         if not more:
             return
         pieces = [np.hstack([shape.columns(run) for shape in more]) for run in self.runs]
         columns = self.channel.columns.add(np.vstack(pieces))
-        self.shapes |= {_name(shape): shape for shape in more}
-        first = 0
-        for shape in more:
-            size = shape.columns(self.runs[0]).shape[1]
-            variant = Variant(columns[first : first + size], np.full(size, PLAUSIBLE_MM))
-            struts = STRUTS + 1 if shape.strut is not None else 1
-            odds = FAMILY_ODDS - float(np.log(KINDS * struts * shape.tried))
-            self.causes.append(Cause(_name(shape), (variant,), odds, named=False))
-            first += size
+        for name, family in families.items():
+            counts = np.cumsum([shape.columns(self.runs[0]).shape[1] for shape in family])
+            own, columns = np.split(columns[: counts[-1]], counts[:-1]), columns[counts[-1] :]
+            odds = FAMILY_ODDS - float(np.log(KINDS * family[0].tried))
+            self.follows[name] = family[0].follows
+            self.causes.append(Cause(name, tuple(self._variants(name, family, own)), odds, named=False))
 
+    def _variants(self, name: str, family: Sequence[Shape], columns: Sequence[NDArray[np.int64]]) -> Iterator[Variant]:
+        """Forms of one cause: kinds of forms are equally likely, and struts of a kind."""
+        forms: list[tuple[tuple[Shape, ...], NDArray[np.int64]]] = [
+            ((shape,), own) for shape, own in zip(family, columns, strict=True)
+        ]
+        single = [form for form in forms if form[0][0].strut is not None]
+        if len(single) == STRUTS:
+            forms.append((tuple(some[0] for some, _ in single), np.concatenate([own for _, own in single])))
+        kinds = [[form for form in forms if _label(form[0]).startswith(kind)] for kind in ("strut", ALIKE, EACH)]
+        kinds = [kind for kind in kinds if kind]
+        for kind in kinds:
+            for some, own in kind:
+                self.shapes[name, _label(some)] = some
+                weight = -float(np.log(len(kinds) * len(kind)))
+                yield Variant(own, np.full(len(own), PLAUSIBLE_MM), label=_label(some), log_weight=weight)
+
+
+EACH = "each strut its own"
+"""Label of the form that has a curve for each strut."""
 
 KINDS = 30
 """Combinations of variable, kind of curve and what moves, about."""
 
 
+def _label(shapes: Sequence[Shape]) -> str:
+    """Label of a form: the strut that it acts on."""
+    if len(shapes) > 1:
+        return EACH
+    return f"strut {shapes[0].strut}" if shapes[0].strut else ALIKE
+
+
 def _name(shape: Shape) -> str:
-    """Unique name of an unmodelled effect."""
-    where = f"strut {shape.strut}" if shape.strut else "no single strut"
-    return f"unmodelled: {shape.follows}, {where}, {shape.form.text('')}"
+    """Name of the cause that a shape is a form of: a dent or a step is at its own place on one strut."""
+    own = f", strut {shape.strut}" if shape.strut and shape.kind in {"bump", "step"} else ""
+    text = shape.form.text("")
+    return f"unmodelled: {shape.follows}{own}{', ' + text if text else ''}"

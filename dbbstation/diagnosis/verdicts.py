@@ -33,12 +33,6 @@ TESTABLE_SHARE = 0.5
 
 OPEN = "These tests leave it open: they neither show nor exclude it."
 
-NO_NAME = (
-    "No name is given: nothing that is listed explains these recordings down to the noise, and beside what is not listed no cause can "
-    "be judged."
-)
-"""Text of every cause where the comparison ended at its limit."""
-
 
 def judge(explained: Explained, anew: ChosenAnew | None = None) -> tuple[SourceFinding, ...]:
     """One finding per named cause, those that are there first.
@@ -79,11 +73,6 @@ class _Judge:
 
     def findings(self) -> tuple[SourceFinding, ...]:
         """All of them."""
-        if self._settled.at_limit:
-            return tuple(
-                replace(self._finding(c), verdict=Verdict.NOT_TESTABLE, text=NO_NAME, probability=ABSENT)
-                for c in self._named.values()
-            )
         found = [self._finding(cause) for cause in self._named.values()]
         found += [_refused(name, why) for name, why in self._settled.refused.items()]
         return tuple(sorted(found, key=lambda f: (f.verdict.rank, -f.gain)))
@@ -196,8 +185,8 @@ class _Judge:
 
     def _in_words(self, *names: str) -> tuple[str, ...]:
         """Names of causes; of an unmodelled effect the variable that it follows."""
-        shapes = self._settled.unmodelled.shapes
-        return tuple(f"an unmodelled effect over {shapes[n].follows}" if n in shapes else n for n in names)
+        follows = self._settled.unmodelled.follows
+        return tuple(f"an unmodelled effect over {follows[n]}" if n in follows else n for n in names)
 
     def _testable(self, name: str) -> bool:
         """Whether plausible amplitudes would be seen beside base and causes; half of their combinations at least."""

@@ -129,28 +129,29 @@ class Alternatives:
 
 
 def named_already(
-    comparison: ModelComparison, nameless: Sequence[Cause], named: Iterable[tuple[Variant, float]]
-) -> frozenset[str]:
-    """Unmodelled effects, of `MOST_ALIKE` amplitudes at the most, that a named cause has among its forms, within what its formula may be off by.
+    comparison: ModelComparison, nameless: Sequence[Variant], named: Iterable[tuple[Variant, float]]
+) -> list[bool]:
+    """Whether a named cause has each form of an unmodelled effect among its own, within what its formula may be off by.
 
-    They are that cause and no hypothesis of their own: listed beside it they would share its probability. What is left of an effect beside a
-    form is counted over all its amplitudes together, each by what is seen of it: a shift of balls that no circle shows decides nothing.
+    Such a form, of `MOST_ALIKE` amplitudes at the most, is that cause and no hypothesis of its own: listed beside it they would share its
+    probability. What is left of an effect beside a form is counted over all its amplitudes together, each by what is seen of it: a shift of
+    balls that no circle shows decides nothing.
 
     Args:
         comparison: of columns.
-        nameless: the unmodelled effects.
+        nameless: forms of unmodelled effects.
         named: forms of named causes, and by how much their formula may be off, as a share of the effect.
     """
-    found: set[str] = set()
+    found = np.zeros(len(nameless), dtype=bool)
     by_size: dict[int, list[tuple[NDArray[np.int64], float]]] = {}
     for variant, share in named:
         if share > 0.0 and len(variant.columns) <= MOST_ALIKE:
             by_size.setdefault(len(variant.columns), []).append((variant.columns, share))
     for size, forms in by_size.items():
-        alike = [cause for cause in nameless if len(cause.variants[0].columns) == size]
-        if not alike:
+        alike = np.array([k for k, form in enumerate(nameless) if len(form.columns) == size], dtype=np.int64)
+        if not len(alike):
             continue
-        own = np.array([cause.variants[0].columns for cause in alike])
+        own = np.array([nameless[k].columns for k in alike])
         other = np.array([columns for columns, _ in forms])
         products = comparison.beside((), np.concatenate([own.ravel(), other.ravel()]))
         count = len(own)
@@ -163,9 +164,8 @@ def named_already(
         shown = np.square(np.matmul(across.transpose(1, 0, 2), roots)).sum(axis=2)
         shown = shown.reshape(len(other), count, size).sum(axis=2).T
         apart = np.sqrt(np.maximum(1.0 - shown / np.maximum(whole, 1e-300)[:, None], 0.0))
-        inside = (apart <= [share for _, share in forms]).any(axis=1)
-        found |= {cause.name for cause, is_inside in zip(alike, inside, strict=True) if is_inside}
-    return frozenset(found)
+        found[alike] = (apart <= [share for _, share in forms]).any(axis=1)
+    return found.tolist()
 
 
 MOST_ALIKE = 3

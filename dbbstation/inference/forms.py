@@ -48,25 +48,59 @@ class Form(ABC):
 
 @dataclass(frozen=True, eq=False)
 class LinearSplines(Form):
-    """Any smooth curve: straight between seven points. Limits are arrays where every strut has its own."""
+    """Any smooth curve: straight between points, seven if nothing is said. Limits are arrays where every strut has its own."""
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+    number: int = SPLINES
 
     @property
     def count(self) -> int:
         """One amplitude per point."""
-        return SPLINES
+        return self.number
+
+    def text(self, unit: str) -> str:
+        """How many points, where there are more than usual."""
+        del unit
+        return f"{self.number} points" if self.number != SPLINES else ""
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """One at its own point, zero at all others."""
-        place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (SPLINES - 1)
-        return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(SPLINES)))
+        place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (self.number - 1)
+        return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(self.number)))
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         """Its own points, in the middle between struts that have their own."""
         del low, high
-        return np.linspace(np.mean(self.low), np.mean(self.high), SPLINES)
+        return np.linspace(np.mean(self.low), np.mean(self.high), self.number)
+
+
+@dataclass(frozen=True, eq=False)
+class Walk(Form):
+    """A random walk: straight between its points, and each step as large as the root of its length.
+
+    Args:
+        at: its points, rising, shape (p + 1,).
+        unit: length of a step of unit size, in the unit of the variable.
+    """
+
+    at: NDArray[np.float64]
+    unit: float
+
+    @property
+    def count(self) -> int:
+        """One amplitude per step."""
+        return len(self.at) - 1
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Zero before a step, its size behind it."""
+        steps = np.diff(self.at)
+        return np.clip((values[..., None] - self.at[:-1]) / steps, 0.0, 1.0) * np.sqrt(steps / self.unit)
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Its own."""
+        del low, high
+        return self.at
 
 
 @dataclass(frozen=True, eq=False)

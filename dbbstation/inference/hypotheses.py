@@ -93,8 +93,8 @@ class Posterior:
     Attributes:
         hypotheses: that were looked at, most probable first.
         weights: log posterior of every set of names that was scored and is not negligible.
-        at_limit: the search ended early: a set of as many causes as were allowed was the most probable one, and each of them was
-            worth its odds. Nothing that was listed explains the target down to the noise, and names mean nothing then.
+        at_limit: a larger set than is allowed would have been more probable than the best one. What the best sets have in common is as
+            sure as ever; something beside them is not explained.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -138,14 +138,10 @@ def search(
         seeds: members of hypotheses to look at beside those that the search finds itself, such as those of an earlier one
             about another linearisation.
         most_expanded: hypotheses whose neighbours are looked at, at the most.
-        most_members: causes of a hypothesis at which the search ends; None: hypotheses may grow as they like.
+        most_members: causes of a hypothesis at the most; None: hypotheses may grow as they like.
         likely: log odds against the best hypothesis within which others are looked at; `CLOSE` where that one alone is wanted.
     """
     return _Search(comparison, causes, most_expanded, most_members, likely).run(seeds)
-
-
-class _AtLimitError(Exception):
-    """The most probable hypothesis has as many members as are allowed."""
 
 
 class _Search:
@@ -161,20 +157,19 @@ class _Search:
         self._causes = {cause.name: cause for cause in causes}
         self._seen: dict[frozenset[str], Hypothesis] = {}
         self._scored: dict[frozenset[str], float] = {}
-        self._most, self._most_members, self._likely = most_expanded, most_members, likely
+        self._most, self._likely = most_expanded, likely
+        self._most_members = np.inf if most_members is None else most_members
+        self._beyond = -np.inf  # log posterior of the most probable set that is too large
         self._room = MOST_SCORES
         self._top = -np.inf  # log posterior of the most probable hypothesis so far
 
     def run(self, seeds: Iterable[Sequence[Member]]) -> Posterior:
-        """Look at hypotheses until none is likely that was not looked at, or one is at the limit."""
-        at_limit = False
-        try:
-            self._grow(seeds)
-        except _AtLimitError:
-            at_limit = True
+        """Look at hypotheses until none is likely that was not looked at."""
+        self._grow(seeds)
         self._drop_negligible()
         weights = {**self._scored, **{key: h.log_posterior for key, h in self._seen.items()}}
-        return Posterior(tuple(sorted(self._seen.values(), key=lambda h: -h.log_posterior)), weights, at_limit)
+        found = tuple(sorted(self._seen.values(), key=lambda h: -h.log_posterior))
+        return Posterior(found, weights, at_limit=self._beyond > self._top)
 
     def _grow(self, seeds: Iterable[Sequence[Member]]) -> None:
         """Look at neighbours of the most probable hypothesis not yet looked at, until none is likely."""
@@ -236,6 +231,9 @@ class _Search:
 
     def _score(self, members: Sequence[Member], log_posterior: float, worth: float = 1.0) -> None:
         """Keep a first score, and look at the hypothesis where it is likely and its last member is worth its odds."""
+        if len(members) > self._most_members:
+            self._beyond = max(self._beyond, log_posterior)
+            return
         if log_posterior > self._top - NEGLIGIBLE:
             self._scored.setdefault(frozenset(member.cause.name for member in members), log_posterior)
             if len(self._scored) > self._room:
@@ -294,14 +292,11 @@ class _Search:
     def _look_at(self, members: Sequence[Member]) -> None:
         """Give every member what suits it best and keep the hypothesis; look at it without a member that is not worth it."""
         key = frozenset(member.cause.name for member in members)
-        if key in self._seen:
+        if key in self._seen or len(key) > self._most_members:
             return
         found = self._settled(list(members))
         self._seen[key] = found
-        if found.log_posterior > self._top:
-            self._top = found.log_posterior
-            if self._most_members is not None and found.lean and len(members) >= self._most_members:
-                raise _AtLimitError
+        self._top = max(self._top, found.log_posterior)
         if not found.lean:
             worth = [f + m.cause.log_prior_odds for m, f in zip(found.members, found.log_factors, strict=True)]
             self._look_at(found.without(found.members[int(np.argmin(worth))].cause.name))

@@ -285,6 +285,20 @@ class Parameter:
         """Greatest size of a value that a model may have, in the parameter's unit."""
         return max(BEYOND_PLAUSIBLE * self.plausible, *(10.0 * abs(value) for value in self.grid), 0.0)
 
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Least and greatest value of a nonlinear parameter in a fit; an amplitude has none.
+
+        A positive parameter such as a time constant may lie one step of its grid, a ratio, beyond either end; another one as far as
+        the grid is long.
+        """
+        grid = sorted(self.grid)
+        if len(grid) < 2 or self.listed:  # noqa: PLR2004 - a step has two ends
+            return -math.inf, math.inf
+        if grid[0] > 0.0:
+            return grid[0] ** 2 / grid[1], grid[-1] ** 2 / grid[-2]
+        return 2.0 * grid[0] - grid[-1], 2.0 * grid[-1] - grid[0]
+
 
 def of_each_strut(
     name: str, unit: str, plausible: float, meaning: str, *, positive: bool = False
@@ -540,6 +554,11 @@ class ErrorSource(ABC):
     def law(self) -> str:
         """Which of the laws of its cause it is: what it varies with, if nothing else is said."""
         return self.varies_with
+
+    @property
+    def simpler_law(self) -> str | None:
+        """Law of the same cause that this one becomes where its nonlinear parameters have no effect; None if there is none."""
+        return None
 
     @property
     def has_history(self) -> bool:

@@ -94,6 +94,8 @@ class Calibration:
         prescribed: parameters that were held at nominal in place of the lost directions; empty where the directions
             themselves were.
         currents: what the motor currents say; None where the fit does without them.
+        at_limit: columns of nonlinear parameters that are held at an end of their range.
+        settled: False where the last step still moved: values are those of that step.
     """
 
     layout: Layout
@@ -108,6 +110,8 @@ class Calibration:
     directions_regularised: tuple[str, ...]
     prescribed: tuple[Name, ...]
     currents: MotorFindings | None = None
+    at_limit: tuple[int, ...] = ()
+    settled: bool = True
 
     @property
     def model(self) -> MachineModel:
@@ -145,6 +149,7 @@ def calibrate(
     prescribe: Sequence[Name] | None = None,
     shapes_within: float | None = None,
     amplitudes_within: float = np.inf,
+    must_settle: bool = True,
 ) -> Calibration:
     """Fit error sources to raw circles.
 
@@ -164,6 +169,7 @@ def calibrate(
         shapes_within: share of their starting values to which parameters of shape are known; None where they are
             known to their usual sizes only.
         amplitudes_within: plausible sizes to which amplitudes of sources with a start are known, one standard deviation.
+        must_settle: False to get the last step where none settles.
 
     Raises:
         CalibrationError: centred circles, too few tests, parameters that cannot stand in for what is lost, or no
@@ -187,6 +193,7 @@ def calibrate(
         x, blocks = _approached(layout, runs, nominal, left, motion_of)
         blocks += current_blocks(layout, channel, x)
     lost, held = np.zeros((0, 0)), None
+    limits, at_limit, settled = layout.limits, np.zeros(0, dtype=np.int64), False
     for steps in range(MOST_STEPS):
         seen = lost_directions(nominal, layout.known, noise.effective)
         if len(seen) != len(lost) or held is None:
@@ -204,13 +211,20 @@ def calibrate(
         share = _share(layout, step, before, share)
         x = x + share * step
         before = step
-        if change < 1.0:
+        beyond = np.flatnonzero((x < limits[0]) | (x > limits[1]))
+        if len(beyond):
+            # The others are then fitted beside the end of its range, where it stays.
+            x = np.clip(x, *limits)
+            layout, at_limit = layout.held_at(x, beyond), np.concatenate([at_limit, beyond])
+        settled = change < 1.0 and not len(beyond)
+        if settled:
             break
         blocks, left = linearise(layout, runs, x, motion_of)
         blocks += current_blocks(layout, channel, x)
         if steps < NOISE_STEPS:
             noise = noise_of_turns(left, solution.freedom_used)
-    else:
+    assert held is not None  # noqa: S101 - of the first step
+    if must_settle and not settled:
         raise CalibrationError(
             f"the fit still moves, {change:.2g} times more than it should after {MOST_STEPS} steps",
             remedy="check that machine, plan and recordings belong together; leave out doubtful tests with --exclude",
@@ -229,6 +243,8 @@ def calibrate(
         directions_regularised=in_words(layout, unseen(nominal, layout, noise)),
         prescribed=() if prescribe is None else names_of(layout, held),
         currents=motor_findings(layout, channel, x, solution, blocks, nominal, noise),
+        at_limit=tuple(at_limit.tolist()),
+        settled=settled,
     )
 
 

@@ -129,6 +129,11 @@ class _WoundUp(SourceWithHistory):
         """Of the two of backlash."""
         return "wind-up"
 
+    @property
+    def simpler_law(self) -> str:
+        """Play: a wind-up over no travel."""
+        return Backlash().law
+
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         """Six widths and one length."""
         widths = of_each_strut("strut_{}_um", "µm", 3.0, "wind-up of strut {}, whole width; positive: it stays behind")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import Effect, ErrorSource, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.screws import screw_lead_mm
 
 if TYPE_CHECKING:
@@ -21,13 +21,15 @@ MM_PER_UM = 1e-3
 class ScrewCyclic(LinearSource):
     """A strut's error goes once up and down with every turn of its screw: dL = a sin(2 pi L / p) + b cos(2 pi L / p).
 
-    p is the lead. The phase is counted from a length of zero between the joints, at which no screw ever stands: only
+    p is the lead. A wave that is no pure sine has a second harmonic, and a screw that is bent swings the more the farther it is driven out:
+    laws of their own, `_TwoHarmonics` and `_AlongTheScrew`. The phase is counted from a length of zero between the joints, at which no screw ever stands: only
     the amplitude, the root of a² + b², says something of the screw.
     """
 
     name = "screw-cyclic"
     belongs_to = Owner.MACHINE
     varies_with = "strut-length"
+    harmonics: ClassVar[tuple[int, ...]] = (1,)
     form_uncertainty = 0.1  # the error of one turn differs along the screw
     texts = Texts(
         what="The screw wobbles in its bearing, or its encoder sits off the axis: the error repeats with every turn.",
@@ -36,12 +38,17 @@ class ScrewCyclic(LinearSource):
         confirm="Move the strut slowly over three turns of its screw against a laser interferometer or a linear scale.",
         cure="Centre the encoder, or seat the screw's bearing anew; else enter a table of screw errors as fine as a "
         "quarter of the lead.",
-        equation="actual minus driven length = a_i sin(2 pi L_i / p) + b_i cos(2 pi L_i / p), p the screw's lead",
+        equation="actual minus driven length = a_i sin(2 pi L_i / p) + b_i cos(2 pi L_i / p), p the screw's lead; or with a "
+        "second harmonic, the same with p / 2; or both times 1 + g (L_i - L_0), L_0 the middle of the travel",
         origin="once-per-turn travel variation of a ball screw, v_2pi of ISO 3408-3; eccentricity of a rotary encoder",
     )
 
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        """The one with a second harmonic, and the one whose amplitude changes along the screw."""
+        return (_TwoHarmonics(), _AlongTheScrew())
+
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Sine and cosine of each strut.
+        """Sine and cosine of each strut, the first harmonic of all struts before the second.
 
         Raises:
             ModelError: the machine file has no screw lead.
@@ -49,31 +56,127 @@ class ScrewCyclic(LinearSource):
         lead_mm = screw_lead_mm(self.name, machine)
         return tuple(
             Parameter(
-                f"strut_{i + 1}_{wave}_um",
+                f"strut_{i + 1}_{wave}{'' if order == 1 else f'_{order}'}_um",
                 "µm",
-                2.0,
-                f"{wave} of strut {i + 1} with period {lead_mm:g} mm",
+                USUAL_UM / order,
+                f"{wave} of strut {i + 1} with period {lead_mm / order:g} mm",
                 strut=i + 1,
             )
+            for order in self.harmonics
             for i in range(STRUTS)
             for wave in ("sine", "cosine")
         )
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
-        """The lead.
+        """The lead over the highest harmonic.
 
         Raises:
             ModelError: the machine file has no screw lead.
         """
-        return screw_lead_mm(self.name, machine)
+        return screw_lead_mm(self.name, machine) / max(self.harmonics)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each strut answers to its own two waves.
+        """Each strut answers to its own waves.
+
+        Raises:
+            ModelError: the machine file has no screw lead.
+        """
+        return Effect(strut_mm=self.waves_mm(motion, machine))
+
+    def waves_mm(self, motion: Motion, machine: Machine) -> NDArray[np.float64]:
+        """Error of each strut by each amplitude, shape (n, 6, p) [mm/µm].
 
         Raises:
             ModelError: the machine file has no screw lead.
         """
         turned_rad = 2.0 * np.pi / screw_lead_mm(self.name, machine) * motion.struts(machine).length_mm
-        waves = np.stack([np.sin(turned_rad), np.cos(turned_rad)], axis=-1)
-        own = waves[:, :, None, :] * np.eye(STRUTS)[:, :, None]
-        return Effect(strut_mm=MM_PER_UM * own.reshape(len(motion), STRUTS, 2 * STRUTS))
+        own = []
+        for order in self.harmonics:
+            waves = np.stack([np.sin(order * turned_rad), np.cos(order * turned_rad)], axis=-1)
+            own.append((waves[:, :, None, :] * np.eye(STRUTS)[:, :, None]).reshape(len(motion), STRUTS, -1))
+        return np.asarray(MM_PER_UM * np.concatenate(own, axis=2), dtype=np.float64)
+
+
+USUAL_UM = 2.0
+"""Usual size of the first harmonic; that of a harmonic falls with its order, as of a wave with a kink [µm]."""
+
+
+class _TwoHarmonics(ScrewCyclic):
+    """A wave of each turn of the screw that is no pure sine."""
+
+    harmonics = (1, 2)
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        """None beside the one it belongs to."""
+        return ()
+
+    @property
+    def law(self) -> str:
+        """Of the two of a screw's cyclic error."""
+        return "two harmonics"
+
+
+GROWTHS_PER_M = (-2.0, 0.0, 2.0)
+"""Changes of the amplitude along the screw worth trying, in the one at the middle of the travel, per metre: from half to twice of it over
+a usual travel [1/m]."""
+
+
+class _AlongTheScrew(ErrorSource):
+    """A wave of each turn, with its second harmonic, whose amplitude changes in proportion along the screw, alike on all struts."""
+
+    name, belongs_to, texts = ScrewCyclic.name, ScrewCyclic.belongs_to, ScrewCyclic.texts
+    varies_with, form_uncertainty = ScrewCyclic.varies_with, ScrewCyclic.form_uncertainty
+
+    @property
+    def law(self) -> str:
+        """Of the three of a screw's cyclic error."""
+        return "along the screw"
+
+    @property
+    def simpler_law(self) -> str:
+        """The same at every length."""
+        return _TwoHarmonics().law
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Two harmonics of each strut, and one change along the screw.
+
+        Raises:
+            ModelError: the machine file has no screw lead.
+        """
+        meaning = "change of the amplitude along the screw, in that at the middle of the travel"
+        growth = Parameter("growth_per_m", "1/m", 2.0, meaning, GROWTHS_PER_M)
+        return (*_TwoHarmonics().parameters(machine), growth)
+
+    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:
+        """That of the second harmonic.
+
+        Raises:
+            ModelError: the machine file has no screw lead.
+        """
+        return _TwoHarmonics().shortest_period_mm(machine, values)
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Error of each strut.
+
+        Raises:
+            ModelError: the machine file has no screw lead.
+        """
+        waves = _TwoHarmonics().waves_mm(motion, machine)
+        return Effect(strut_mm=(waves @ values[:-1]) * (1.0 + values[-1] * _out_m(motion, machine)))
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """By the amplitudes, each strut its own, and by the change.
+
+        Raises:
+            ModelError: the machine file has no screw lead.
+        """
+        waves, out_m = _TwoHarmonics().waves_mm(motion, machine), _out_m(motion, machine)
+        by_growth = out_m * (waves @ values[:-1])
+        return Effect(
+            strut_mm=np.concatenate([waves * (1.0 + values[-1] * out_m)[:, :, None], by_growth[:, :, None]], axis=2)
+        )
+
+
+def _out_m(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    """How far each strut is driven out beyond the middle of its travel, shape (n, 6) [m]."""
+    return 1e-3 * (motion.struts(machine).length_mm - sum(machine.travel.strut_mm) / 2.0)

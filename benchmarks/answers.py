@@ -153,11 +153,11 @@ def main() -> None:
     for name, words in cases(ROOT, Path(recordings) if recordings else None).items():
         if given.only in name:
             file = f"{name.replace(' ', '-')}.json"
-            both = [
+            old, new = (
                 answer(checkout, commit, words, keep / commit / file)
                 for checkout, commit in ((old_checkout, old_commit), (ROOT, new_commit))
-            ]
-            table[name] = list(differences(*both, given.relative))
+            )
+            table[name] = list(differences(old, new, given.relative))
             sys.stderr.write(f"{name}: {len(table[name])} differences\n")
     if given.json:
         head = {"old": old_commit, "new": new_commit, "relative": given.relative}

@@ -37,4 +37,4 @@ def listen_to_compiler() -> None:
                 for tell in _told:
                     tell(False)  # noqa: FBT003 - ended
 
-    event.register("numba:compile", Listener())
+    event.register("numba:compile", Listener())  # type: ignore[no-untyped-call]

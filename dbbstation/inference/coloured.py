@@ -166,7 +166,8 @@ class Coloured:
             stretches: rows that follow one another without a gap.
         """
         power = np.exp(
-            self.log_power((np.arange(FREQUENCIES) + 0.5) / (2.0 * FREQUENCIES)) - 2.0 * np.log(self.innovation)
+            self.log_power((np.arange(FREQUENCIES, dtype=np.float64) + 0.5) / (2.0 * FREQUENCIES))
+            - 2.0 * np.log(self.innovation)
         )
         total = 0.0
         for count in (stretch.stop - stretch.start for stretch in stretches):

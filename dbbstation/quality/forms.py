@@ -67,7 +67,7 @@ class Forms:
         p, q = self.machine.shape[1], self.rest.shape[1]
         few = np.hstack([self.machine, self.rest, self.off])
         if len(few) > few.shape[1]:
-            few = np.linalg.qr(few, mode="r")
+            few = np.asarray(np.linalg.qr(few, mode="r"), dtype=np.float64)
         axes, grown = _whitening(few[:, p : p + q])
         few = axes.T @ few / grown[:, None]
         # Rounding leaves 1e-16 of the largest variance, which is some 1e6 times that of noise, beside which all count.

@@ -149,7 +149,7 @@ def predicted_parts(
                 known[names] = with_all - log_density(work, others, rows, left, less.fitted.columns), rms(left[rows])
             return known[names]
 
-        gains = {(term,): brought(frozenset({term}))[0] for term in one.node.names}
+        gains: dict[tuple[str, ...], float] = {(term,): brought(frozenset({term}))[0] for term in one.node.names}
         of_classes = {frozenset[str](): brought(frozenset(one.node.names))}
         for wanted in classes:
             own = (name for name in one.node.names if followed_by(one.settled.bank, name) & wanted)

@@ -40,6 +40,8 @@ IDENTITY = ("name", "test", "direction", "repeat", "strut", "parameter", "cause"
 OF_THE_RUN = frozenset({"provenance", "program", "seconds", "processor_s", "memory_mb", "date"})
 """Keys that say when and by what something was computed."""
 MISSING = "-"
+INTERRUPTED = "interrupted"
+"""What the program says when somebody stops it, with exit code 1: that is no answer and is not kept."""
 
 
 def cases(root: Path, recordings: Path | None) -> dict[str, tuple[str, ...]]:
@@ -118,8 +120,8 @@ def answer(checkout: Path, commit: str, words: tuple[str, ...], kept: Path) -> d
         text=True,
         check=False,
     )
-    if ran.returncode < 0:
-        sys.exit(f"{' '.join(translated)} was ended by signal {-ran.returncode}; run the same command to go on")
+    if ran.returncode < 0 or (not ran.stdout and ran.stderr.startswith(INTERRUPTED)):
+        sys.exit(f"{' '.join(translated)} was interrupted ({ran.returncode}); run the same command to go on")
     try:
         said = json.loads(ran.stdout)
     except ValueError:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from tests.plant.foreign.judge import judge
 from tests.plant.foreign.score import compare
 from tests.plant.foreign.sessions import KINDS, LEAST_SIZE, kind_of, make, small_machine
 from tests.plant.machine import reference_machine
@@ -63,6 +64,20 @@ def test_a_seed_makes_the_same_session_and_an_answer_is_not_made_twice(tmp_path:
     (tmp_path / "one" / one["session"] / "plan.yaml").unlink()
     assert make(tmp_path / "one", 48, number)["seed"] == one["seed"]
     assert not (tmp_path / "one" / one["session"] / "plan.yaml").exists()
+
+
+@pytest.mark.parametrize(("stops", "kept"), [("interrupted; what was written stays", False), ("no such run", True)])
+def test_an_interrupted_diagnosis_is_not_kept(tmp_path: Path, stops: str, *, kept: bool) -> None:
+    program = tmp_path / "checkout" / "dbbstation"
+    program.mkdir(parents=True)
+    (program / "__init__.py").touch()
+    (program / "__main__.py").write_text(f"import sys\nsys.exit({stops!r})\n", encoding="utf-8")
+    if kept:
+        assert judge(tmp_path, program.parent, "0123abcd", "0001")["error"].strip() == stops
+    else:
+        with pytest.raises(SystemExit, match="0001: diagnose was interrupted"):
+            judge(tmp_path, program.parent, "0123abcd", "0001")
+    assert (tmp_path / "verdicts" / "0123abcd" / "0001.json").exists() == kept
 
 
 def _source(name: str, verdict: str, **more: Any) -> dict[str, Any]:

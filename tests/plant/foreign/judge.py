@@ -13,6 +13,8 @@ from typing import Any
 COMMAND = {"": ("diagnose", "{session}", "--json")}
 """Words of the command by the beginning of a commit; those under "" are for all commits that say nothing else."""
 KIB_PER_MB = 1024.0
+INTERRUPTED = "interrupted"
+"""What the program says when somebody stops it, with exit code 1: that says nothing of the session, and is not kept."""
 
 
 def commit_of(checkout: Path) -> str:
@@ -42,8 +44,8 @@ def judge(folder: Path, checkout: Path, commit: str, session: str) -> dict[str, 
         said.seek(0)
         complained.seek(0)
         text, error = said.read().decode(), complained.read().decode()
-    if child.returncode < 0:
-        sys.exit(f"{session}: diagnose was ended by signal {-child.returncode}; run the same command to go on")
+    if child.returncode < 0 or (not text.strip() and error.startswith(INTERRUPTED)):
+        sys.exit(f"{session}: diagnose was interrupted ({child.returncode}); run the same command to go on")
     verdict = {
         "session": session,
         "commit": commit,

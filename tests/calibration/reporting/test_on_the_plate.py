@@ -12,6 +12,7 @@ from dbbstation.calibration.reporting.on_the_plate import SECTORS, ball_shifts, 
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.trace.analysis import figures
 from dbbstation.trace.average import by_angle
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import draw_session
@@ -44,11 +45,18 @@ def test_curves_are_the_recording_less_the_circle_and_less_the_model(fit):
 
 def test_centres_and_circularity_are_those_that_the_tables_have(fit):
     runs = evaluate(fit.model, fit.observations).runs
+    models = [MachineModel(fit.model.machine), fit.model.of_the_machine()]
     for one in circle_tests(fit):
-        own = [run for run in runs if run.test == one.name]
-        for row, figures in enumerate([[run.before for run in own], [run.after for run in own]]):
-            assert one.centre_um[row] == pytest.approx(1e3 * np.mean([f.centre_mm for f in figures], axis=0), abs=1e-3)
-            assert one.circularity_um[row] == pytest.approx(max(f.circularity_um for f in figures), abs=1e-3)
+        own = [(o, run) for o, run in zip(fit.observations, runs, strict=True) if run.test == one.name]
+        for row, (model, when) in enumerate(zip(models, ("before", "after"), strict=True)):
+            left = [(o.raw, o.raw.length_mm - model.bar(o.motion()).length_mm) for o, _ in own]
+            centres_mm = [figures(raw, raw.circle.bar_mm + residual).centre_mm for raw, residual in left]
+            assert one.centre_um[row] == pytest.approx(1e3 * np.mean(centres_mm, axis=0), abs=1e-3)
+            told = [getattr(run, when) for _, run in own]
+            assert [1e3 * np.hypot(*centre) for centre in centres_mm] == pytest.approx(
+                [f.centre_deviation_um for f in told]
+            )
+            assert one.circularity_um[row] == pytest.approx(max(f.circularity_um for f in told), abs=1e-3)
         (x, y, z) = next(o.setup.fixed_ball_mm for o in fit.observations if o.test == one.name)
         assert one.ball_mm == pytest.approx([x, y, z])
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.output import echo, say
-from dbbstation.cli.progress import COUNTED, ENDLESS, Bar
+from dbbstation.cli.progress import COUNTED, ENDLESS, ProgressBar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +43,7 @@ def demo(*, out: Path | None, seed: int, quick: bool, as_json: bool) -> None:
     folder = out or unused_path(Path(), "dbbstation-demo")
     if folder.exists():
         raise OutputError("the folder exists already", where=str(folder), remedy="name another with --out")
-    shown = Shown()
+    shown = DemoShown()
     try:
         result = run_demo(folder, seed, shown.tell, shown.progress, QUICK if quick else None)
     finally:
@@ -55,24 +55,24 @@ def demo(*, out: Path | None, seed: int, quick: bool, as_json: bool) -> None:
         _print(result)
 
 
-class Shown:
+class DemoShown:
     """Each command on a line, and a bar below it while it runs."""
 
     def __init__(self) -> None:
-        self.bar = Bar("", ENDLESS)
+        self.bar = ProgressBar("", ENDLESS)
 
     def tell(self, command: str) -> None:
         """Begin a command."""
         self.bar.end()
         say(f"$ {command}")
-        self.bar = Bar("  running", ENDLESS, passing=True)
+        self.bar = ProgressBar("  running", ENDLESS, passing=True)
         self.bar.show()
 
     def progress(self, text: str, done: int = 0, of: int = 0) -> None:
         """Show how many of how many circles are done."""
         if done == 0:
             self.bar.end()
-            self.bar = Bar("  circles", COUNTED, passing=True)
+            self.bar = ProgressBar("  circles", COUNTED, passing=True)
         self.bar.show(done, of, text)
 
 

@@ -8,7 +8,7 @@ import threading
 from typing import TYPE_CHECKING, TextIO
 
 from dbbstation.cli.output import echo, log_said
-from dbbstation.cli.progress import COUNTED, Bar
+from dbbstation.cli.progress import COUNTED, ProgressBar
 from dbbstation.results.measured import CompletedRun, MeasuredSession, RecordedRun
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.station import events
@@ -61,7 +61,7 @@ class Talk:
 
     def __init__(self, *, asking: bool) -> None:
         self._asking = asking
-        self._bar = Bar("  recording", COUNTED, unit="°", passing=True)
+        self._bar = ProgressBar("  recording", COUNTED, unit="°", passing=True)
         self._wrong = False
         self._centre = _OF_MACHINE
 

@@ -53,7 +53,7 @@ class Tell(Protocol):
         """Take a stage, and how much of it is done where that can be counted."""
 
 
-class Bar:
+class ProgressBar:
     """A bar on standard error, which begins when it is first shown to somebody.
 
     Args:
@@ -127,7 +127,7 @@ class Compiling:
     """Says on a terminal, once, that loops are compiled, and shows a bar meanwhile."""
 
     def __init__(self) -> None:
-        self._bar = Bar("compiling", ENDLESS, passing=True)
+        self._bar = ProgressBar("compiling", ENDLESS, passing=True)
         self._said = False
 
     def __call__(self, begun: bool) -> None:  # noqa: FBT001 - as the compiler tells it
@@ -155,7 +155,7 @@ def count_bar(label: str) -> Iterator[Callable[[int, int], None]]:
 
     The bar begins when the work has taken a moment, and ends with the last piece.
     """
-    bar, started_s, begun = Bar(label, COUNTED), now_s(), False
+    bar, started_s, begun = ProgressBar(label, COUNTED), now_s(), False
 
     def tell(done: int, of: int) -> None:
         nonlocal begun
@@ -183,7 +183,7 @@ def stage_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
         stages: how much is done when a stage begins [%], in their order; a text belongs to the stage whose name it begins
             with.
     """
-    bar = _Stages(Bar(label, SHARE), stages)
+    bar = _Stages(ProgressBar(label, SHARE), stages)
     try:
         yield bar.tell
         bar.bar.end(done=True)
@@ -215,7 +215,7 @@ def task_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
 class _Stages:
     """One bar over several stages."""
 
-    def __init__(self, bar: Bar, stages: Mapping[str, int]) -> None:
+    def __init__(self, bar: ProgressBar, stages: Mapping[str, int]) -> None:
         self.bar = bar
         self._stages = stages
         self._reached = 0.0

@@ -19,7 +19,7 @@ def listen_to_compiler() -> None:
     """Hand on what the compiler says; code that was kept on disk is loaded, and nobody is told."""
     from numba.core import event  # noqa: PLC0415 - a third of a second, of which the compiler's user has paid already
 
-    class Listener(event.Listener):
+    class CompileListener(event.Listener):
         """Counts compilations that are parts of others."""
 
         def __init__(self) -> None:
@@ -37,4 +37,4 @@ def listen_to_compiler() -> None:
                 for tell in _told:
                     tell(False)  # noqa: FBT003 - ended
 
-    event.register("numba:compile", Listener())  # type: ignore[no-untyped-call]
+    event.register("numba:compile", CompileListener())  # type: ignore[no-untyped-call]

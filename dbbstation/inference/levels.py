@@ -27,7 +27,7 @@ class Differs(StrEnum):
     CANNOT_TELL = "cannot tell"
 
 
-class Follows(StrEnum):
+class FollowsAnswer(StrEnum):
     """Level 2: what is known of a class of variables."""
 
     FOLLOWS = "follows"
@@ -55,7 +55,7 @@ class Detectable:
 
 
 @dataclass(frozen=True)
-class Difference:
+class DifferenceFound:
     """Level 1.
 
     Attributes:
@@ -132,7 +132,7 @@ class Followed:
 
     variables: tuple[tuple[str, ...], ...]
     or_variables: tuple[str, ...]
-    answer: Follows
+    answer: FollowsAnswer
     probability: float
     ways: dict[str, float]
     rms: float
@@ -162,12 +162,12 @@ class Levels:
             nothing was found, or nothing was tested.
     """
 
-    differs: Difference
+    differs: DifferenceFound
     follows: tuple[Followed, ...]
     correction: bool | None
 
 
-SAYS_YES = (Follows.FOLLOWS, Follows.GOES_ON, Follows.HAPPENED)
+SAYS_YES = (FollowsAnswer.FOLLOWS, FollowsAnswer.GOES_ON, FollowsAnswer.HAPPENED)
 
 
 def difference_of(
@@ -176,7 +176,7 @@ def difference_of(
     gains: DensityGains | None,
     doubts: tuple[str, ...],
     rest: tuple[float, bool, float, tuple[Detectable, ...]],
-) -> Difference:
+) -> DifferenceFound:
     """Level 1 from what the levels below it found.
 
     Args:
@@ -198,7 +198,7 @@ def difference_of(
         answer, why = Differs.CANNOT_TELL, doubts[0]
     elif probability > ABSENT:
         why = f"something may be there, at probability {probability:.2f}"
-    return Difference(
+    return DifferenceFound(
         answer,
         why,
         probability,

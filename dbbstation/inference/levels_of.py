@@ -16,7 +16,7 @@ from dbbstation.inference.followed import (
     way_probability,
 )
 from dbbstation.inference.law_form import law_form
-from dbbstation.inference.levels import TIME, Followed, Follows, Levels, difference_of
+from dbbstation.inference.levels import TIME, Followed, FollowsAnswer, Levels, difference_of
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def _followed(
     effect = settled.effect(sorted(one.members))[settled.channel.kept]
     driven = {variable.name for variable in settled.channel.variables if variable.driven}
     form = None
-    if answer is Follows.FOLLOWS and parts is not None:
+    if answer is FollowsAnswer.FOLLOWS and parts is not None:
         form = law_form(settled, one, parts.rows)
     return Followed(
         variables=one.each,
@@ -135,11 +135,11 @@ def _followed(
     )
 
 
-def _answer(probability: float, gain: ClassGain | None, *, in_time: bool) -> Follows:
+def _answer(probability: float, gain: ClassGain | None, *, in_time: bool) -> FollowsAnswer:
     if probability < SURE:
-        return Follows.UNDECIDED
+        return FollowsAnswer.UNDECIDED
     if in_time:
-        return Follows.GOES_ON if gain is not None and gain.predicts else Follows.HAPPENED
+        return FollowsAnswer.GOES_ON if gain is not None and gain.predicts else FollowsAnswer.HAPPENED
     if gain is None:
-        return Follows.NOT_TESTED
-    return Follows.FOLLOWS if gain.predicts else Follows.DOES_NOT_PREDICT
+        return FollowsAnswer.NOT_TESTED
+    return FollowsAnswer.FOLLOWS if gain.predicts else FollowsAnswer.DOES_NOT_PREDICT

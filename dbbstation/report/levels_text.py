@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.inference.levels import Differs, Follows
+from dbbstation.inference.levels import Differs, FollowsAnswer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dbbstation.inference.levels import Difference, Followed, LawForm, Levels
+    from dbbstation.inference.levels import DifferenceFound, Followed, LawForm, Levels
 
 LIKELY = 0.5
 """Probability from which on a way is mentioned."""
@@ -37,7 +37,7 @@ def level_sentences(levels: Levels, unit: str) -> list[str]:
     return found
 
 
-def _difference(one: Difference, unit: str) -> Iterator[str]:
+def _difference(one: DifferenceFound, unit: str) -> Iterator[str]:
     answer = {
         Differs.YES: f"Measured and simulated values differ: probability {one.probability:.3f}",
         Differs.NO: f"No effect of {_size(one.matters, unit)} rms or more is there: probability of any effect {one.probability:.2f}",
@@ -61,15 +61,19 @@ def _followed(one: Followed, unit: str) -> Iterator[str]:
     how = f"probability {one.probability:.3f}{''.join(f', {way}' for way in ways)}, {_size(one.rms, unit)} rms"
     also = f" These rows cannot tell it from {_listed(one.or_variables)}." if one.or_variables else ""
     what = {
-        Follows.FOLLOWS: f"The difference follows {one.name}",
-        Follows.GOES_ON: "The difference goes on in time; no listed variable says it",
-        Follows.HAPPENED: "Something happened in time",
-        Follows.DOES_NOT_PREDICT: f"In these rows the difference follows {one.name}; other rows gain nothing by it",
-        Follows.NOT_TESTED: f"The difference follows {one.name}; this was not tested on held-out rows",
-        Follows.UNDECIDED: f"The difference may follow {one.name}; these rows do not decide it",
+        FollowsAnswer.FOLLOWS: f"The difference follows {one.name}",
+        FollowsAnswer.GOES_ON: "The difference goes on in time; no listed variable says it",
+        FollowsAnswer.HAPPENED: "Something happened in time",
+        FollowsAnswer.DOES_NOT_PREDICT: f"In these rows the difference follows {one.name}; other rows gain nothing by it",
+        FollowsAnswer.NOT_TESTED: f"The difference follows {one.name}; this was not tested on held-out rows",
+        FollowsAnswer.UNDECIDED: f"The difference may follow {one.name}; these rows do not decide it",
     }[one.answer]
     yield f"{what}: {how}.{also}"
-    if one.answer in (Follows.FOLLOWS, Follows.GOES_ON) and one.before is not None and one.after is not None:
+    if (
+        one.answer in (FollowsAnswer.FOLLOWS, FollowsAnswer.GOES_ON)
+        and one.before is not None
+        and one.after is not None
+    ):
         yield f"  Correcting it leaves {one.after:.3g} of {_size(one.before, unit)} rms in rows that took no part."
     if one.consequence:
         yield f"  {one.name} results from what is simulated: it shows the difference, and is no cause of it."

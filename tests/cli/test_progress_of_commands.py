@@ -11,7 +11,7 @@ import pytest
 
 import dbbstation
 from dbbstation.cli import DONE, progress
-from dbbstation.cli.demo import Shown
+from dbbstation.cli.demo import DemoShown
 from dbbstation.cli.measure_talk import Talk
 from dbbstation.plan.circle import Direction
 from dbbstation.station.events import RunAccepted, RunId, RunProgress
@@ -76,7 +76,7 @@ def recorded(monkeypatch):
     monkeypatch.setattr(progress, "_SHORT_S", -1.0)
     calls = []
 
-    class Recorded(progress.Bar):
+    class Recorded(progress.ProgressBar):
         def __init__(self, *given, **named):
             super().__init__(*given, **named)
             calls.append((self, "__init__", given, named))
@@ -89,7 +89,7 @@ def recorded(monkeypatch):
             calls.append((self, "end", (), named))
             super().end(**named)
 
-    monkeypatch.setattr(progress, "Bar", Recorded)
+    monkeypatch.setattr(progress, "ProgressBar", Recorded)
     return calls
 
 
@@ -103,7 +103,7 @@ def again(calls):
             getattr(made[bar], name)(*given, **named)
 
 
-Plain = progress.Bar
+Plain = progress.ProgressBar
 
 
 @pytest.mark.parametrize("name", HAS_BAR)
@@ -174,7 +174,7 @@ def test_measuring_shows_one_bar_which_leaves_with_the_circle(monkeypatch, termi
 @pytest.mark.parametrize("terminal", TERMINALS)
 def test_the_demonstration_shows_its_commands_and_a_bar_for_each(monkeypatch, terminal):
     def work():
-        shown = Shown()
+        shown = DemoShown()
         shown.tell("dbbstation measure")
         for number in range(30):
             shown.progress("test a ccw", number, 30)

@@ -21,7 +21,7 @@ from dbbstation.inference.followed import (
     probability_of_any,
 )
 from dbbstation.inference.left_over import left_over
-from dbbstation.inference.levels import TIME, Detectable, Differs, Followed, Follows, difference_of
+from dbbstation.inference.levels import TIME, Detectable, Differs, Followed, FollowsAnswer, difference_of
 from dbbstation.inference.levels_of import levels_of, slow_chance
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
 from dbbstation.inference.settle import settle
@@ -55,7 +55,7 @@ def test_both_variables_are_followed_each_with_its_law(both):
     assert found.differs.answer is Differs.YES
     assert found.differs.gain_without_best > np.log(19.0)
     by_name = {one.name: one for one in found.follows}
-    assert {one.answer for one in by_name.values()} == {Follows.FOLLOWS}
+    assert {one.answer for one in by_name.values()} == {FollowsAnswer.FOLLOWS}
     assert by_name["q"].form.name == "hysteresis of q"
     assert by_name["angle"].form.name == "twice per turn of angle"
     assert by_name["q"].ways["direction"] > 0.95
@@ -199,8 +199,8 @@ def followed(answer):
         (0.99, (), None, (), Differs.YES),
         (0.99, (), DensityGains((5.0, 5.0)), (), Differs.YES),
         (0.99, (), DensityGains((0.1, 0.1)), (), Differs.CANNOT_TELL),
-        (0.99, (followed(Follows.HAPPENED),), DensityGains((0.1, 0.1)), ("slow",), Differs.YES),
-        (0.99, (followed(Follows.DOES_NOT_PREDICT),), DensityGains((0.1, 0.1)), (), Differs.CANNOT_TELL),
+        (0.99, (followed(FollowsAnswer.HAPPENED),), DensityGains((0.1, 0.1)), ("slow",), Differs.YES),
+        (0.99, (followed(FollowsAnswer.DOES_NOT_PREDICT),), DensityGains((0.1, 0.1)), (), Differs.CANNOT_TELL),
         (0.20, (), DensityGains((0.1, 0.1)), ("slow",), Differs.CANNOT_TELL),
         (0.20, (), DensityGains((0.1, 0.1)), (), Differs.NO),
     ],
@@ -216,4 +216,4 @@ def test_time_and_single_rows_are_the_time():
     settled = settle(replace(whole, residual=whole.residual + 0.4 * inside))
     (one,) = levels_of(settled, left_over(settled), None, None).follows
     assert one.name == TIME
-    assert one.answer is Follows.HAPPENED
+    assert one.answer is FollowsAnswer.HAPPENED

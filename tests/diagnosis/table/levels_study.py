@@ -25,7 +25,7 @@ from scipy.signal import lfilter
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.inference.curves import Spline
-from dbbstation.inference.levels import TIME, Follows
+from dbbstation.inference.levels import TIME, FollowsAnswer
 from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def answer(kind: str, seed: int, what: str) -> dict[str, object]:
         truth = truth if what == "effect" else frozenset()
     began = time.process_time()
     levels = find_mismatch(table).levels
-    located = [one for one in levels.follows if one.answer is Follows.FOLLOWS]
+    located = [one for one in levels.follows if one.answer is FollowsAnswer.FOLLOWS]
     named = [{SAME.get(v, v) for each in one.variables for v in (*each, *one.or_variables)} for one in located]
     return {
         "kind": kind,

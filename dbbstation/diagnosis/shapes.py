@@ -356,11 +356,6 @@ def shapes(extent: Ranges) -> list[Shape]:
             Shape("strut-length", "", strut, SIGNED, _usual("strut-length", extent, strut))
             for strut in range(1, STRUTS + 1)
         ]
-    lengths = extent.low["strut-length"], extent.high["strut-length"]
-    found += [
-        Shape("strut-length", "", k + 1, EVERY, LinearSplines(low, high, FINE))
-        for k, (low, high) in enumerate(zip(*lengths, strict=True))
-    ]
     for name in ("time", *warmed):
         if name in extent.low and name not in OF_STRUTS:
             found += [Shape(name, "", None, moves, _usual(name, extent, None)) for moves in (READING, BALL)]
@@ -386,10 +381,6 @@ def shapes(extent: Ranges) -> list[Shape]:
     return found
 
 
-FINE = 25
-"""Points of a curve over strut length that may have kinks: the reference machine's struts move by 30 mm from one to the next."""
-
-
 def wander(runs: Sequence[Samples]) -> list[Shape]:
     """A slow wander of the reading, within runs and from one to the next: a random walk over the time; none without times."""
     times = [run.values["time"] for run in runs if "time" in run.values]
@@ -399,8 +390,8 @@ def wander(runs: Sequence[Samples]) -> list[Shape]:
     return [Shape("time", "wander", None, READING, Walk(at, 60.0))]
 
 
-WALK_STEPS = 8
-"""Of a wander within a run, straight between them: what it does within an eighth of a run counts as noise."""
+WALK_STEPS = 6
+"""Of a wander within a run, straight between them: what it does within a sixth of a run counts as noise."""
 
 
 def _usual(name: str, extent: Ranges, strut: int | None) -> Form:

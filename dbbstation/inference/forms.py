@@ -48,31 +48,25 @@ class Form(ABC):
 
 @dataclass(frozen=True, eq=False)
 class LinearSplines(Form):
-    """Any smooth curve: straight between points, seven if nothing is said. Limits are arrays where every strut has its own."""
+    """Any smooth curve: straight between seven points. Limits are arrays where every strut has its own."""
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    number: int = SPLINES
 
     @property
     def count(self) -> int:
         """One amplitude per point."""
-        return self.number
-
-    def text(self, unit: str) -> str:
-        """How many points, where there are more than usual."""
-        del unit
-        return f"{self.number} points" if self.number != SPLINES else ""
+        return SPLINES
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """One at its own point, zero at all others."""
-        place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (self.number - 1)
-        return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(self.number)))
+        place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (SPLINES - 1)
+        return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(SPLINES)))
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         """Its own points, in the middle between struts that have their own."""
         del low, high
-        return np.linspace(np.mean(self.low), np.mean(self.high), self.number)
+        return np.linspace(np.mean(self.low), np.mean(self.high), SPLINES)
 
 
 @dataclass(frozen=True, eq=False)

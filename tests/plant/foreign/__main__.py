@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 from tests.plant.foreign.judge import commit_of, judge
-from tests.plant.foreign.score import scored
+from tests.plant.foreign.score import as_table, scored
 from tests.plant.foreign.sessions import make
 
 
@@ -47,7 +47,7 @@ def main() -> None:
         sys.stdout.write(text)
         if given.out:
             given.out.parent.mkdir(parents=True, exist_ok=True)
-            given.out.write_text(text, encoding="utf-8")
+            given.out.write_text(json.dumps(as_table(figures), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def _numbers(text: str) -> list[int]:

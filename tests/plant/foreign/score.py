@@ -34,6 +34,24 @@ def scored(folder: Path, commits: Sequence[str], sessions: Sequence[str], seed: 
     }
 
 
+def as_table(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """The figures as the validation page takes them: a column a commit."""
+    of = figures["commits"].values()
+    rows = {
+        "sessions": [one["sessions"] for one in of],
+        "without any answer": [len(one["without_answer"]) for one in of],
+        "listed causes that were named": [f"{one['named_right']} of {one['listed']}" for one in of],
+        "sessions with a wrong name": [len(one["wrong_names"]) for one in of],
+        "values within 3u": [f"{one['values_within_3u']} of {one['values']}" for one in of],
+        "most processor time / s": [round(one["processor_s"]["most"]) for one in of],
+        "most memory / MB": [one["memory_mb_most"] for one in of],
+    }
+    head = {key: figures[key] for key in ("question", "command", "date", "seed")}
+    data = "Sessions of two simulated robots whose laws are not the program's own."
+    limits = "Each commit judged another number of sessions; the command goes on where it ended."
+    return {**head, "data": data, "limits": limits, "columns": list(figures["commits"]), "figures": rows}
+
+
 def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any]:
     """One session: what was put in, what was named, rightly or not, and how well its values fit."""
     listed = {effect["name"]: effect["amplitudes"] for effect in answer["effects"] if effect["listed"]}

@@ -80,7 +80,7 @@ def bar(
     """Read the bar on its calibrator and write what it read: the length that `measure --bar FILE` needs.
 
     Put the bar on the calibrator, a block of known length such as of Zerodur, and wait until it has the temperature of the
-    shop. The readings are averaged. What the bar reads too long or too short is noted and never taken off a recording: the fit of
+    shop. The readings are averaged. What the bar reads too long or too short is noted and never taken off a recording. The fit of
     `calibrate` knows it, with its uncertainty, and with what the bar grows by until it measures.
 
     \b

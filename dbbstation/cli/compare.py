@@ -37,7 +37,7 @@ def compare(
     force: bool,
     as_json: bool,
 ) -> None:
-    r"""Put two sessions side by side: where they differ, in what form, and by which cause; differences are B less A.
+    r"""Put two sessions side by side: where they differ, in what form, and by which cause. Differences are B less A.
 
     For last year against today, or a simulation against a recording. The readings of A are the simulation of B. What is
     stated of noise, mountings, CMM sheets and bars is no difference. Error sources that may have changed, balls and bars that

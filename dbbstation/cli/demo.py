@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def demo(*, out: Path | None, seed: int, quick: bool, as_json: bool) -> None:
     r"""Measure, calibrate, diagnose, compensate and measure again, on a virtual machine over a real serial line.
 
-    Takes one to two minutes and needs no hardware. Every step is a command that can be typed by hand; they are shown
+    Takes one to two minutes and needs no hardware. Every step is a command that can be typed by hand. They are shown
     as they run, and the files they read and write stay in the folder.
 
     \b

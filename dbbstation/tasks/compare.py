@@ -39,7 +39,7 @@ def compare(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> ComparisonResult:
-    """Put two sessions side by side: where they differ, in what form, and by which cause; differences are B less A.
+    """Put two sessions side by side: where they differ, in what form, and by which cause. Differences are B less A.
 
     Args:
         a: session folder; its readings are the simulation of B.

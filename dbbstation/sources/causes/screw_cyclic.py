@@ -38,8 +38,8 @@ class ScrewCyclic(LinearSource):
         confirm="Move the strut slowly over three turns of its screw against a laser interferometer or a linear scale.",
         cure="Centre the encoder, or seat the screw's bearing anew; else enter a table of screw errors as fine as a "
         "quarter of the lead.",
-        equation="actual minus driven length = a_i sin(2 pi L_i / p) + b_i cos(2 pi L_i / p), p the screw's lead; or with a "
-        "second harmonic, the same with p / 2; or both times 1 + g (L_i - L_0), L_0 the middle of the travel",
+        equation="actual minus driven length = a_i sin(2 pi L_i / p) + b_i cos(2 pi L_i / p), p the screw's lead; or with the same "
+        "for p / 2, and both times 1 + g (L_i - L_0), L_0 the middle of the travel",
         origin="once-per-turn travel variation of a ball screw, v_2pi of ISO 3408-3; eccentricity of a rotary encoder",
     )
 

@@ -116,9 +116,9 @@ class _TwoHarmonics(ScrewCyclic):
         return "two harmonics"
 
 
-GROWTHS_PER_M = (-2.0, 0.0, 2.0)
-"""Changes of the amplitude along the screw worth trying, in the one at the middle of the travel, per metre: from half to twice of it over
-a usual travel [1/m]."""
+GROWTHS_PERCENT_M = (-200.0, 0.0, 200.0)
+"""Changes of the amplitude along the screw worth trying, of the one at the middle of the travel: from half to twice of it over a usual
+travel [percent/m]."""
 
 
 class _AlongTheScrew(ErrorSource):
@@ -143,8 +143,8 @@ class _AlongTheScrew(ErrorSource):
         Raises:
             ModelError: the machine file has no screw lead.
         """
-        meaning = "change of the amplitude along the screw, in that at the middle of the travel"
-        growth = Parameter("growth_per_m", "1/m", 2.0, meaning, GROWTHS_PER_M)
+        meaning = "change of the amplitude along the screw, of that at the middle of the travel"
+        growth = Parameter("growth_percent_m", "percent/m", 200.0, meaning, GROWTHS_PERCENT_M)
         return (*_TwoHarmonics().parameters(machine), growth)
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:
@@ -162,7 +162,7 @@ class _AlongTheScrew(ErrorSource):
             ModelError: the machine file has no screw lead.
         """
         waves = _TwoHarmonics().waves_mm(motion, machine)
-        return Effect(strut_mm=(waves @ values[:-1]) * (1.0 + values[-1] * _out_m(motion, machine)))
+        return Effect(strut_mm=(waves @ values[:-1]) * (1.0 + values[-1] * _out(motion, machine)))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """By the amplitudes, each strut its own, and by the change.
@@ -170,13 +170,13 @@ class _AlongTheScrew(ErrorSource):
         Raises:
             ModelError: the machine file has no screw lead.
         """
-        waves, out_m = _TwoHarmonics().waves_mm(motion, machine), _out_m(motion, machine)
-        by_growth = out_m * (waves @ values[:-1])
+        waves, out = _TwoHarmonics().waves_mm(motion, machine), _out(motion, machine)
+        by_growth = out * (waves @ values[:-1])
         return Effect(
-            strut_mm=np.concatenate([waves * (1.0 + values[-1] * out_m)[:, :, None], by_growth[:, :, None]], axis=2)
+            strut_mm=np.concatenate([waves * (1.0 + values[-1] * out)[:, :, None], by_growth[:, :, None]], axis=2)
         )
 
 
-def _out_m(motion: Motion, machine: Machine) -> NDArray[np.float64]:
-    """How far each strut is driven out beyond the middle of its travel, shape (n, 6) [m]."""
-    return 1e-3 * (motion.struts(machine).length_mm - sum(machine.travel.strut_mm) / 2.0)
+def _out(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    """How far each strut is driven out beyond the middle of its travel, shape (n, 6) [100 m]: one percent of what is there, per metre."""
+    return 1e-5 * (motion.struts(machine).length_mm - sum(machine.travel.strut_mm) / 2.0)

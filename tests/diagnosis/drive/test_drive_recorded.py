@@ -93,8 +93,8 @@ def test_a_motor_that_is_off_before_and_after_is_no_dead_channel(recorded):
 def test_at_one_speed_coulomb_friction_is_not_ruled_out(recorded):
     summary = answered(recorded("drives/lead-screw-start-stop-trimmed.csv"), cutoff_hz=4.0)
     assert sources(summary)["coulomb-friction"]["verdict"] != "ruled-out"
-    # Nine stretches of time are noise whose neighbours resemble each other.
-    assert sources(summary)["transient-force"]["verdict"] == "ambiguous"
+    # Nine stretches of time have fewer independent samples than noise may have: they happened, or cannot be told from noise.
+    assert sources(summary)["transient-force"]["verdict"] in {"ambiguous", "happened"}
     assert not summary["parameters"]["viscous_n_s_m"]["identifiable"]
 
 

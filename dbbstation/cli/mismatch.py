@@ -19,6 +19,7 @@ from dbbstation.cli.effects import (
 )
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.number_options import number_language, number_options
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ if TYPE_CHECKING:
 @click.option("--free", metavar="NAME,...", help="Parameters of which nothing is known, such as initial states.")
 @click.option(
     "--matters",
-    type=float,
+    type=Finite(),
     metavar="SIZE",
     help='Smallest effect that you care about, rms in the unit of the measured values: "no" is answered only where it would have been '
     "found [default: what refitted parameters leave].",

@@ -63,7 +63,9 @@ def test_the_demonstration_means_what_evaluate_means(capsys, tmp_path, printed, 
         tmp_path,
         _side_by_side(measured, measured),
         DemoCalibration(residual_within_mounting_rms_um=3.0),
-        DemoDiagnosis(sources=(DemoCause("play", "ruled-out", None, {}),), held_out_rms_um=BeforeAfter(7.0, 0.2)),
+        DemoDiagnosis(
+            (DemoCause("play", "ruled-out", None, {}),), held_out="tested", held_out_rms_um=BeforeAfter(7.0, 0.2)
+        ),
         DemoReport(verdict=ReportVerdict("none", "Nothing is held against anything.", (), ()), causes=()),
         printed={},
     )

@@ -35,7 +35,6 @@ ROUND_IT = {
     "files/recordings/event_log.py": "appends to the log, and cuts what could not be noted",
     "report/pdf.py": "reads what the browser has just printed",
     "computing/memory.py": "asks the system in /proc how much memory it took",
-    "simulators/kept.py": "reads files of the package",
     "simulators/program.py": "creates the file that it writes",
 }
 """Files that open files themselves, each with its reason."""

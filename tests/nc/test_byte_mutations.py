@@ -1,6 +1,6 @@
 """Programs with bytes changed, as a bad line or a bad disk leaves them: read, or refused by name; at once either way.
 
-What LinuxCNC refuses of them must be refused here too. `DBBSTATION_FUZZ=5000` changes as many as that.
+What LinuxCNC refuses of them must be refused here too. `DBBSTATION_FUZZ=5000` changes as many as that, `-m nightly` three times as many.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ M30
 %
 """
 MUTANTS = int(os.environ.get("DBBSTATION_FUZZ", "500"))
+counted = pytest.mark.parametrize("count", [MUTANTS, pytest.param(3 * MUTANTS, marks=pytest.mark.nightly)])
 AMONG = bytes(range(256)) + b"0123456789.-+GMXYZABCFIJPRN %;()\n\r\t" * 8
 
 
@@ -78,11 +79,12 @@ def read(linuxcnc, data: bytes):
 
 
 @pytest.mark.slow
-def test_every_mutant_is_read_or_refused_at_once_and_in_little_memory(linuxcnc):
+@counted
+def test_every_mutant_is_read_or_refused_at_once_and_in_little_memory(linuxcnc, count):
     accepted, slowest = 0, 0.0
     tracemalloc.start()
     try:
-        for data in mutants(1, MUTANTS):
+        for data in mutants(1, count):
             began = time.process_time()
             path = read(linuxcnc, data)
             slowest = max(slowest, time.process_time() - began)
@@ -94,14 +96,15 @@ def test_every_mutant_is_read_or_refused_at_once_and_in_little_memory(linuxcnc):
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert 0.05 * MUTANTS < accepted < 0.9 * MUTANTS
+    assert 0.05 * count < accepted < 0.9 * count
     assert slowest < 10.0
     assert peak < 500e6
 
 
-def test_accepted_mutants_are_compensated_or_refused_by_name(linuxcnc, crooked):
+@counted
+def test_accepted_mutants_are_compensated_or_refused_by_name(linuxcnc, crooked, count):
     written = 0
-    drawn = mutants(2, MUTANTS // 4)
+    drawn = mutants(2, count // 4)
     for data in drawn:
         path = read(linuxcnc, data)
         if path is None:
@@ -117,7 +120,8 @@ def test_accepted_mutants_are_compensated_or_refused_by_name(linuxcnc, crooked):
 
 @pytest.mark.slow
 @needs_rs274
-def test_mutants_that_linuxcnc_refuses_are_refused(linuxcnc, tmp_path):
-    for data in mutants(3, MUTANTS // 2):
+@counted
+def test_mutants_that_linuxcnc_refuses_are_refused(linuxcnc, tmp_path, count):
+    for data in mutants(3, count // 2):
         if read(linuxcnc, data) is not None:
             assert events(data, tmp_path) is not None, data.decode()

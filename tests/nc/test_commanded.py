@@ -24,8 +24,9 @@ def observed(circle: Circle, samples: int = 1500) -> Observation:
     return Observation("a", 1, raw, setup)
 
 
-def test_a_nominal_program_commands_the_nominal_circle(linuxcnc, all_runs):
-    for circle in all_runs[::10]:
+@pytest.mark.parametrize("step", [10, pytest.param(1, marks=pytest.mark.nightly)])
+def test_a_nominal_program_commands_the_nominal_circle(linuxcnc, all_runs, step):
+    for circle in all_runs[::step]:
         run = observed(circle)
         text = linuxcnc.write(circle_toolpath(circle, "run"))
         poses = commanded_poses(text, "programs/run.ngc", run)

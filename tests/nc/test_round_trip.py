@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -55,8 +56,9 @@ def test_linuxcnc_reads_back_what_was_written(first, steps):
     assert dialect.write(read) == text
 
 
-def test_a_run_reads_back_within_half_a_nanometre(linuxcnc, all_runs):
-    for circle in all_runs[::4]:
+@pytest.mark.parametrize("step", [4, pytest.param(1, marks=pytest.mark.nightly)])
+def test_a_run_reads_back_within_half_a_nanometre(linuxcnc, all_runs, step):
+    for circle in all_runs[::step]:
         path = circle_toolpath(circle, "run")
         read = linuxcnc.read(linuxcnc.write(path), "run.ngc")
         assert np.abs(read.poses - path.poses)[:, :3].max() <= 0.5001e-6

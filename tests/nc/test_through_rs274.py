@@ -29,7 +29,7 @@ COUNT = int(os.environ.get("DBBSTATION_FUZZ", "100"))
 FIRST = int(os.environ.get("DBBSTATION_FUZZ_FROM", "0"))
 SHARES = 2
 
-NIGHTLY_SEEDS, BLOCK = range(1000, 51_000), 100
+NIGHTLY_SEEDS, BLOCK = range(100, 51_000), 100
 PASSED = os.environ.get("DBBSTATION_FUZZ_PASSED")
 
 OFFSETS = {5220: 2, 5221: 10.0, 5222: -3.0, 5223: 1.0, 5224: 2.0, 5241: -7.0, 5242: 4.0, 5243: 2.0, 5246: 3.0}

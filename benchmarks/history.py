@@ -34,13 +34,7 @@ WANTED_S = 3.0
 
 
 def copies(one: Path, folder: Path, count: int) -> None:
-    """Make weekly sessions of one: a smooth error and noise of its own in every run.
-
-    Args:
-        one: session folder.
-        folder: to make them in.
-        count: how many.
-    """
+    """Make weekly sessions of one: a smooth error and noise of its own in every run."""
     rng = np.random.default_rng(SEED)
     text = (one / "session.yaml").read_text("utf-8")
     runs = {path.name: path.read_text("utf-8").splitlines() for path in sorted((one / "runs").glob("*.csv"))}

@@ -39,9 +39,7 @@ class FoundClass(Generic[Base]):
     """A class that is not the package's.
 
     Attributes:
-        kind: the class.
         place: where it was found: file and line, or entry point.
-        remedy: what to do about its faults.
     """
 
     kind: type[Base]
@@ -54,7 +52,6 @@ def in_folders(base: type[Thing], *folders: ModuleType) -> Mapping[str, Thing]:
 
     Args:
         base: what the classes derive from. Abstract ones and those whose name begins with an underscore do not count.
-        folders: packages in whose modules they stand.
     """
     found: dict[str, Thing] = {}
     for folder in folders:
@@ -91,9 +88,6 @@ class Loaded:
 
     Attributes:
         value: the thing itself.
-        named: how the entry point names it.
-        place: entry point and package.
-        remedy: what to do about its faults.
     """
 
     value: object
@@ -122,12 +116,8 @@ def added(
     """Put one more thing to those that are known; a name that is taken is added to `faults`.
 
     Args:
-        found: what is known by name.
         whose: where each of them comes from, where it is not the program itself.
-        one: to be added.
-        place: where it comes from.
         called: what things of this kind are called, with their article.
-        faults: where faults are added.
     """
     if one.name in found:
         what = f"{called} `{one.name}` is known already, from {whose.get(one.name, 'dbbstation itself')}"
@@ -153,8 +143,6 @@ def looked_up(
     """Return what has a name.
 
     Args:
-        name: as given.
-        known: everything by name.
         called: what things of this kind are called.
         error: raised where nothing has the name.
         how_to_add: what the name may lack, a sentence without a full stop.

@@ -45,9 +45,7 @@ def judge_sessions(
     """Diagnose every session of a folder; those that have a verdict already are not judged twice.
 
     Args:
-        folder: with one session folder each for what was recorded.
         candidates: names of the error sources to look for.
-        jobs: processes.
         progress: called with how many of how many sessions are judged.
         again: judge all of them anew, for a diagnosis that has changed since.
 

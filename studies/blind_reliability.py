@@ -60,7 +60,6 @@ def forecasts(
 
     Args:
         sources: as in the summary of a diagnosis.
-        hidden: names of what is in the session.
         perturbed: what is hidden follows its law only roughly.
     """
     best: dict[frozenset[str], Mapping[str, Any]] = {}

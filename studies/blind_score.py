@@ -38,10 +38,7 @@ class Outcome:
     """One session, judged and compared.
 
     Attributes:
-        session: name.
-        seed: that it was made from.
         plan: what kind was measured.
-        rate_hz: samples per second.
         angles: the recording has commanded angles.
         kind: `clean`, `single`, `pair`, `triple`, `faint`, `disturbed`, `outside`, `concealed` or `not-a-candidate`.
         perturbed: what is hidden follows its law only roughly.
@@ -52,8 +49,8 @@ class Outcome:
         identified: names that it gives, `identified` or `happened`.
         declared: names that it says it cannot tell apart, with those that each is not told from.
         named: each hidden effect is identified.
-        within: each hidden effect is identified or in a declared ambiguity of at most three: it with its own rivals, all
-            that hang together, or the class of what no test tells from a name that is given.
+        within: each hidden effect is identified or in a declared ambiguity of at most three: it with its own rivals, all that
+            hang together, or the class of what no test tells from a name that is given.
         wrong: names given, alone or as an ambiguity, where nothing of the kind is hidden.
         located: what is left, or the misfit, is put on the right strut or variable; None where nothing was asked.
         quiet: none of the hidden effects is claimed at a size that it has not (for what nobody can see).

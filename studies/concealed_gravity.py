@@ -58,10 +58,8 @@ def concealed_gravity(
     """Draw a machine with kinematic errors and gravity, calibrate it kinematically, diagnose it, look elsewhere.
 
     Args:
-        machine: reference machine.
         jig: the fifteen circles of [CAL Table II].
         conditions: the nine of [GRAV Table 4].
-        seed: of machine and measurement.
         progress: called with what is being done.
     """
     rng = np.random.default_rng(seed)

@@ -46,8 +46,6 @@ class Coverage:
     Attributes:
         parameters: by machine and parameter, shape (m, 24).
         positions: by machine, pose and axis, shape (m, 40, 3).
-        sigma_um: median stated standard deviation of each parameter [µm].
-        names: of the parameters.
     """
 
     parameters: NDArray[np.float64]
@@ -85,12 +83,9 @@ def coverage(
     """Draw machines, record the plan on each, calibrate, and compare with what was drawn.
 
     Args:
-        machine: nominal machine.
-        plan: what is recorded.
-        seeds: of the machines and their sessions.
         progress: called with how many machines are done.
-        level: no raised bar in the plan: machines are drawn without a common height of their base joints, which
-            level bars do not see and which would reach the other parameters in second order.
+        level: no raised bar in the plan: machines are drawn without a common height of their base joints, which level bars do not
+            see and which would reach the other parameters in second order.
     """
     done = []
     for one in over_machines(partial(_machine, machine, plan, level=level), seeds):

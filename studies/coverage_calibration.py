@@ -88,11 +88,9 @@ class Case:
     """Circumstances of a calibration.
 
     Attributes:
-        name: in words.
         raised: whether five bars are raised, which shows the height of the base.
         tolerance: whether the machine file states the tolerance of joints.
         gravity: whether struts are elastic, and their compliance fitted.
-        bar: what is known of the bar.
     """
 
     name: str
@@ -141,7 +139,6 @@ def coverage_of_calibration(
 
     Args:
         cases: circumstances; each sees all machines, and they take turns.
-        seeds: of the machines.
         progress: called with how many sessions are done.
         keep: file of the draws; None where none are kept.
     """

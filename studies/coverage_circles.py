@@ -85,7 +85,6 @@ class Cell:
     """One noise.
 
     Attributes:
-        level_um: standard deviation of a reading [µm].
         colour: `white` or `correlated`.
     """
 
@@ -118,7 +117,6 @@ def coverage_of_circles(
 
     Args:
         draws: for each noise; the three kinds of circles take turns.
-        seed: of the first draw.
         progress: called with how many draws are done.
         cells: noises; they take turns too, so that a study that is cut short has as many of each.
         keep: file of the draws; None where none are kept.

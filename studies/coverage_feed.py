@@ -43,7 +43,6 @@ def coverage_of_feed(draws: int, seed: int, progress: Callable[[int], None], kee
 
     Args:
         draws: recordings; noises take turns.
-        seed: of the first.
         progress: called with how many are done.
         keep: file of the draws; None where none are kept.
     """

@@ -59,7 +59,6 @@ def coverage_of_noises(
 
     Args:
         draws: pairs of turns for each noise; noises take turns.
-        seed: of the first draw.
         progress: called with how many draws are done.
         kinds: noises, of `tests.plant.other_noise.KINDS`.
         keep: file of the draws; None where none are kept.

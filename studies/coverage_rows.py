@@ -26,15 +26,11 @@ class Row:
     """Coverage of one printed figure.
 
     Attributes:
-        case: under which circumstances.
-        figure: which.
         draws: machines or recordings that were drawn.
         values: stated values, of all draws.
-        stated: share of the values for which an uncertainty is stated.
         inside: share of those within 1.96 u of the truth, or within U = 2 u; None where none is stated.
         error: its standard error, values of one draw taken for one; None likewise.
         u: median stated standard uncertainty; None likewise.
-        unit: of it.
         reason: why more than 97 % are inside; empty where that is not so.
     """
 
@@ -88,11 +84,8 @@ def row_of(
     """Return the row of one figure.
 
     Args:
-        case: under which circumstances.
-        figure: which.
         off: found less true value, shape (draws, values of each).
         u: stated standard uncertainty, NaN where none is, of the same shape.
-        unit: of both.
         reason: why more than 97 % may be inside.
         within: standard uncertainties to each side of the interval: 2 of a printed U. An interval that reaches to zero has 1.96
             to that side, and less would cut it off.

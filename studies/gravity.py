@@ -79,9 +79,8 @@ class Driven:
 
     Attributes:
         circularity_um: as measured, mean of both directions, by condition [µm].
-        left_um: the same without noise, by condition [µm].
-        expected_um: of the uncompensated recording less its prediction, which is what [GRAV Fig 6] calls expected, by
-            condition [µm]; empty for commands without compensation.
+        expected_um: of the uncompensated recording less its prediction, which is what [GRAV Fig 6] calls expected, by condition
+            [µm]; empty for commands without compensation.
     """
 
     circularity_um: dict[str, float]
@@ -185,7 +184,6 @@ def gravity_study(
         machine: reference machine, with masses.
         jig: the fifteen circles of [CAL Table II].
         conditions: the nine of [GRAV Table 4].
-        seeds: of the machines.
         progress: called with how many machines are done.
     """
     done = []

@@ -46,11 +46,8 @@ class Size:
 
     Attributes:
         tables: histories without a change.
-        quantities: of each.
-        sessions: of each.
         false_alarms: stated rate per session, of the whole table.
         changes: histories of one quantity for each kind of change.
-        seed: of all of them.
     """
 
     tables: int
@@ -66,10 +63,7 @@ class Way:
     """A way to watch, of which one is the program's.
 
     Attributes:
-        name: in words.
-        reference: k.
         single_share: share of the false alarms for single sessions.
-        baseline: sessions.
     """
 
     name: str
@@ -92,7 +86,6 @@ def study(size: Size, progress: Callable[[int, int], None] = lambda _done, _of: 
     """Simulate, and return shares and delays as plain numbers.
 
     Args:
-        size: how much of it.
         progress: called with how many of how many parts are done.
     """
     of = len(SCATTERS) + len(WAYS) + len(FEW)
@@ -159,7 +152,6 @@ def stated_share(chart: Chart, quantities: int, sessions: int) -> float:
 
     Args:
         chart: limits of one quantity.
-        quantities: of a table.
         sessions: of a history; the first is held against nothing.
     """
     quiet = 1.0 - signalled_within(chart, [0.0] * (sessions - 1))[-1]

@@ -21,7 +21,6 @@ def drawn(experiment: Callable[[int], Any], numbers: Sequence[int], path: Path |
 
     Args:
         experiment: as of `over_machines`; its result can be written as JSON.
-        numbers: of the draws.
         path: of the file; None where nothing is kept.
         what: that is drawn: study, circumstances, first seed.
 

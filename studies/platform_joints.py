@@ -43,11 +43,9 @@ class Round:
         tests: measured so far.
         added: texts of the tests that were added for this look.
         verdict: on platform joints.
-        ambiguous_with: what they could not be told from.
         gain: log evidence for them.
         concealed: share of their signature that the kinematic parameters swallow.
         kinematic_um: true position error over the workspace of the kinematic calibration, rms less its mean [µm].
-        joint_um: the same of the joint model [µm].
         stated_um: what the joint model states of itself, less a common shift [µm]; None where it is not known.
         held_out: of left-out tests in units of the predicted covariance, before and after.
     """
@@ -75,10 +73,8 @@ def platform_joints(
     """Measure, ask, measure what was asked for, until platform joints are named.
 
     Args:
-        machine: reference machine.
         jig: the fifteen circles of [CAL Table II].
         seed: of machine and measurements.
-        joint_error_mm: standard deviation of a platform joint's coordinate [mm].
         progress: called with what is being done.
         most_rounds: times that tests are added.
     """

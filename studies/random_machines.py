@@ -21,7 +21,6 @@ def over_machines(experiment: Callable[[int], Result], seeds: Sequence[int]) -> 
 
     Args:
         experiment: can be sent to another process: a function of a module, or a `functools.partial` of one.
-        seeds: of the machines.
     """
     cores = os.cpu_count() or 1
     if cores == 1 or len(seeds) <= TOGETHER:

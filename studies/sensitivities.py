@@ -35,7 +35,6 @@ class Constant:
 
     Attributes:
         module: where it is declared, below `dbbstation`.
-        name: of the constant.
         others: values to try in its place; empty: half and twice its own.
     """
 
@@ -117,7 +116,6 @@ class Variation:
 
     Attributes:
         constant: which is another; None: the program as it is.
-        value: in its place.
         paths: one drive recording or table, or the sessions A and B.
         force_per_ampere: of a drive recording with a current; None: it has a force [N/A].
         columns: measured and simulated column of a table; None for what is no table.
@@ -154,11 +152,6 @@ class Change:
 
     Attributes:
         constant: name, with the module that has it.
-        own: as the program has it.
-        tried: in its place.
-        data: what was asked of.
-        verdicts: those that are others, as `name: before -> after`.
-        largest: change of a parameter, in its standard uncertainties.
         parameter: that one; empty where no parameter is in both answers.
     """
 
@@ -184,7 +177,6 @@ def study(
     Args:
         drives: recordings, and the force that an ampere makes in each [N/A].
         pairs: sessions A and B.
-        jobs: processes.
         progress: called with how many answers of how many there are.
         only: names of the constants to vary; all if empty.
         tables: with the names of the measured and of the simulated column.

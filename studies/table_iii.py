@@ -64,8 +64,6 @@ class Verified:
 
     Attributes:
         centre_deviation_um: by position, relative to position a [µm].
-        mean_radial_error_um: by position [µm].
-        circularity_um: by position [µm].
         flatness_um: over eight points of X, Y = ±190 mm [µm].
         parallelism_um: of a move along X, ±190 mm [µm].
     """
@@ -134,10 +132,7 @@ def table_iii(
     """Calibrate and verify random machines.
 
     Args:
-        machine: reference machine.
         conventional: plan with balls put up under the spindle.
-        jig: plan on the jig plate.
-        seeds: of the machines.
         progress: called with how many machines are done.
         gravity: the machines' struts are elastic, which no calibration models.
     """

@@ -42,14 +42,10 @@ def draw_session(
     Whether a micrometer is at hand does not change anything else that is drawn.
 
     Args:
-        truth: the machine as it is.
-        plan: what is measured.
-        rng: of mountings, CMM entries, bar length and noise, each with the size that the plan states; of balls put up
-            under the spindle with `SET_UP_MM`.
-        noise_mm: of one sample [mm].
-        samples: per turn.
-        micrometer_mm: uncertainty of its readings, one standard deviation [mm]: balls that the plan puts up under the
-            spindle come with their set-up errors as read; None: nobody measured them.
+        rng: of mountings, CMM entries, bar length and noise, each with the size that the plan states; of balls put up under the
+            spindle with `SET_UP_MM`.
+        micrometer_mm: uncertainty of its readings, one standard deviation [mm]: balls that the plan puts up under the spindle
+            come with their set-up errors as read; None: nobody measured them.
         command: from the wanted motion to the poses that are commanded instead, as a compensation does.
     """
     known = known_sources()

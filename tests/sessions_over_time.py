@@ -38,14 +38,8 @@ def sessions_over_time(
     """Make weekly sessions: each with a centre and a length of its own, 0.7 µm one standard deviation, and 0.4 µm of two undulations.
 
     Args:
-        folder: to make.
         count: of sessions, `w001` and so on.
-        seed: of the scatter.
         step_at: from this session on, counted from 0, the centre is further in X.
-        step_um: by so much [µm].
-        long_at: the bar of this one session is longer.
-        long_um: by so much [µm].
-        tests: of a, g and l.
     """
     rng = np.random.default_rng(seed)
     small = shipped_folder("fixtures") / "sessions" / "small"

@@ -36,9 +36,6 @@ class ParameterSet:
     """One set of parameters of one source.
 
     Attributes:
-        source: the cause.
-        shared: name of the set.
-        parameters: what the columns are.
         columns: where they stand in x.
     """
 
@@ -61,11 +58,10 @@ class Layout:
     """Terms of a fit and what is known of their columns beforehand.
 
     Attributes:
-        machine: nominal machine.
         terms: sets of parameters in the order of the columns.
         known: priors and scales; priors are about `nominal`.
-        nominal: values that columns keep where nothing is seen of them, shape (k,): zero for amplitudes, a usual
-            value for shape parameters such as time constants.
+        nominal: values that columns keep where nothing is seen of them, shape (k,): zero for amplitudes, a usual value for shape
+            parameters such as time constants.
     """
 
     machine: Machine

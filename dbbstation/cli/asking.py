@@ -30,7 +30,6 @@ class Asker:
         """Return an answer; empty where nobody can give one, which `check` refuses then.
 
         Args:
-            question: as shown.
             option: that says the same on the command line.
             choices: the only answers that are taken; empty: any.
             default: what Enter means; None: an answer is needed.
@@ -44,21 +43,14 @@ class Asker:
         )
 
     def give(self, option: str, why: str) -> None:
-        """Say that an option is needed which no single answer can take the place of: `check` refuses, on a terminal too.
-
-        Args:
-            option: as it is typed.
-            why: it is needed.
-        """
+        """Say that an option is needed which no single answer can take the place of: `check` refuses, on a terminal too."""
         self._missing.append(f"{option} ({why})")
 
     def number(self, question: str, option: str, *, needed: bool = False) -> float | None:
         """Return a number; None where nobody can give one, or where Enter says that nobody knows it.
 
         Args:
-            question: as shown.
             option: that says the same on the command line.
-            needed: Enter does not do.
         """
         if not self.terminal:
             self.text(question, option)

@@ -185,14 +185,7 @@ def _print(results: Sequence[Checked], runs: Sequence[DryRun]) -> None:
 
 @dataclass(frozen=True)
 class DryRun:
-    """The programs of a plan, tried on a machine.
-
-    Attributes:
-        plan: file of the plan.
-        machine: file of the machine.
-        programs: how many were tried.
-        problems: what `program` would refuse.
-    """
+    """The programs of a plan, tried on a machine."""
 
     plan: Path
     machine: Path
@@ -202,13 +195,7 @@ class DryRun:
 
 @dataclass(frozen=True)
 class SampledPlan:
-    """What an instrument sees of a plan.
-
-    Attributes:
-        plan: file of the plan.
-        circles: one for each test.
-        notes: the same in sentences.
-    """
+    """What an instrument sees of a plan."""
 
     plan: Path
     circles: tuple[SampledCircle, ...]

@@ -51,12 +51,7 @@ def cancelling_text(cancelling: Cancelling) -> str:
 
 
 def residual_text(left: LeftOver, unit: str) -> str:
-    """Return whether something is left beyond noise, and what, as a sentence.
-
-    Args:
-        left: tests of what is left.
-        unit: of the residual.
-    """
+    """Return whether something is left beyond noise, and what, as a sentence."""
     if left.is_noise:
         return "Nothing is left beyond noise."
     where = f", {left.worst.where}" if left.worst.where else ""

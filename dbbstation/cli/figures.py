@@ -21,12 +21,7 @@ deviation; only the second can be held against a prediction, which has no noise.
 
 
 def print_runs(runs: Sequence[EvaluatedRun], *, low_passed: bool = False) -> None:
-    """Print centre deviation, mean radial error and circular deviation of every run, before and after.
-
-    Args:
-        runs: figures of each.
-        low_passed: print the circular deviation of low-passed readings, which the runs must then have.
-    """
+    """Print centre deviation, mean radial error and circular deviation of every run, before and after."""
     echo("             centre deviation     mean radial error  circular deviation G  [µm]")
     titles = ["test", "dir", "n", "before", "after", " before", " after", "  before", "  after"]
     rows = []

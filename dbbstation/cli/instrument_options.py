@@ -81,8 +81,6 @@ def chosen_protocol(
     """Return the protocol that the options name.
 
     Args:
-        instrument: name or file.
-        profile: of it.
         zero_mm: where a relative instrument shows zero [mm].
         bar_length_mm: calibrated length of the bar, taken for it where nothing else is said [mm].
 

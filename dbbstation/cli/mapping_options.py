@@ -173,8 +173,6 @@ def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, aske
     """Return what gives the mapping once everything was answered: from its file, or from names, options and answers.
 
     Args:
-        tables: that it is for; the columns of the first are named in it.
-        options: by name.
         asker: of what cannot be told.
     """
     from dbbstation.files.formats.mapping import ANGLE, DEVIATION, IGNORED, LENGTH, UNITS, read_mapping

@@ -86,27 +86,20 @@ class MeasureOptions:
     """What `measure` was asked.
 
     Attributes:
-        plan_file: test plan.
-        machine_file: nominal machine.
         instrument: name of the instrument, or its protocol file.
         profile: of the instrument; None: its usual one.
         zero_mm: length at which a relative instrument shows zero; None: that of the bar [mm].
-        port: of the instrument.
         baud: rate of the line; None: the instrument's usual one [1/s].
         spy: file for a log of all bytes; None: none.
         out: session folder.
         auto: control address of `emulate`; None: a person starts circles.
-        time_scale: of a virtual machine.
         programs: folder of the NC programs that are run; None: none.
         rate_hz: sampling rate; None: the instrument's usual one [Hz].
         largest_loss_percent: of samples, of a run; None: the plan's [%].
         largest_bar_age_h: of the bar's calibration; None: any [h].
         model_file: that circles are judged by; None: the nominal machine.
         source_files: Python files with error sources of that model.
-        order: in which tests are measured.
         gate: which run must be good before the others.
-        as_json: whether what was recorded is printed as JSON.
-        session: what is stated of the session.
     """
 
     plan_file: Path

@@ -153,12 +153,7 @@ class Summary:
 
 
 class Keyboard:
-    """Turns lines of standard input into commands; an observer of the station, which knows what Enter means now.
-
-    Args:
-        send: takes commands.
-        lines: where they are read.
-    """
+    """Turns lines of standard input into commands; an observer of the station, which knows what Enter means now."""
 
     def __init__(self, send: Callable[[Command], None], lines: TextIO | None = None) -> None:
         self._send = send

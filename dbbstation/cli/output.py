@@ -31,7 +31,6 @@ def echo(text: object = "", *, err: bool = False, nl: bool = True) -> None:
 
     Args:
         text: control characters in it are shown.
-        err: on standard error.
         nl: end it with a line end.
     """
     # While a bar is drawn Rich stands in for standard error and puts lines above the bar; Click would look through it.

@@ -75,7 +75,6 @@ class ProgressBar:
         """Show how much of how much is done.
 
         Args:
-            done: so far.
             of: all; None where that is unknown.
             text: beside the bar.
             at_once: draw it now, and not a moment later.
@@ -234,12 +233,7 @@ class _Stages:
 
 
 def time_left(share: float, passed_s: float) -> str:
-    """Return what is left of work as text before the name of its stage, such as `20 s left, `; empty where too early.
-
-    Args:
-        share: of the work that is done.
-        passed_s: time since it began [s].
-    """
+    """Return what is left of work as text before the name of its stage, such as `20 s left, `; empty where too early."""
     least_s, least = _TRUSTED
     if passed_s < least_s or not least <= share < 1.0:
         return ""

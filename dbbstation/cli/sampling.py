@@ -18,8 +18,6 @@ def sampled_circles(plan: Plan, protocol: Protocol, baud: int | None = None) -> 
     """Return for each circle of a plan what the instrument sees of it.
 
     Args:
-        plan: what is to be measured.
-        protocol: of the instrument.
         baud: of its line, None: the usual rate.
     """
     from dbbstation.plan.sampling import enough_feed_mm_min, sampling

@@ -171,7 +171,6 @@ def require_bar(job: Job, largest_age_h: float | None) -> None:
     A session that goes on has its bar already.
 
     Args:
-        job: what is to be measured.
         largest_age_h: age of a calibration beyond which it is stale [h]; None: the usual one.
 
     Raises:

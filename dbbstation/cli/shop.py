@@ -38,11 +38,7 @@ class ShopOption(click.Option):
     """An option that takes its value from the shop's settings where the command line has none.
 
     Args:
-        declarations: as `click.Option` takes them.
         setting: key in the settings, with dots.
-        factor: from the setting's unit to the option's.
-        goes_with: another option of the command; where the command line has that one, the setting is of something else.
-        more: as `click.Option` takes it.
     """
 
     def __init__(
@@ -110,7 +106,6 @@ def folder_of_sessions(command: str | None, values: Mapping[str, Any]) -> Path |
     """Return the folder that a command's sessions stand in; None where it has none.
 
     Args:
-        command: its name.
         values: its parameters by name.
     """
     names = (*_SESSIONS, *(["out"] if command in _MADE else []))

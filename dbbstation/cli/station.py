@@ -273,10 +273,7 @@ def _given(line: Line, spy: Path | None, sequence: tuple[str, str], noted: Sessi
     """Return what options and settings say of a session that is chosen on the screen.
 
     Args:
-        line: instrument and port.
-        spy: file of `--spy`.
         sequence: order of the tests, and what is repeated at their end.
-        noted: the session's options.
 
     Raises:
         click.UsageError: an option that the start screen has no place for.

@@ -86,10 +86,6 @@ def schema_of(kind: type) -> dict[str, Any]:
 def read_json(kind: type[_Kind], text: str | bytes) -> _Kind:
     """Return what `json_of` wrote of a frozen dataclass whose keys are its fields' names.
 
-    Args:
-        kind: the class.
-        text: JSON.
-
     Raises:
         ValueError: the text is no JSON, or not of this class.
     """

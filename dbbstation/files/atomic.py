@@ -38,8 +38,6 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
     """Write a file.
 
     Args:
-        path: of the file.
-        data: what it will hold.
         force: replace a file that exists.
         rewrites: the file is the program's own and was read to be changed, such as a session file.
 
@@ -69,7 +67,6 @@ def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
     """Open a file that is written piece by piece, and put it in its place once all is written.
 
     Args:
-        path: of the file.
         force: replace a file that exists.
 
     Yields:
@@ -107,14 +104,13 @@ def write_folder(
     """Write several files into one folder, all or none; the folder is made where it does not exist.
 
     Args:
-        folder: where they go.
         files: content by path within the folder; a path that ends with a slash is an empty folder.
         force: replace files that exist; others in the folder stay.
         own: the folder is a session and the files are part of it.
-        read_only: whether a file, by its path within the folder, may only be read from then on.
 
     Raises:
-        OutputError: one exists and `force` is not given, it lies in a session, or one cannot be written; nothing has changed then.
+        OutputError: one exists and `force` is not given, it lies in a session, or one cannot be written; nothing has changed
+            then.
     """
     if not own:
         refuse_recorded(folder / "any")

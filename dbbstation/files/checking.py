@@ -50,11 +50,9 @@ class Checked:
     """What was found in one file or session.
 
     Attributes:
-        path: as given.
         kind: its format, `run` for a run file, `drive` for a recording of one drive; empty where it could not be told.
         summary: what it holds, one line; empty where it has problems.
         problems: what makes it unusable.
-        warnings: what does not.
         judgements: of the runs of a session that are accepted or wait to be; empty for everything else.
     """
 

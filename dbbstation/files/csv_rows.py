@@ -31,7 +31,6 @@ def csv_text(rows: Iterable[Iterable[object]], *, exact: bool = False) -> str:
     A text that a spreadsheet would take for a formula gets `'` before it. Numbers stay numbers, negative ones too, with `DIGITS` digits.
 
     Args:
-        rows: of cells.
         exact: write numbers with as many digits as it takes to read back the same bits: of recordings that come back.
     """
     out = io.StringIO(newline="")
@@ -57,9 +56,7 @@ def csv_rows(
 
     Args:
         lines: of the text, with or without their ends.
-        separator: what stands between cells.
         file: as named in messages.
-        first_line: number of the first of these lines in the file.
         skip_spaces: leave out spaces behind separators.
 
     Raises:

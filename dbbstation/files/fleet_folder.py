@@ -33,15 +33,6 @@ _LONGEST = 60
 class FleetFolder:
     """Results of one task in a folder.
 
-    Args:
-        folder: made where it is not there.
-        task: name of the task.
-
-    Attributes:
-        folder: as given.
-        table: file for every value.
-        page: file for the page.
-
     Raises:
         OutputError: something else lies in the folder, or it cannot be written.
     """
@@ -78,9 +69,6 @@ class FleetFolder:
         """Keep a result, and return it as `known` would.
 
         Args:
-            name: of the session.
-            key: of the result.
-            data: what is kept.
             files: further files, by their ending.
 
         Raises:

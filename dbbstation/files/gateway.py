@@ -44,7 +44,6 @@ class Source:
     Args:
         file: unbuffered, open for reading.
         path: as named in messages.
-        size: bytes that it had when it was opened.
         largest: bytes that are read at the most.
     """
 
@@ -92,10 +91,6 @@ class Source:
 @contextmanager
 def opened(path: Path, largest: int = LARGEST_BYTES) -> Iterator[Source]:
     """Open a regular file for reading.
-
-    Args:
-        path: of the file.
-        largest: bytes that are read at the most.
 
     Raises:
         NotRegularError: it is a pipe, a socket or a device.

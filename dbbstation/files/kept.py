@@ -42,7 +42,6 @@ class Stamp:
 
     Attributes:
         modified_ns: when it was written [ns].
-        size: in bytes.
     """
 
     modified_ns: int
@@ -87,7 +86,6 @@ class Kept:
     """What is kept of the files of one folder, each written at once: work that is interrupted loses nothing. A context.
 
     Args:
-        folder: whose files these are.
         begin_anew: forget what is kept, but for anchors that were noted.
 
     Attributes:
@@ -125,14 +123,7 @@ class Kept:
         return self._by_hash.get(sha256)
 
     def keep(self, name: str, stamp: Stamp, sha256: str, text: str) -> None:
-        """Keep what was worked out of a file.
-
-        Args:
-            name: of the file in the folder.
-            stamp: of the file before it was read.
-            sha256: of its content.
-            text: what is kept.
-        """
+        """Keep what was worked out of a file."""
         self._rows[name] = _Row(stamp, sha256, text)
         self._by_hash[sha256] = text
         row = (name, stamp.modified_ns, stamp.size, sha256, text)

@@ -65,8 +65,6 @@ def own_instances(
     """Return an instance of every class of Python files that derives from `base`, by names that differ.
 
     Args:
-        files: Python files.
-        base: what the classes derive from.
         contract: where to read what is asked of them.
         attributes: that a class must have, `name` among them.
         fault_of: what is wrong with an instance, and what to do; it may run its code.

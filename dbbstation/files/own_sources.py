@@ -19,9 +19,6 @@ CONTRACT = "see `An error source of your own` in docs/diagnosis.md"
 def every_source(files: Sequence[Path] = ()) -> Mapping[str, ErrorSource]:
     """All error sources by name: the package's, those of installed packages, those of Python files.
 
-    Args:
-        files: Python files with error sources.
-
     Raises:
         InputError: every fault of every entry point, or else of every file: not there, not Python, no error source in it, a name
             that is taken, something that the contract asks for and that is not there or not right.

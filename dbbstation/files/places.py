@@ -19,7 +19,6 @@ def unused_path(folder: Path, name: str, suffix: str = "") -> Path:
     """Return a path of that name that does not exist, with a number where it has to.
 
     Args:
-        folder: that it is in.
         name: of a folder, or of a file without its ending.
         suffix: ending of a file.
     """

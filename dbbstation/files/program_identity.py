@@ -44,12 +44,7 @@ def code_digest() -> str:
 
 
 def differences_of(one: dict[str, str], other: dict[str, str]) -> str:
-    """Return in words what differs between two programs; empty where nothing does.
-
-    Args:
-        one: this one.
-        other: another one.
-    """
+    """Return in words what differs between two programs; empty where nothing does."""
     names = [name for name in dict.fromkeys([*one, *other]) if one.get(name) != other.get(name)]
     return ", ".join(f"{name} {_short(other, name)} and not {_short(one, name)}" for name in names)
 

@@ -20,9 +20,6 @@ def read_bytes(
     """Return a file's bytes, or None with the reason added to `faults`.
 
     Args:
-        path: of the file.
-        faults: take the reason.
-        largest: number of bytes that are read at the most.
         is_input: outputs name it among their inputs; not so where the hash of the file stands in another input.
     """
     try:

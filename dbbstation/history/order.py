@@ -20,12 +20,7 @@ the order. Names that were given at random agree on about 2 / sqrt(n) of n [Loga
 
 
 def date_faults(sessions: Sequence[SessionFigures], now: datetime) -> list[str]:
-    """Say which sessions have dates that cannot be right, or that another session has too.
-
-    Args:
-        sessions: of one machine, each with its date.
-        now: the time.
-    """
+    """Say which sessions have dates that cannot be right, or that another session has too."""
     faults = []
     by_date = sorted(sessions, key=_dated)
     for one, other in pairwise(by_date):

@@ -13,7 +13,6 @@ class Figure:
 
     Attributes:
         name: such as `G` or `X`.
-        value_um: its size [µm].
         u_um: its standard uncertainty [µm]; None where it is not known.
     """
 
@@ -32,10 +31,8 @@ class RunFigures:
     """Figures of one accepted run.
 
     Attributes:
-        test: name of its test.
         direction: `ccw` or `cw`.
         circle: its commanded circle in words: runs of one test are comparable where these are the same.
-        figures: of the run.
     """
 
     test: str
@@ -50,13 +47,11 @@ class SessionFigures:
 
     Attributes:
         name: of its folder, from the folder of the history.
-        sha256: of its session file.
         machine: serial number of the machine, or the name in its machine file.
         started: start of the first accepted run; None where no run has one noted.
         runs: accepted runs that show a circle.
         bar: serial number of the bar; empty where not noted.
         programs: NC programs that were run instead of the plan's circles, as a hash over theirs; empty for none.
-        notes: remarks on it.
         anchor: link of the last event of its log; of a session without a log the end of its chain of runs; empty without a seal.
     """
 
@@ -77,10 +72,7 @@ class ModelParameter:
 
     Attributes:
         source: name of its error source.
-        name: of the parameter.
-        value: its size, in `unit`.
         u: its standard uncertainty; None where it was held or is not known.
-        unit: of both.
     """
 
     source: str
@@ -96,9 +88,7 @@ class ModelFigures:
 
     Attributes:
         file: its path, from the folder of the history.
-        sha256: of the file.
         sessions: SHA-256 of the session files that it comes from, by name.
-        parameters: those of the machine.
         warnings: what has to be said of it wherever its numbers are shown.
     """
 

@@ -49,12 +49,7 @@ class Chart:
 
 
 def transitions(chart: Chart, mean: float = 0.0) -> NDArray[np.float64]:
-    """Return probabilities of the upward sum's next state by its state, shape (STATES, STATES); what lacks to one signals.
-
-    Args:
-        chart: its limits.
-        mean: of the values, in standard deviations.
-    """
+    """Return probabilities of the upward sum's next state by its state, shape (STATES, STATES); what lacks to one signals."""
     width = 2.0 * chart.interval / (2.0 * STATES - 1.0)  # the last state's upper edge is h
     state = np.arange(STATES)
     edges = (state[None, :] - state[:, None] + 0.5) * width + chart.reference
@@ -80,7 +75,6 @@ def signalled_within(chart: Chart, means: Iterable[float]) -> NDArray[np.float64
     """Return the probability that the upward chart has signalled by each value, shape (n,).
 
     Args:
-        chart: its limits.
         means: of each value, in standard deviations; the n values in their order.
     """
     state = np.zeros(STATES)
@@ -101,7 +95,6 @@ def chart_for(false_alarms: float, reference: float = REFERENCE, single_share: f
 
     Args:
         false_alarms: signals per value, both directions together: one over the average run length.
-        reference: k.
         single_share: share of them that single values may make; 0 for a plain CUSUM.
     """
     single = -float(ndtri(false_alarms * single_share / 2.0)) if single_share else np.inf

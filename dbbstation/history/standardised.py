@@ -37,7 +37,6 @@ class ScatterRatio:
 
     Attributes:
         freedom: degrees of freedom; one fewer than values for each level.
-        square: sum of squares.
     """
 
     freedom: int = 0

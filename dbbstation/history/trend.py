@@ -52,7 +52,6 @@ class Subject:
         test: name of the test; empty for a parameter.
         direction: `ccw` or `cw`; empty for a parameter.
         of: circle in words; of a parameter its error source.
-        unit: of the values.
         beside: of a parameter the other sources of its models, since it is comparable only beside the same ones.
     """
 
@@ -74,9 +73,7 @@ class Trend:
     """One quantity of one machine over its sessions; arrays have shape (n,).
 
     Attributes:
-        subject: what it is of.
         label: in words, no other of this machine has the same.
-        at: which sessions of the machine.
         values: mean over the runs of each session.
         u: standard uncertainty of each; NaN where not known.
         limit: greatest size by the shop's tolerances; None where there is none.
@@ -130,8 +127,6 @@ class TrendOptions:
     """How trends are worked out.
 
     Attributes:
-        coverage_factor: k of U = k u.
-        tolerances: of the shop.
         false_alarms: per session, over all quantities of a machine.
         tests: names of those to take; empty for all.
         exclude: names of those to leave out.
@@ -157,7 +152,6 @@ def histories(
     Args:
         sessions: each with its date, each counted once.
         models: by the SHA-256 of the one session that each comes from.
-        asked: how.
     """
     machines = sorted({one.machine for one in sessions})
     return tuple(

@@ -36,11 +36,8 @@ class TrendEvent:
 
     Attributes:
         verdict: `STANDS_OUT` or `CHANGED`.
-        since: number of the value from which it is so.
-        found: number of the value that showed it.
         difference: values from `since` to `found` less the level before; of a change that is a baseline's length ago: the level
             after it less the level before.
-        u_difference: its standard uncertainty, by the larger of stated uncertainty and scatter.
         by_stated: whether only the stated uncertainties say so: the scatter of the sessions is not known yet.
     """
 
@@ -113,9 +110,6 @@ def watch(
     Args:
         values: in time order, shape (n,).
         u: standard uncertainty of each, positive, shape (n,).
-        chart: its limits.
-        coverage_factor: k of U = k u.
-        baseline: values from which their scatter is the scale.
     """
     looked, scatter = _look(values, u, chart, coverage_factor, baseline, None)
     if not any(event.by_stated for event in looked.events):
@@ -191,14 +185,7 @@ def _look(
 
 
 def _settled(event: TrendEvent, level: NDArray[np.float64], u_level: NDArray[np.float64], start: int) -> TrendEvent:
-    """Return a change with the difference of the levels about it: that of the values which showed it was chosen for being large.
-
-    Args:
-        event: the change.
-        level: of every value.
-        u_level: its standard uncertainty.
-        start: number of the first value of the level after it.
-    """
+    """Return a change with the difference of the levels about it: that of the values which showed it was chosen for being large."""
     before = event.since - 1
     difference, u = float(level[start] - level[before]), float(np.hypot(u_level[start], u_level[before]))
     return replace(event, difference=difference, u_difference=u)
@@ -225,11 +212,7 @@ def _change(
     """Return a change with all its values, those that stood out among them.
 
     Args:
-        since: number of its first value.
-        found: number of the value that showed it.
         at: numbers of the values that the level before is taken from, as far as they are before it.
-        values: all of them.
-        u: their standard uncertainties.
     """
     before, these = at[at < since], slice(since, found + 1)
     level, u_level = _mean(values[before], u[before])
@@ -248,16 +231,7 @@ def _scatter(values: NDArray[np.float64], u: NDArray[np.float64]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
-    """Values from the beginning or a change on, without those that stand out.
-
-    Attributes:
-        at: their numbers.
-        of: held against those before them.
-        values: themselves.
-        u: their standard uncertainties.
-        chart: its limits.
-        coverage_factor: k of U = k u.
-    """
+    """Values from the beginning or a change on, without those that stand out."""
 
     at: NDArray[np.intp]
     of: Standardised

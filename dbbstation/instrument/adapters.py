@@ -18,7 +18,6 @@ class Adapter:
     """What tells one USB adapter from another.
 
     Attributes:
-        vendor, product: USB numbers.
         serial_number: of the adapter; empty where it has none.
         socket: USB socket it is plugged into; decides only between adapters without a serial number.
     """

@@ -11,7 +11,6 @@ class Arrivals:
     Bytes that are seen together arrived one after the other: those in front earlier by the time that the others take.
 
     Args:
-        character_s: time of a byte on the line [s].
         reach: bytes that a question may lie behind the newest.
     """
 
@@ -31,11 +30,7 @@ class Arrivals:
             self._chunks.popleft()
 
     def at_latest_s(self, behind: int) -> float:
-        """Return when the byte with so many behind it had arrived at the latest [s].
-
-        Args:
-            behind: bytes that came after it.
-        """
+        """Return when the byte with so many behind it had arrived at the latest [s]."""
         place = self._count - behind
         end, seen_s = next(one for one in self._chunks if one[0] >= place)
         return seen_s - (end - place) * self._character_s

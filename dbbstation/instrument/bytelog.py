@@ -51,9 +51,7 @@ class ByteLog:
         path: the file; it must not exist yet.
         instrument: name of the protocol.
         profile: of it, empty where it has none.
-        port: name of the port.
         force: overwrite the file.
-        clock: monotonic clock in s.
 
     Raises:
         OutputError: the file exists, or cannot be written.

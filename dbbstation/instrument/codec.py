@@ -27,7 +27,6 @@ class Garbage:
     """Bytes that are not understood.
 
     Attributes:
-        raw: the bytes.
         why: what was wrong with them, empty where they simply do not fit the grammar.
         joining: they are the rest of a frame that was under way when listening began: nothing is wrong.
         reason: why they are rejected, in one word, for counting.
@@ -46,11 +45,10 @@ def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, sta
     """Return the bytes with which the device tells one sample.
 
     Args:
-        protocol: the wire.
         length_mm: length in mm; None: the device has none, which it tells as `fault` unless `status` says otherwise.
         counter: sample counter, taken modulo what the wire has.
-        status: what the device says of the sample. A length that does not fit is reported as `overrange`; a device that
-            cannot say `overrange` says `fault`.
+        status: what the device says of the sample. A length that does not fit is reported as `overrange`; a device that cannot
+            say `overrange` says `fault`.
 
     Raises:
         InstrumentError: the wire has no way to say it.
@@ -100,7 +98,6 @@ class Decoder:
     """Cuts a stream of bytes into frames and decodes them; chunks may end anywhere.
 
     Args:
-        protocol: the wire.
         joining: listening begins in the middle of a stream, so that the first line may be half of one.
     """
 

@@ -36,9 +36,7 @@ class Written:
     """How a number stood on the wire.
 
     Attributes:
-        value: it, in the unit of the wire, with its sign.
         before: digits before its point.
-        behind: digits behind it.
         unit: that the wire names; empty where it names none.
     """
 
@@ -76,8 +74,6 @@ class Piece:
     """A reading (`lost` not yet counted, no time) with its bytes.
 
     Attributes:
-        reading: what they tell.
-        raw: the bytes.
         after: bytes of the same chunk that follow it.
         written: how its number stood there; None where it has none in decimal digits.
     """

@@ -43,15 +43,14 @@ class Instrument:
     """A length instrument on a serial line; use it in a `with` block, which starts and closes it.
 
     Args:
-        protocol: its wire.
         port: name or URL of the port, or an open port (which stays open).
         baud: baud rate where the device is not set to the usual one.
-        clock: what stamps the readings, in s, monotonic. With a virtual instrument on scaled time, its clock; patience
-            is always in real seconds.
+        clock: what stamps the readings, in s, monotonic. With a virtual instrument on scaled time, its clock; patience is always
+            in real seconds.
         log: where every byte is written down; the caller closes it.
         timeout_s: patience before a silent line is an error, instead of the protocol's.
-        memory_s: how long the quickest arrival of a stream's samples is remembered, by `clock`: on a scaled clock as many
-            times longer, because what holds samples up is the computer, in real time.
+        memory_s: how long the quickest arrival of a stream's samples is remembered, by `clock`: on a scaled clock as many times
+            longer, because what holds samples up is the computer, in real time.
         reconnect_s: how long an adapter that was pulled out is waited for, in real seconds; it is known by its USB identity,
             whatever its port is called then. A port that is no USB adapter is not waited for.
     """

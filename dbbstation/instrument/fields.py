@@ -36,7 +36,6 @@ class NotUnderstood(ValueError):  # noqa: N818 (it is no error of the program: m
     """These bytes are not what the grammar says.
 
     Args:
-        what: is wrong with them.
         reason: the same in one word, for counting.
     """
 
@@ -72,7 +71,6 @@ class FrameParts:
         value: the number of the length, in device units, without the sign of a `sign` part.
         sign: 1 or -1.
         unit: None: the unit that the protocol declares.
-        counter: sample counter.
         status, said, remedy: the worst status that a part reported.
         text: what the device says in words of its own.
         digits: of the length: how many stood before its point and behind it; None where it is not written in decimal digits.
@@ -100,7 +98,6 @@ class Content:
 
     Attributes:
         value: signed, in device units.
-        counter: of the sample.
         voice: the code or bit that speaks of a status.
         features: what the device has switched on, for optional parts.
     """

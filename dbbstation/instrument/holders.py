@@ -14,7 +14,6 @@ def holders(port: str, proc: Path = _PROC) -> list[str]:
     Linux tells of processes of the same user, and to root of all; elsewhere the list is empty.
 
     Args:
-        port: name of a device.
         proc: folder of the system's processes.
     """
     target = os.path.realpath(port)

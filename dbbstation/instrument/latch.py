@@ -16,7 +16,6 @@ class Latch:
 
     Attributes:
         t_s: the likeliest, by the host's clock [s].
-        uncertainty_s: one standard deviation [s].
     """
 
     t_s: float
@@ -33,10 +32,7 @@ def latch_of(protocol: Protocol, *, asked_s: float, first_byte_s: float, baud: i
     could carry it says that its times do not hold: the moment lies anywhere between asking and the first byte.
 
     Args:
-        protocol: of the device.
         asked_s: when the request was handed to the system.
-        first_byte_s: when the first byte of the reply was seen, by the same clock.
-        baud: of the line.
     """
     character_s = protocol.line.character_s(baud)
     sent_s = asked_s + len(protocol.ask.request) * character_s

@@ -62,7 +62,6 @@ def load_instrument(name_or_file: str | Path, profile: str | None = None) -> Pro
     """Return the protocol of a known instrument, or of a file (a name that ends in `.yaml`).
 
     Args:
-        name_or_file: of the instrument.
         profile: variant of the device; the usual one where none is named.
 
     Raises:
@@ -93,7 +92,6 @@ def with_zero(protocol: Protocol, zero_mm: float | None) -> Protocol:
     """Return the protocol of a device that shows how far it is from its zero, with the length at which it shows zero.
 
     Args:
-        protocol: of any device.
         zero_mm: distance of the ball centres at which it shows zero; None where the device shows whole lengths.
 
     Raises:

@@ -65,12 +65,10 @@ class Link:
     """An open line to an instrument.
 
     Args:
-        port: the open port.
         name: what messages call it.
         owned: close the port with the link; a port that somebody else opened stays open.
         log: where every byte is written down.
         marks: takes out what the system marks damaged characters with; None where it marks none.
-        has_bits: it is a line with bits, not a pseudo-terminal.
     """
 
     def __init__(
@@ -174,7 +172,6 @@ def open_link(
 
     Args:
         port: name of a port (`/dev/ttyUSB0`, `COM3`), a URL of pyserial (`socket://127.0.0.1:4001`), or an open port.
-        line: its settings.
         baud: baud rate to use instead of the usual one.
         log: where every byte is written down.
         text: all that comes is text, so that characters with a wrong parity or stop bit can be marked in it.

@@ -25,10 +25,9 @@ class Number(Schema):
     """What all numbers share.
 
     Attributes:
-        of: what it counts.
         modulus: of a counter: it starts again from 0 there.
-        scale: of a length: what one on the wire stands for, in the length's unit; 0.0001 where a device leaves out the
-            decimal point of four decimals.
+        scale: of a length: what one on the wire stands for, in the length's unit; 0.0001 where a device leaves out the decimal
+            point of four decimals.
         specials: contents that are no number.
     """
 
@@ -111,7 +110,6 @@ class DecimalText(Number):
     Attributes:
         width: characters, sign and decimal point included; None: as many as it takes, at most `max_width`.
         decimals: decimals that the device writes; others are understood only with `decimals_vary`.
-        point: the decimal point.
         pad: what fills the width on the left.
         signed: the sign stands in this field; `plus` is what a positive number has there. Where it has something, a number
             without a sign is not understood; a blank is, where blanks fill up.
@@ -191,12 +189,10 @@ class Integer(Number):
 
     Attributes:
         size: bytes of the number (in hexadecimal text: half the characters).
-        order: of the bytes.
         signed: two's complement.
         written: `binary`, `bcd` (two decimal digits in a byte), `hex` or `HEX` (text).
-        tags: upper bits of each byte, in wire order, where a device marks its bytes so that a listener can find the
-            start; the other `payload_bits` carry the number.
-        payload_bits: bits of each byte that carry the number.
+        tags: upper bits of each byte, in wire order, where a device marks its bytes so that a listener can find the start; the
+            other `payload_bits` carry the number.
     """
 
     kind: Literal["integer"]

@@ -39,7 +39,6 @@ class PolledReply:
 
     Attributes:
         heard: the reply, or as garbage whatever came instead before patience ended.
-        first_s: when its first byte was seen [s].
         raw: all bytes, in wire order.
     """
 

@@ -75,7 +75,6 @@ class Profile(Schema):
     """One variant: keys that it has instead of those of the file. Lists are replaced whole, and nothing removes a key.
 
     Attributes:
-        title: what the variant is.
         references: more of them, beside those of the file.
     """
 
@@ -103,7 +102,6 @@ def variant(document: YamlDocument, name: str, faults: list[Problem]) -> Protoco
     Args:
         document: of the file, which is valid as a `ProtocolFile`.
         name: of the profile; any other than those under `profiles` is the usual one.
-        faults: where faults are added.
     """
     chosen = _merged(document, name if name in document.data.get("profiles", {}) else "")
     protocol = validate(chosen, Protocol, faults)

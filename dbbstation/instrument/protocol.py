@@ -84,7 +84,6 @@ class FollowUp(Schema):
     """What is asked once after a fault, to hear what it is in the device's own words.
 
     Attributes:
-        request: bytes sent.
         frames: the first is the answer while there is a fault, others that there is nothing to tell. All are messages.
     """
 
@@ -103,13 +102,9 @@ class Ask(Schema):
     """How a reading is obtained.
 
     Attributes:
-        mode: `poll`: `request` before each; the device takes the length whenever it likes before it replies. `latch`: the
-            request makes it take the length, within `timing.latch_bounds_s`. `stream`: it sends by itself once it is
-            started. `request` is the name that `latch` had in older files.
-        request: bytes.
-        request_end: what every request, command and follow-up ends with.
-        start, stop: commands.
-        follow_up: what is asked after a fault.
+        mode: `poll`: `request` before each; the device takes the length whenever it likes before it replies. `latch`: the request
+            makes it take the length, within `timing.latch_bounds_s`. `stream`: it sends by itself once it is started. `request`
+            is the name that `latch` had in older files.
     """
 
     mode: Literal["request", "poll", "latch", "stream"]
@@ -153,7 +148,6 @@ class Length(Schema):
 
     Attributes:
         unit: of the number, unless a code in the frame names another one.
-        mm_per_count: for unit `count`.
         sense: -1 where the number falls when the balls move apart.
         range_mm: lengths outside are reported as overrange.
         stroke_mm: travel of the gauge from the bar's calibrated length, either way; circles of other radii are refused.
@@ -229,7 +223,6 @@ class Protocol(Schema):
 
     Attributes:
         name: what it is called on the command line; the file's name without `.yaml`.
-        title: what it is.
         profile: which variant of the device this is; empty where the file has no variants.
         setup: what the operator sets on the device.
         references: manual pages.

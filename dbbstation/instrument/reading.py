@@ -25,13 +25,11 @@ class Reading:
     Attributes:
         t_s: host time of the sample, monotonic, in s; 0 where there is no clock (a codec alone).
         length_mm: length in mm; None exactly when the device gave no number (`status` is then not `ok`).
-        status: see `Status`.
         lost: samples lost immediately before this one (gap of the counter, or replies that could not be read).
         counter: the device's own sample counter, None where its wire has none.
         said: what the device said where `status` is not `ok`; why it is doubted where it is `doubtful`.
-        remedy: what to do about it.
-        t_uncertainty_s: standard uncertainty of `t_s` where the request bounds it [s]; None of a stream, whose clock does
-            better than its bounds.
+        t_uncertainty_s: standard uncertainty of `t_s` where the request bounds it [s]; None of a stream, whose clock does better
+            than its bounds.
         first_byte_s: host time at which the first byte had arrived at the latest, by the clock of `t_s` [s]; 0 without.
     """
 

@@ -26,12 +26,8 @@ class Tally:
     """What a driver has seen since `start`.
 
     Attributes:
-        readings: handed out.
         lost: samples that never came, or came and were rejected.
-        doubtful: handed out as doubtful.
         rejected: frames and stretches of bytes that were not believed, by reason.
-        garbage_bytes: bytes of these.
-        garbage: an example of them.
         reconnected: how often the line was opened again.
     """
 
@@ -56,15 +52,12 @@ class Reception:
     """One line that is being read.
 
     Attributes:
-        protocol: of the instrument.
         where: name of the port.
-        baud: rate of the line.
         clock: what stamps readings [s].
         timeout_s: patience before a silent line is an error, in real seconds.
         memory_s: how long the quickest arrival of a stream's samples is remembered, by the clock.
         tally: counts what comes.
         stop: set when reading shall end.
-        put: takes every reading.
         eighth_bit_marks: the eighth bit of a character of seven can only be the mark of a wrong parity.
     """
 
@@ -89,7 +82,6 @@ class Reception:
 
         Args:
             raw: what came instead, empty where nothing did.
-            why: what was wrong with it.
         """
         if not raw:
             heard_before = self.tally.readings > 0

@@ -23,7 +23,6 @@ def looks_like(raw: bytes, other_than: Protocol) -> list[Protocol]:
 
     Args:
         raw: what came over the line.
-        other_than: the instrument that was expected, which is left out.
     """
     found = []
     for name in known_instruments():

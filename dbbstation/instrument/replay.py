@@ -24,9 +24,7 @@ class Replayed:
 
     Attributes:
         t_s: when its last byte came, in s since the log was opened.
-        raw: the bytes.
         reading: what they tell; None where they are not understood.
-        why: what was wrong with them.
     """
 
     t_s: float

@@ -30,9 +30,7 @@ class Placed(Generic[Held]):
     """A sample with its place in the sequence.
 
     Attributes:
-        sample: as given.
         lost: samples missing before it; None: it is rejected.
-        why: why it is rejected.
     """
 
     sample: Held

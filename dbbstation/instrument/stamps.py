@@ -15,10 +15,6 @@ class MachineTime:
     """Clock of a virtual machine that waits until every sample is read: samples are counted, and no arrival is timed.
 
     As a clock it gives the time of the last sample.
-
-    Args:
-        period_s: between samples.
-        begins_s: machine time before the first sample [s].
     """
 
     def __init__(self, period_s: float, begins_s: float) -> None:
@@ -27,11 +23,7 @@ class MachineTime:
         self._number = 0
 
     def stamp(self, _seen_s: float, lost: int = 0) -> float:
-        """Return the time of the next sample, in s, at most a period early: where in its period it lies is unknown.
-
-        Args:
-            lost: samples missing before it.
-        """
+        """Return the time of the next sample, in s, at most a period early: where in its period it lies is unknown."""
         self._number += 1 + lost
         return self()
 
@@ -44,7 +36,6 @@ class StreamStamps:
     """Sample times of a stream that is paced by the device.
 
     Args:
-        period_s: nominal time between samples.
         memory_s: how long a small delay is remembered. A device whose clock is off by 100 ppm drifts 0.2 ms in 2 s.
     """
 
@@ -60,7 +51,6 @@ class StreamStamps:
 
         Args:
             seen_s: when its last byte can have left the device at the latest.
-            lost: samples missing before it.
         """
         self._number += 1 + lost
         offset_s = seen_s - self._number * self._period_s

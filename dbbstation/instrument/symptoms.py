@@ -58,11 +58,7 @@ def garbage(
     """Return the error for bytes that are no reading, with the likeliest cause.
 
     Args:
-        protocol: that is expected.
         where: name of the port.
-        raw: the bytes.
-        why: what is wrong with them.
-        baud: of the port.
         marked: the eighth bit of a character of seven can only be the mark of a wrong parity.
     """
     return InstrumentError(

@@ -52,7 +52,6 @@ class ErrorTable(Schema):
     """The number of an error, with what each means; a number that is not listed is reported as it is.
 
     Attributes:
-        width: characters of a number.
         codes: what is known; the first is what the virtual instrument says of a fault that no other code fits better.
     """
 

@@ -61,12 +61,7 @@ def inlined(part: Kernel) -> Kernel:
 
 
 class _Kernel:
-    """A loop that reaches the compiler when it is called: importing that takes longer than most commands in all.
-
-    Args:
-        function: the loop.
-        options: of the compiler.
-    """
+    """A loop that reaches the compiler when it is called: importing that takes longer than most commands in all."""
 
     def __init__(self, function: Callable[..., Any], **options: bool) -> None:
         self._function = function

@@ -37,7 +37,6 @@ class Difference:
     Attributes:
         key: as the machine file has it, such as `masses.platform_kg`; with the strut where it has a value for each.
         one: value in the first file, as text with every digit; `not given` where it has none.
-        other: value in the second.
     """
 
     key: str
@@ -71,10 +70,6 @@ def check_model_is_of(machine: Machine, calibrated: Machine) -> None:
 
     Travel, tolerances and the name may differ, and so may what only one of the two files states: a model does not use
     what was added to the machine file later.
-
-    Args:
-        machine: that it is used for.
-        calibrated: nominal machine of the model.
 
     Raises:
         ModelError: names what differs, with both values.

@@ -68,7 +68,6 @@ class Masses:
     """What gravity acts on; a part that is not known is None.
 
     Attributes:
-        platform_kg: platform with spindle [kg].
         centre_of_gravity_above_tip_mm: on the platform's axis, from the tool tip [mm].
     """
 
@@ -129,15 +128,11 @@ class Machine:
     """The nominal machine: what its controller believes.
 
     Attributes:
-        name: as the machine file has it.
-        hexapod: nominal joints.
-        travel: limits.
-        reference_length_error_mm: already corrected by the controller, which drives strut i to
-            F_i(T) minus this, shape (6,) [mm].
+        reference_length_error_mm: already corrected by the controller, which drives strut i to F_i(T) minus this, shape (6,)
+            [mm].
         screw_lead_mm: travel of a strut per turn of its screw [mm]; None where not known.
         masses: what gravity acts on; None where not known.
-        joint_tolerance_mm: standard deviation of a base-joint coordinate after assembly [mm]; None
-            where not known.
+        joint_tolerance_mm: standard deviation of a base-joint coordinate after assembly [mm]; None where not known.
         compliance: of the struts as designed; None where not known.
         strut_masses: of the struts as designed; None where not known.
         joint_axes: of universal joints; None where not known, or where the joints are balls.

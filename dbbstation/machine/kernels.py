@@ -154,7 +154,6 @@ def _orthogonalise(matrix: NDArray[np.float64], triangle: NDArray[np.float64], s
     (1992) 176-190]
 
     Args:
-        matrix: to solve with.
         triangle: gets what was along each column c and, on its diagonal, 1/|c|², shape (6, 6, LANES).
         sound: 1.0 where the matrix has full rank, 0.0 where it has not or is not a number, shape (LANES,).
     """

@@ -65,7 +65,6 @@ def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> F
     """Poses at which the struts have these lengths [CAL eq 2].
 
     Args:
-        hexapod: joints.
         length_mm: strut lengths, shape (n, 6) [mm].
         near: where Newton-Raphson starts, usually the commanded poses.
 
@@ -179,10 +178,8 @@ def bar_sensitivity(
 
     Args:
         hexapod: the actual joints.
-        frames: the actual poses.
         fixed_ball_mm: centre of the ball on the table, machine frame, shape (3,) or (n, 3) [mm].
-        tool_ball_mm: centre of the moving ball in the platform frame, shape (3,) or (n, 3) [mm];
-            the tool tip by default.
+        tool_ball_mm: centre of the moving ball in the platform frame, shape (3,) or (n, 3) [mm]; the tool tip by default.
 
     Raises:
         KinematicsError: a pose where the platform can move with its struts locked.

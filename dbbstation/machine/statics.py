@@ -92,7 +92,6 @@ def transverse_load(struts: Struts, pull_n: NDArray[np.float64]) -> Load:
     [GRAV eq 3 and 6] have the moment; [GRAV eq 1] leaves the force out, which belongs there as well.
 
     Args:
-        struts: at the poses.
         pull_n: forces on the platform at its joints, shape (n, 6, 3) [N].
     """
     return Load(pull_n.sum(axis=1), np.cross(struts.arm_mm, pull_n).sum(axis=1))
@@ -104,7 +103,6 @@ def strut_tensions(struts: Struts, load: Load) -> NDArray[np.float64]:
     Solves J^T T = [F, M] for each pose: [GRAV eq 1 and 6] with the force signed, where eq 7 prints its magnitude.
 
     Args:
-        struts: at the poses.
         load: on the platform, one row per pose.
 
     Raises:
@@ -158,8 +156,6 @@ def stretch_mm(
     the joint, L / (2 l) of its weight. The motor behind the joint stretches nothing.
 
     Args:
-        struts: at the poses.
-        compliance: of every strut.
         tension_n: at the platform joints, shape (n, 6) [N].
         masses: of every strut; None for struts without weight.
     """
@@ -181,7 +177,6 @@ def motor_loads(
     what all potential energy gains when one motor shortens its strut.
 
     Args:
-        struts: at the poses.
         tension_n: at the platform joints, shape (n, 6) [N].
         masses: of every strut; None for struts without weight.
     """
@@ -203,7 +198,6 @@ def base_loads(
     A strut at rest hands on to the base what the platform does to it, T u - f, and its own weight.
 
     Args:
-        struts: at the poses.
         tension_n: at the platform joints, shape (n, 6) [N].
         masses: of every strut; None for struts without weight.
     """

@@ -53,10 +53,9 @@ class Passed:
     """What a model remembers of a path so far, between two stretches.
 
     Attributes:
-        model: the machine's own sources.
         states: of the sources with a history, those first whose errors build up, else in the model's order.
-        held_back_mm: what the history added to the driven lengths in the last row, shape (6,) [mm]: where the search begins
-            in the next.
+        held_back_mm: what the history added to the driven lengths in the last row, shape (6,) [mm]: where the search begins in
+            the next.
     """
 
     model: MachineModel

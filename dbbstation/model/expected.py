@@ -39,7 +39,6 @@ def expected_circle(
 
     Args:
         observation: the run; of its readings nothing is used but the angles at which they were taken.
-        known_by: the nominal machine, or a model that was identified.
         causes: all that are known; those of the machine are left out where the model was identified.
 
     Raises:
@@ -104,7 +103,6 @@ class _Acting:
         at_a_pose: whether it acts wherever the machine stands, whatever the way there and the time.
         scatters: variances of it that the difference of two runs of one circle has: two where each mounting has its own, one of
             what grows with time.
-        moving: whether it acts where the machine moves, and not where it stands.
     """
 
     key: tuple[str, str]

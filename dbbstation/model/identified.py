@@ -91,9 +91,8 @@ def known_u(variance: NDArray[np.float64], along: NDArray[np.float64]) -> NDArra
     """Standard uncertainties; NaN where they would rest on a guess for their greater part.
 
     Args:
-        variance: of what was identified.
-        along: variance along what the recordings cannot determine, each combination at its plausible size. The smaller part
-            is part of the uncertainty; the greater part is no measurement.
+        along: variance along what the recordings cannot determine, each combination at its plausible size. The smaller part is
+            part of the uncertainty; the greater part is no measurement.
     """
     return np.sqrt(np.where(along > variance, np.nan, variance + along))
 

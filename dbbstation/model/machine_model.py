@@ -61,7 +61,6 @@ class MachineModel:
         """All sources together, but for those of motor currents, which change nothing else.
 
         Args:
-            motion: as commanded.
             there: where weights pull at the machine; None: at the commanded poses of the nominal machine.
 
         Raises:
@@ -180,9 +179,6 @@ class Actual:
 
     Attributes:
         model: whose sources are at work.
-        motion: as commanded.
-        hexapod: its joints.
-        frames: of its platform.
         effect: of all sources together.
     """
 

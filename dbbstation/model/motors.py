@@ -22,7 +22,6 @@ class MotorCurrents:
     """Predicted currents of one run.
 
     Attributes:
-        model: that predicts.
         driven: the run as commanded, with the loads of the motors.
         there: where the machine really is.
         current_a: at the rows that count, shape (n, 6) [A].

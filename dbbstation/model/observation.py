@@ -100,11 +100,7 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """Motions of runs, each made when it is asked for: its poses are six numbers a sample.
-
-    Attributes:
-        observations: the runs.
-    """
+    """Motions of runs, each made when it is asked for: its poses are six numbers a sample."""
 
     observations: Sequence[Observation]
 

@@ -32,7 +32,6 @@ class RootSearch:
 
     Attributes:
         at: where f is wanted next; where `done`, the answer, shape (k,).
-        done: whether the search is over.
         lost: number, from 1, of the first function that has no zero near the guess; 0 where all have.
     """
 

@@ -28,7 +28,6 @@ class SimulatedCircle:
     Attributes:
         t_s: time since the first sample [s].
         theta_deg: angle from +X towards +Y [deg].
-        length_mm: predicted reading [mm].
         commanded: poses of the lead-in and the turn, shape (m + n, 6) [mm, deg].
     """
 
@@ -50,7 +49,6 @@ def simulate_circle(
 
     Args:
         model: machine and measurement effects.
-        circle: as commanded.
         setup: ball and bar.
         samples: equally spaced over the turn.
         started_s: start of the turn after that of the session [s]; None where the model needs no time.

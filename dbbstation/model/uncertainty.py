@@ -32,7 +32,6 @@ def position_uncertainty_mm(
     and where what the recordings could not determine would be the greater part of it (`known_u`).
 
     Args:
-        identified: the model.
         motion: commanded poses.
         about_mean: of positions less their mean over the motion, which a common shift does not change.
 
@@ -60,7 +59,6 @@ def range_uncertainty_mm(identified: IdentifiedModel, motion: Motion, axis: int)
     To first order that of the two poses where these are.
 
     Args:
-        identified: the model.
         motion: commanded poses.
         axis: 0, 1 or 2 for X, Y or Z.
 
@@ -117,7 +115,6 @@ def predicted_poses(
     """Return the actual poses for commanded ones, each by itself, and how well their positions are known.
 
     Args:
-        identified: model with its covariance.
         poses: commanded, shape (n, 6) [mm, deg], numbers of any type.
         progress: told how many of how many are done.
 
@@ -155,7 +152,6 @@ class PoseErrors:
         common_shift_um: mean error, X, Y, Z [µm].
         error_about_mean_rms_um: root mean square without the common shift [µm].
         greatest_uncertainty_um: largest standard uncertainty of a position, its length over the axes; None where not known [µm].
-        greatest_uncertainty_by_axis_um: the same of each axis [µm].
     """
 
     greatest_error_um: float

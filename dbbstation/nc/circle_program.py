@@ -62,11 +62,10 @@ def circle_toolpath(
     their numbers. A chord lies `chord_error_mm` inside the circle at most.
 
     Args:
-        circle: what to run, with its direction.
         name: of the program, for messages.
         step_deg: greatest angle between points of the arc [deg].
-        approach: where rapids go and the program waits for the bar to be put on and taken off; None: the bar is on
-            already and stays on, so the program starts with a feed move to its first point and ends at its last.
+        approach: where rapids go and the program waits for the bar to be put on and taken off; None: the bar is on already and
+            stays on, so the program starts with a feed move to its first point and ends at its last.
     """
     first, last = circle.poses(_ends_deg(circle), circle.feed_in_mm)
     path = ToolpathBuilder(name)

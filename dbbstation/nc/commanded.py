@@ -34,7 +34,6 @@ def commanded_poses(text: str, file: str, observation: Observation) -> NDArray[n
     Args:
         text: the program that was run.
         file: its name; the extension tells the dialect, or what the program holds.
-        observation: the run that it commanded.
 
     Raises:
         InputError: the program cannot be read, or does not run this circle.
@@ -54,7 +53,6 @@ def poses_at_progress(toolpath: Toolpath, circle: Circle, phi_deg: NDArray[np.fl
     feed-out in that stretch, which moves the middle nowhere.
 
     Args:
-        toolpath: the program.
         circle: the run's circle and direction.
         phi_deg: progress, negative in the lead-in, shape (n,) [deg].
 

@@ -62,7 +62,6 @@ class Slow:
 
     Attributes:
         line: of the program; 0 where there is none.
-        asked_mm_min: F of the program.
         reached_mm_min: F at which it would lose none.
         chord_um: chord error at which it would keep its F, with pieces of the length that F needs [µm].
     """
@@ -121,12 +120,11 @@ def compensate_toolpath(
     machine will have.
 
     Args:
-        toolpath: as it should be.
         model: calibrated model; what belongs to the machine is inverted.
         chord_mm: moves at feed are written in the longest pieces that keep this tolerance; None writes one move for each.
         keep_arcs: chords of arcs stay as they are: they were chosen for the feed before.
-        started_s: start of the program on the time scale of the model's sessions, for sources that need time [s];
-            None: not known.
+        started_s: start of the program on the time scale of the model's sessions, for sources that need time [s]; None: not
+            known.
         largest_mm: greatest correction that is applied, of the tip and of a point `LEVER_MM` from it by the tilt [mm].
         planner: the control on its machine, which says how long pieces must be for their feed.
         prefer: what to keep where chord and feed cannot both be kept; None: the chord, and F as it is.
@@ -205,7 +203,6 @@ class _Part:
     """What is commanded along some rows of a toolpath.
 
     Attributes:
-        pieces: of the whole toolpath, k of them.
         commanded: pose at the end of each, shape (k, 6) [mm, deg].
         shift_mm: correction there, shape (k,) [mm].
         off_mm: how far the curve leaves each piece, shape (k,) [mm].
@@ -270,10 +267,6 @@ def _slowest(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner, shor
     """Return the move that loses most of its feed; None where all keep it, and all together with their ramps.
 
     Args:
-        toolpath: as it was.
-        done: compensated, with F as it was.
-        of: runs of their rows.
-        planner: the control on its machine.
         short: how near to the curve the pieces are that the feed needs, by run [mm].
     """
     cutting = cuts(done)

@@ -57,10 +57,8 @@ class Dialect(ABC):
         """Return what a program commands.
 
         Args:
-            text: the program.
             name: file it came from, for messages.
-            start: pose before the program, shape (6,) [mm, deg]; None where unknown: then its first move must
-                name all six axes.
+            start: pose before the program, shape (6,) [mm, deg]; None where unknown: then its first move must name all six axes.
 
         Raises:
             InputError: faults with line and column.

@@ -54,7 +54,6 @@ class Inverse:
     """The model to compensate with.
 
     Attributes:
-        model: calibrated model.
         origin: where it comes from, for the header: what by which name or hash.
         started_s: start of each program on the time scale of the model's sessions [s]; None where not known.
         identified: the same model with the covariance of its values; None where that is not known.
@@ -77,8 +76,6 @@ class Program:
     """A program ready to be written.
 
     Attributes:
-        name: file name.
-        text: the program.
         points: moves at feed.
         greatest_um: largest correction of a programmed point [µm]; None in a nominal program.
         chord_um: largest distance between a move and the path that it stands for [µm]; None in a nominal program.
@@ -91,7 +88,6 @@ class Program:
         feed_s: time of all moves at feed, as the control plans them [s]; None in a nominal program.
         nominal_feed_s: of the program that it was made from [s]; None in a nominal program.
         rapid_s: time of all rapids, as the control plans them at the machine's greatest feed; None in a nominal program [s].
-        nominal_rapid_s: of the program that it was made from [s].
         cost: what a preference cost, in words; empty without one.
         slower_rapids: what rapids lose, in words; empty where that is next to nothing.
         merged_um: distance of points that were left out from the lines in their place, where short moves had to be made one [µm].
@@ -134,9 +130,7 @@ def circle_programs(
     """Return the programs of all runs of a plan, named TEST-DIRECTION with the dialect's extension.
 
     Args:
-        plan: the tests.
         machine: nominal machine, whose travel holds.
-        dialect: to write in.
         inverse: compensate with this; None for nominal programs.
         origin: where plan and machine come from, for the header.
         tests: names of the tests wanted; empty for all.
@@ -191,7 +185,6 @@ def dry_run(
     """Try the nominal programs of all runs of a plan, and write none.
 
     Args:
-        plan: the tests.
         machine: nominal machine, whose travel and feeds hold.
         tests: names of the tests wanted, which the plan has; empty for all.
         step_deg: greatest angle between programmed points [deg].
@@ -285,10 +278,7 @@ def _or_the_feed_that_is_kept(
     more than they reach.
 
     Args:
-        written: makes the program.
-        what: of this.
         slower: the same with no F beyond this [mm/min].
-        inverse: the model to compensate with.
 
     Raises:
         TooSlowError: names that feed.

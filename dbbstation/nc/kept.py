@@ -26,9 +26,7 @@ class TooSlowError(StationError):
     """The control cannot keep a feed.
 
     Args:
-        name: of the program.
         slow: the move that loses most.
-        asked_um: chord error that was asked for [µm].
         machine: whose acceleration was reckoned with.
         prefer: what was preferred; None: nothing.
     """
@@ -59,7 +57,6 @@ class MergedMovesError(StationError):
     """The feed is kept in each move, and the control is faster through the nominal program, whose short moves it makes one.
 
     Args:
-        refused: without making them one.
         merged_um: distance of points that are left out from the lines in their place [µm].
     """
 

@@ -130,7 +130,6 @@ def _chain_ends(
 
     Args:
         points: X, Y, Z at the end of each line, shape (k, 3) [mm].
-        begins: at its begin.
         within_mm: distance from the one line that its points have at most, shape (k,).
         new: whether something stands before the line, shape (k,).
     """

@@ -114,11 +114,8 @@ def segments_of(
     """Return the written moves that some rows of a toolpath belong to.
 
     Args:
-        toolpath: of n rows.
         rows: of moves of one kind that move the tool tip, at least one.
         limited: rows in which A, B or C move, on a control that does not look ahead there, shape (n,).
-        acceleration_mm_s2: of the tool tip.
-        in_chords: whether arcs are written as their chords.
     """
     number = moves_of(toolpath)[rows]
     first = np.concatenate([[True], number[1:] != number[:-1]])
@@ -158,7 +155,6 @@ def _ways(toolpath: Toolpath, rows: NDArray[np.int64], at: NDArray[np.float64]) 
     """Unit vectors of the tip's way in some rows at one of their ends, those of arcs along their tangent, shape (k, 3).
 
     Args:
-        toolpath: of n rows.
         rows: shape (k,).
         at: poses at that end of each row of the toolpath, shape (n, 6).
     """
@@ -193,9 +189,6 @@ def seconds_of(
     """Return the time of each row of the segments, shape (n,) [s].
 
     Args:
-        segments: m of them.
-        acceleration_mm_s2: of the tool tip.
-        cycle_s: servo period.
         alone_mm_s: speed that a segment of its length reaches with half the acceleration, shape (m,) [mm/s].
     """
     a, length = acceleration_mm_s2, segments.length_mm
@@ -262,10 +255,8 @@ def _takes(
     Args:
         length_mm: shape (k,).
         begins: speed at their begin, shape (k,) [mm/s].
-        ends: at their end.
         acceleration: shape (k,) [mm/s²].
         most_mm_s: speed that they do not exceed, shape (k,).
-        of_peak: share of the speed that they would reach.
     """
     peak = of_peak * np.sqrt(np.maximum((2.0 * acceleration * length_mm + begins**2 + ends**2) / 2.0, 0.0))
     peak = np.maximum(np.minimum(peak, most_mm_s), np.maximum(begins, ends))
@@ -293,10 +284,6 @@ class _Arcs:
 
     Attributes:
         enters: speed at its begin, 0 where the first move stops or hands over to the second [mm/s].
-        leaves: at its end.
-        mm_s: greatest speed in an arc.
-        cut_mm: what an arc takes from both moves.
-        length_mm: of an arc; 0 where there is none.
     """
 
     enters: NDArray[np.float64]

@@ -49,7 +49,6 @@ class LookAhead:
 
     Attributes:
         share: of a·L that v² reaches in a piece of length L [1].
-        cycle_s: servo period [s].
     """
 
     share: float
@@ -61,7 +60,6 @@ class Planner:
     """A control on a machine.
 
     Attributes:
-        acceleration_mm_s2: of the tool tip.
         look_ahead: of the control where A, B or C move; None: as far as it needs to.
     """
 

@@ -54,7 +54,6 @@ def seconds(toolpath: Toolpath, planner: Planner, fastest_mm_min: float) -> floa
     Args:
         toolpath: nominal or compensated.
         planner: the control on its machine.
-        fastest_mm_min: speed of a rapid [mm/min].
     """
     rows = _rows(toolpath)
     if planner.look_ahead is None or len(rows) == 0:
@@ -89,10 +88,8 @@ def corners_mm(
     say how far corners may be rounded: what holds then is not known, and could not be written again.
 
     Args:
-        done: compensated.
         turned: rows that moved A, B or C before they were compensated, shape (n,).
         planner: the control on its machine.
-        fastest_mm_min: speed of a rapid [mm/min].
     """
     rows = _rows(done)
     if planner.look_ahead is None or len(rows) < 2:  # noqa: PLR2004 - a pair

@@ -51,10 +51,6 @@ def dialect_named(name: str) -> Dialect:
 def dialect_of_file(file: str, text: str) -> Dialect:
     """Return the dialect that a program is in: its extension says, or what it holds where several have that one.
 
-    Args:
-        file: name of the program's file.
-        text: the program.
-
     Raises:
         StationError: no dialect has that extension, or several have it and the program does not tell them apart.
     """

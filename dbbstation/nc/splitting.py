@@ -134,7 +134,6 @@ def runs_of(toolpath: Toolpath, needed_mm: NDArray[np.float64]) -> NDArray[np.in
     direction: a curve in short lines, whose pieces may join any of its points.
 
     Args:
-        toolpath: in rows.
         needed_mm: length of a piece that keeps the feed of each row, shape (n,).
     """
     moves = moves_of(toolpath)
@@ -165,7 +164,6 @@ def split(
     """Return the pieces in which a toolpath is written.
 
     Args:
-        curve: to follow.
         model: whose shortest period says how closely to look.
         tolerance_mm: greatest distance of a piece from the curve.
         needed_mm: length of a piece that keeps the feed, for each row; 0 where any does, shape (n,).
@@ -262,7 +260,6 @@ def with_begins(at_places: NDArray[np.float64], start: NDArray[np.float64]) -> N
     """Poses at places of each piece, shape (k, m, 6), with that at its begin before them, shape (k, 1 + m, 6).
 
     Args:
-        at_places: the last place of each piece is its end.
         start: pose before the first piece, shape (6,).
     """
     begins = np.vstack([start, at_places[:-1, -1]])

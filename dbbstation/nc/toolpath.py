@@ -81,28 +81,26 @@ class Toolpath:
     Attributes:
         name: what to call the program in messages; the file where it was read from one.
         kind: `RowKind` of each row, shape (n,).
-        poses: [X, Y, Z, A, B, C] after each row, shape (n, 6) [mm, deg]; NaN before the first move where nobody
-            knows where the machine stands.
+        poses: [X, Y, Z, A, B, C] after each row, shape (n, 6) [mm, deg]; NaN before the first move where nobody knows where the
+            machine stands.
         feed_mm_min: feed of `FEED` rows along the path of the tool tip, shape (n,) [mm/min]; NaN in other rows.
         feed_deg_min: feed of `FEED` rows in which nothing but angles move, shape (n,) [deg/min]; NaN in other rows.
         dwell_s: duration of `DWELL` rows, shape (n,) [s]; zero in other rows.
         line: line of the program that each row came from, counted from 1, shape (n,); 0 where there is none.
         text: words of `PAUSE`, `COMMENT` and `FUNCTION` rows, by row.
         start: pose before the first row, shape (6,); None where unknown.
-        corners_mm: how far the control may round the corner at the end of each row, shape (n,) [mm]: 0 for exact path,
-            infinite for as much as the feed needs, NaN where the program does not say.
-        system: in which the numbers of each row count, shape (n,): `MACHINE_SYSTEM`, `ACTIVE_SYSTEM`, or 1 to 9 for one
-            of `SYSTEMS`.
+        corners_mm: how far the control may round the corner at the end of each row, shape (n,) [mm]: 0 for exact path, infinite
+            for as much as the feed needs, NaN where the program does not say.
+        system: in which the numbers of each row count, shape (n,): `MACHINE_SYSTEM`, `ACTIVE_SYSTEM`, or 1 to 9 for one of
+            `SYSTEMS`.
         frame: in which the place of each axis was named last, up to each row, shape (n, 6): values as in `system`, or
             `BY_INCREMENTS`.
-        guard: not None where the program stops, says why and ends before it moves, if the work system in force or one of
-            these, G92 or a tool length is not zero.
-        ending: how the program ends.
+        guard: not None where the program stops, says why and ends before it moves, if the work system in force or one of these,
+            G92 or a tool length is not zero.
         units_said: whether the program says in which unit its lengths are.
-        numbers: line numbers of the first and the last line that have one; a compensated program carries its checksum
-            there.
-        merges_mm: distance from one straight line within which the control makes short moves one before it plans them, shape
-            (n,) [mm]; 0 where it makes none.
+        numbers: line numbers of the first and the last line that have one; a compensated program carries its checksum there.
+        merges_mm: distance from one straight line within which the control makes short moves one before it plans them, shape (n,)
+            [mm]; 0 where it makes none.
         arc: of rows that are chords of an arc: X and Y of its centre [mm] and the angle that the chord spans [rad],
             counter-clockwise positive, shape (n, 3); the angle is 0 in straight rows. None: there are no arcs.
     """
@@ -295,7 +293,6 @@ class ToolpathBuilder:
     """Collects the rows of a toolpath.
 
     Args:
-        name: of the program.
         start: pose before the first row, shape (6,) [mm, deg]; None where unknown.
 
     Attributes:
@@ -303,8 +300,6 @@ class ToolpathBuilder:
         merge_mm: distance from one straight line within which the control makes those moves one [mm].
         system: in which the numbers of the moves that follow count, as `Toolpath.system`.
         increments: whether they are increments, which name no place.
-        guard: as `Toolpath.guard`.
-        ending: how the program ends.
         units_said: whether the program says in which unit its lengths are.
     """
 
@@ -337,7 +332,6 @@ class ToolpathBuilder:
 
         Args:
             pose: to go to, shape (6,) [mm, deg].
-            line: of the program.
             named: axes that the line names, 0 to 5; the others stay where they are.
             system: in which this move's numbers count; None: as those before it.
         """
@@ -359,9 +353,7 @@ class ToolpathBuilder:
 
         Args:
             poses: to go through, shape (k, 6) [mm, deg].
-            mm_min: feed of the tool tip [mm/min].
             deg_min: feed of moves that only turn [deg/min]; None: the same number.
-            line: of the program.
             named: axes that the line names, 0 to 5; the others stay where they are.
             system: in which the numbers of these moves count; None: as those before them.
             arc: that the moves are chords of, as a row of `Toolpath.arc`.

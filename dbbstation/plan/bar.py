@@ -32,16 +32,11 @@ class Bar:
     """The bar: recorded readings stay as they are; what is made of them is corrected by what it reads too long.
 
     Attributes:
-        serial_number: of the bar.
         calibrated_length_mm: distance between the ball centres that its calibration found [mm].
-        calibrator_uncertainty_mm: of that length, one standard deviation [mm].
-        calibrated: when; None where not noted.
-        temp_c: of the bar then [degC]; None where not noted.
         expansion_um_m_k: thermal expansion [µm/(m K)]; None where not noted.
         stroke_mm: travel of its gauge from that length, either way [mm]; None where not noted.
         reading_mm: what it read on its calibrator [mm]; None where not noted.
         temp_uncertainty_k: standard uncertainty of a temperature of the bar [K]; None where not noted.
-        calibrator_serial_number: of the calibrator; None where not noted.
     """
 
     serial_number: str

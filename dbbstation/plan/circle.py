@@ -45,7 +45,6 @@ class Circle:
         start_deg: angle where the full turn starts, from +X towards +Y [deg].
         overshoot_deg: arc travelled before and after the full turn [deg].
         feed_in_mm: how far outside the circle the feed-in starts, along the bar [mm].
-        elevation_deg: angle of the bar above the horizontal [deg].
         direction: sense of travel.
     """
 

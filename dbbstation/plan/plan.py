@@ -43,12 +43,10 @@ class Ball:
     Attributes:
         name: its key in the plan.
         bore: bore of the jig plate it stands in; None where it stands in no bore.
-        holder: what it stands on.
         centre_mm: centre in the machine frame (x, y, z) [mm].
-        uncertainty_mm: of the CMM, one standard deviation per axis [mm].
         repeatability_mm: of putting the holder up, one standard deviation per axis [mm].
-        place_known: False for a ball that is put up under the spindle, as the standard circular test does
-            [CAL III-A]; `centre_mm` is then where the machine is told to stand.
+        place_known: False for a ball that is put up under the spindle, as the standard circular test does [CAL III-A];
+            `centre_mm` is then where the machine is told to stand.
         plate: that its bore is in; None where it stands in no bore.
     """
 
@@ -68,8 +66,6 @@ class PlannedTest:
 
     Attributes:
         name: unique in the plan.
-        ball: the ball on the table.
-        circle: the circle in the first of its directions.
         directions: senses of travel, in the order they are run.
     """
 
@@ -88,8 +84,6 @@ class Plan:
     """Tests by name, in the order they are run.
 
     Attributes:
-        name: as the plan file has it.
-        tests: by name.
         repeat_at_end: tests measured a second time after all others, so that drift and height do not mix.
         largest_loss_percent: share of a run's samples that may be lost [%].
     """

@@ -32,14 +32,7 @@ FEWEST = 2
 
 @dataclass(frozen=True)
 class Scatter:
-    """A standard deviation from so many degrees of freedom.
-
-    Attributes:
-        s_um: estimate [µm].
-        low_um: lower end of its interval [µm].
-        high_um: upper end [µm].
-        freedom: degrees of freedom.
-    """
+    """A standard deviation from so many degrees of freedom."""
 
     s_um: float
     low_um: float
@@ -61,8 +54,6 @@ class Repeatability:
         together: of all coordinates, what a holder file states: one standard deviation per axis.
         rms_distance_um: root mean square of the distance from the mean place, what sigma sqrt(number of axes) estimates [µm].
         mean_distance_um: mean of that distance, corrected for the mean place that the mountings themselves give [µm].
-        places: number of places.
-        mountings: in all.
         axes_differ: probability of a ratio as great as that of the largest and the smallest variance, if all axes scatter alike.
         of_cmm_um: standard deviation of the CMM's readings that was taken off [µm].
     """
@@ -114,10 +105,8 @@ def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float 
     """Return the standard deviation that a sum of squares shows, and its chi-square interval.
 
     Args:
-        squares_um2: sum of squares of deviations from means [µm²].
         freedom: degrees of freedom f.
         cmm_um: standard deviation whose square is taken off the variance and both ends of its interval [µm].
-        level: probability of the interval.
     """
     tail = (1.0 - level) / 2.0
     variances = (

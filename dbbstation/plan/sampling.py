@@ -26,7 +26,6 @@ class Sampling:
 
     Attributes:
         points_per_turn: readings while the machine goes once round.
-        spacing_deg: between two of them [deg].
         highest_undulation: per revolution; what has more looks like something slower, and is not told apart from it.
     """
 
@@ -46,12 +45,7 @@ class Sampling:
 
 
 def sampling(circle: Circle, rate_hz: float) -> Sampling:
-    """Return what is seen of a circle.
-
-    Args:
-        circle: as commanded.
-        rate_hz: readings per second.
-    """
+    """Return what is seen of a circle."""
     points = rate_hz * FULL_TURN_DEG / circle.turning_deg_s
     return Sampling(points, FULL_TURN_DEG / points, int(points / POINTS_PER_UNDULATION))
 
@@ -61,6 +55,5 @@ def enough_feed_mm_min(circle: Circle, rate_hz: float) -> float:
 
     Args:
         circle: its radius counts.
-        rate_hz: readings per second.
     """
     return circle.feed_mm_min * sampling(circle, rate_hz).points_per_turn / (UNDULATIONS * POINTS_PER_UNDULATION)

@@ -62,7 +62,6 @@ class Tolerance:
     """A limit for one figure of some circles.
 
     Attributes:
-        figure: which.
         largest_um: greatest size that is within tolerance [µm].
         tests: names of the tests it holds for; empty for all.
         directions: senses of travel it holds for; empty for both.
@@ -85,9 +84,7 @@ class Worst:
     """The circle that comes nearest to a tolerance, or exceeds it most.
 
     Attributes:
-        tolerance: the limit.
         run: name of the run, such as a-ccw-1.
-        size_um: size of its figure [µm].
     """
 
     tolerance: Tolerance
@@ -104,7 +101,6 @@ def worst(tolerance: Tolerance, runs: Iterable[tuple[str, str, int, Mapping[Circ
     """Return the run with the largest figure that a tolerance holds for; None where it holds for none of them.
 
     Args:
-        tolerance: the limit.
         runs: test, direction, repeat and figures [µm] of each.
     """
     held = [

@@ -116,7 +116,6 @@ def bar_of_all(runs: Sequence[Seen], *, by_model: bool) -> Finding:
     Without a model a machine that makes all circles larger by as much explains the same readings, an odd one: then it cannot be told.
 
     Args:
-        runs: all that count.
         by_model: whether a model says where circles lie.
     """
     known = [one for one in runs if one.run.expected is not None and one.run.bar_stated]
@@ -172,9 +171,7 @@ class _Likelihood:
     """How likely readings are by ways in which programs may have run, whatever the size of the machine's errors.
 
     Args:
-        runs: n runs, each with where it should lie.
         read: coefficients of each along the travel of the plan, shape (7,) each [µm].
-        ways: k ways.
         longer: whether what a longer bar reads is wanted, too.
 
     Attributes:
@@ -198,7 +195,6 @@ class _Likelihood:
         """Return whether the readings are as near to what is expected as those of a machine with the causes that are known.
 
         Args:
-            way: which.
             longer_um: by how much the bar reads too long [µm].
         """
         off = self._few.off[:, way] - (longer_um * self._few.off[:, -1] if longer_um else 0.0)
@@ -210,11 +206,7 @@ class _Likelihood:
         return distances[int(np.argmin(unlikeliness))] <= length_quantile(self._dimensions) ** 2
 
     def gained(self, sigma_um: float) -> tuple[float, float]:
-        """Return by how much a longer bar makes the readings likelier, as a logarithm, and how much longer it is [µm].
-
-        Args:
-            sigma_um: standard deviation of that before.
-        """
+        """Return by how much a longer bar makes the readings likelier, as a logarithm, and how much longer it is [µm]."""
         off, column = self._few.off.T
         logarithms, amounts = [], []
         for size in SIZES:

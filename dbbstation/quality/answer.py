@@ -25,7 +25,6 @@ class RunAssessment:
     """What to do with a run.
 
     Attributes:
-        word: in one word.
         causes: of REPEAT, the one first that explains most of those behind it: what was found, and what to do, a sentence each.
         unseen: of CANNOT TELL, what could be wrong and shows in nothing that was measured so far.
     """
@@ -42,7 +41,6 @@ def answer(findings: Sequence[Finding], problem: str = "") -> RunAssessment:
     GOOD where every fault of `SHOWN_BY` would have shown. Without findings nothing was looked for: CANNOT TELL.
 
     Args:
-        findings: all that was looked for.
         problem: why the recording holds no circle; empty where it does.
     """
     wrong = [one for one in findings if one.wrong]

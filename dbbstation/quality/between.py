@@ -30,7 +30,6 @@ def direction(one: Seen, others: Others, expected: Expected | None = None) -> Fi
     [linear in the speed, or in its sign]. Odd ones, the centre above all, are compared.
 
     Args:
-        one: the run.
         others: what other runs of its session show.
         expected: where its circle should lie, by whatever says so best; None where nothing does.
     """

@@ -54,7 +54,6 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     machines have steps and spikes, from what the other reversals of the turn show.
 
     Args:
-        one: the circle.
         reversals_deg: angles at which struts turn round; none where they are not known [deg].
     """
     rest = one.residual_um - gaussian(one.raw.phi_deg, one.residual_um, FORM_UPR)
@@ -84,7 +83,6 @@ def near_reversals(
     Args:
         theta_deg: angles of the samples, 0 to 360, shape (n,) [deg].
         reversals_deg: angles at which struts turn round [deg].
-        reach_deg: how far beside a reversal counts [deg].
     """
     near = np.full(len(theta_deg), -1, dtype=np.int64)
     for number, place in enumerate(reversals_deg):

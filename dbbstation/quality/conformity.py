@@ -22,10 +22,8 @@ class Size:
     """A figure of one circle as measured.
 
     Attributes:
-        um: its size [µm].
         u_um: its standard uncertainty [µm]; None where a cause of unknown size counts.
         why_not: why it has none; empty where it has one.
-        known_um: the part of its standard uncertainty that is known [µm].
     """
 
     um: float
@@ -35,13 +33,7 @@ class Size:
 
 
 def conformity(size: Size, largest_um: float, coverage_factor: float) -> Conformity:
-    """Hold a figure against a limit.
-
-    Args:
-        size: the figure.
-        largest_um: the limit [µm].
-        coverage_factor: k of U = k u.
-    """
+    """Hold a figure against a limit."""
     if size.u_um is None:
         return Conformity.UNDECIDED
     expanded = coverage_factor * size.u_um

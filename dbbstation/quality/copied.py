@@ -39,12 +39,7 @@ BASE = 0x9E3779B97F4A7C15
 
 
 def copied(one: Seen, others: Sequence[Seen]) -> Finding:
-    """Return how many readings of the turn stand, in the same order, in another run of the session.
-
-    Args:
-        one: the run.
-        others: all other runs.
-    """
+    """Return how many readings of the turn stand, in the same order, in another run of the session."""
     assert one.analysis is not None  # noqa: S101 - asked before
     raw = one.analysis.raw
     chance = _chance(one.analysis)

@@ -50,10 +50,8 @@ class Finding:
     """One thing that was looked for in one run.
 
     Attributes:
-        name: what.
         value: the number found; None where there is none.
         limit: greatest value of a sound run; None where none can be given.
-        unit: of both.
         verdict: whether the value keeps the limit.
         text: what was found, where, and what to do where it is wrong; why it cannot be decided where it cannot.
         short: the same in the fewest words; empty where name, value and limit are that.
@@ -77,12 +75,8 @@ def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: 
     """Return a finding of a value that a limit is held against.
 
     Args:
-        name: what was looked for.
-        value: its size.
         limit: greatest that is sound.
-        unit: of both.
         sound: text where the limit is kept.
-        wrong: text where it is not.
         short: what was found, in the fewest words.
     """
     verdict = FindingVerdict.WRONG if value > limit else FindingVerdict.GOOD

@@ -49,7 +49,6 @@ class Forms:
         rest: what all else does that several places share, shape (r, q).
         off: columns of forms less what is expected without other runs, shape (r, k).
         log_determinant: of the covariance of what each place has alone, before it was made white.
-        tests: test of each row.
         dimensions: coefficients of each test.
         root: makes the rows of one place coefficients again, shape (r, r) [µm]; empty for several places.
     """
@@ -86,7 +85,6 @@ class Independent:
         rest: what all else does that several places share, shape (r, q).
         off: columns of forms less what is expected without other runs, shape (r, k).
         variance: of each row by the machine's causes, beside one by all else, shape (r,).
-        log_determinant: of the covariance by all else.
     """
 
     machine: NDArray[np.float64]

@@ -40,7 +40,6 @@ def chance_equal(squares_mm2: float, count: int, step_mm: float) -> float:
 
     Args:
         squares_mm2: sum of the squares of second differences where the length does not stand still [mm²].
-        count: how many of them there are.
         step_mm: smallest difference of two readings [mm].
     """
     if not count or not 0.0 < step_mm < inf:
@@ -58,9 +57,6 @@ def chance_of(variance_mm2: float, step_mm: float) -> float:
 def moving_noise(raw: RawCircle) -> tuple[float, int, float]:
     """Return what `chance_equal` is worked out of, from the readings of a turn that do not stand still.
 
-    Args:
-        raw: a turn of which not all readings are the same.
-
     Returns:
         Sum of the squares of second differences [mm²], how many they are, smallest difference of two readings [mm].
     """
@@ -77,9 +73,7 @@ def equal_limit(squares_mm2: float, count: int, step_mm: float, readings: float)
 
     Args:
         squares_mm2: sum of the squares of second differences where the length does not stand still [mm²].
-        count: how many of them there are.
         step_mm: smallest difference of two readings [mm].
-        readings: of a turn.
 
     Returns:
         Their number; infinite where the step is not finer than the noise, by the lower limit of what is known of it.
@@ -94,7 +88,6 @@ class HeldLength:
 
     Attributes:
         since_s: time of the first of the last equal readings [s].
-        equal: how many of them there are.
         step_mm: smallest difference of two readings so far [mm]; infinite before two differ.
     """
 
@@ -116,8 +109,6 @@ class HeldLength:
         """Take the next reading; noise is read where the length moves at least once a second.
 
         Args:
-            t_s: when it was taken [s].
-            length_mm: reading [mm].
             noise: whether differences may be noise; False where the machine feeds out.
         """
         if self._last is None or length_mm != self._last:

@@ -33,7 +33,6 @@ class Judgement:
     """What was found of one run.
 
     Attributes:
-        run: the run.
         analysis: its figures without a filter; None where it shows no circle.
         findings: all that was looked for, in the order of `Name`.
     """
@@ -67,12 +66,7 @@ def judge(runs: Sequence[Run], progress: Callable[[int, int], None] = lambda _do
 
 @dataclass(frozen=True, eq=False)
 class _Pair:
-    """Two runs of one test.
-
-    Attributes:
-        one: of them.
-        other: of them.
-    """
+    """Two runs of one test."""
 
     one: Seen
     other: Seen
@@ -103,7 +97,6 @@ class SessionRuns:
 
     Args:
         runs: in the order in which they were recorded.
-        known: other runs of the same session, of which pairs are known.
     """
 
     def __init__(self, runs: Sequence[Seen], known: SessionRuns | None = None) -> None:

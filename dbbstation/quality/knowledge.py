@@ -104,13 +104,7 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A circle of the plan, and what a model says that it looks like.
-
-    Attributes:
-        test: name of its test.
-        circle: as commanded.
-        expected: by the model.
-    """
+    """A circle of the plan, and what a model says that it looks like."""
 
     test: str
     circle: Circle
@@ -127,11 +121,8 @@ class Run:
     """One run as it is judged.
 
     Attributes:
-        test: name of its test.
         repeat: counts the runs of this test and direction.
         mounting: name of the putting-up of its ball; runs that share it share the place of the ball.
-        circle: as commanded.
-        recording: as recorded.
         expected: where its circle should lie; None where nobody knows.
         largest_loss_percent: share of samples that may be lost [%].
         planned: all circles of its plan, where a model says what they look like.
@@ -163,17 +154,17 @@ class Seen:
     """A run with what was worked out of it once.
 
     Attributes:
-        run: the run.
         analysis: its figures; None where it shows no circle.
         problem: why it shows none; empty where it does.
         lost: samples missing on the turn, and there.
         unusable: of the missing ones, how many are recorded but cannot be used.
         feed_mm_min: feed that its overlap shows and its standard uncertainty [mm/min]; None where it shows none.
-        longer_s: by how much the way from feed-in to feed-out took longer than its length at the programmed feed; None where one of
-            them is missing or angles were recorded [s].
-        coefficients_um: orthonormal Fourier coefficients of the readings less the bar's length, harmonics 0 to 3 by
-            commanded angle from the start of the turn towards +Y: mean, cosines, sines, shape (7,) [µm].
-        local_um: the same up to `LOCAL_HARMONIC` undulations, as of `local_columns`, shape (59,) [µm]; zeros where samples are too few.
+        longer_s: by how much the way from feed-in to feed-out took longer than its length at the programmed feed; None where one
+            of them is missing or angles were recorded [s].
+        coefficients_um: orthonormal Fourier coefficients of the readings less the bar's length, harmonics 0 to 3 by commanded
+            angle from the start of the turn towards +Y: mean, cosines, sines, shape (7,) [µm].
+        local_um: the same up to `LOCAL_HARMONIC` undulations, as of `local_columns`, shape (59,) [µm]; zeros where samples are
+            too few.
         ways: feed-in and feed-out by the readings; None where they are not in the recording.
     """
 
@@ -275,19 +266,13 @@ class Others:
     """What the other runs of a session show, and which of them belong to this one.
 
     Attributes:
-        noise_um: noise of each [µm].
-        closure_um: closure of each and its uncertainty by noise [µm].
-        drift_um: drift over the turn of each, likewise [µm].
         longer_s: by how much each took longer than due [s].
         directions_um: root mean square of the difference of both directions, of each other circle, likewise [µm].
-        repeats_um: the same of repeats.
         directions_stated: how far both directions of each other circle differ, in standard deviations of what is stated.
-        repeats_stated: the same of repeats.
         across_um: difference of both directions, of each other circle, off the axis through the start of the turn [µm].
         local_um: root mean square by which both directions of each other circle differ at places [µm].
         opposite: same test in the other direction, on the same mounting where there is one; None where there is none.
         earlier: same test and direction, the repeat before; None where there is none.
-        every: all other runs.
     """
 
     noise_um: tuple[float, ...] = ()

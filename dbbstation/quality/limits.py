@@ -64,7 +64,6 @@ def ratio_quantile(above: float, below: float) -> float:
 
     Args:
         above: degrees of freedom of the numerator.
-        below: of the denominator.
     """
     return float(fdtri(above, below, 1.0 - SHARE))
 
@@ -110,11 +109,7 @@ def median_length(dimensions: int) -> float:
 
 
 def joined(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Standard deviation of a sum of independent parts and its degrees of freedom [Welch, Satterthwaite; GUM G.4.1].
-
-    Args:
-        parts: standard deviation and degrees of freedom of each.
-    """
+    """Standard deviation of a sum of independent parts and its degrees of freedom [Welch, Satterthwaite; GUM G.4.1]."""
     variance = sum(size**2 for size, _ in parts)
     if not variance > 0.0:
         return 0.0, _MANY

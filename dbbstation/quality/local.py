@@ -40,10 +40,6 @@ def local_difference(one: Seen, others: Others) -> Finding:
     Enough other pairs of directions whose odd undulations differ by more widen it. The limit is the ellipsoid of what noise and the causes that are known leave in the direction in which both differ, at stated or usual
     size; a share of what reversals show; and what a drift leaves: D over a turn is a sawtooth, whose k-th undulation has the amplitude
     D / (pi k).
-
-    Args:
-        one: the run.
-        others: which other runs belong to it.
     """
     against = others.opposite or others.earlier
     if against is None or one.analysis is None or against.analysis is None:

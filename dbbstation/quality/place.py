@@ -24,7 +24,6 @@ def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = 
     """Mean reading against the expected one.
 
     Args:
-        one: the circle.
         expected: what is known of its mean reading; None where nothing is.
         by_others: whether other tests of the session say so.
     """
@@ -75,7 +74,6 @@ def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Fi
     move one of these numbers move the others with it.
 
     Args:
-        one: the run.
         expected: what is known of its form; None where nothing is.
         by_others: whether other tests of the session say so.
     """

@@ -26,7 +26,6 @@ def scale(one: Seen, others: Others) -> Finding:
     spoilt by the other direction, so the lesser of both counts.
 
     Args:
-        one: the run.
         others: which run is its other direction.
     """
     expected, feed_in_um = one.run.expected, 1e3 * one.run.circle.feed_in_mm

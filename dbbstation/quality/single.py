@@ -132,8 +132,6 @@ def _beyond(u: float, freedom: float, others: Sequence[tuple[float, float]]) -> 
     """Limit of a value about zero, from its own uncertainty and from what others scatter beyond theirs.
 
     Args:
-        u: standard uncertainty of the value.
-        freedom: its degrees of freedom.
         others: value and standard uncertainty of each other run; of few of them nobody knows which is spoilt.
     """
     parts = [(u, freedom)]

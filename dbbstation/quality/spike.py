@@ -48,7 +48,6 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     the probability `limits.SHARE`.
 
     Args:
-        one: the circle.
         reversals_deg: angles at which struts turn round; none where they are not known [deg].
     """
     apart, sound = _apart(one.residual_um, one.raw.phi_deg)
@@ -111,7 +110,6 @@ def _scales(apart: NDArray[np.float64], among: NDArray[np.bool_]) -> tuple[NDArr
 
     Args:
         apart: differences, shape (n,) [µm].
-        among: which of them count.
     """
     count = len(apart)
     whole, _ = scale_of(list(apart[among]))

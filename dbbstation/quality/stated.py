@@ -33,8 +33,6 @@ def apart_by(one_um: Effects, other_um: Effects, count: int) -> NDArray[np.float
 
     Args:
         one_um: effects of each cause on the one form, shape (n, p) each [µm].
-        other_um: likewise on the other.
-        count: n, coefficients of a form.
     """
     covariance = np.zeros((count, count))
     for key in dict.fromkeys([*one_um, *other_um]):

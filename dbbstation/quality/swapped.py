@@ -34,13 +34,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Explained:
-    """How much better another circle explains a run.
-
-    Attributes:
-        ratio: logarithm of the likelihood as the other circle over that as its own.
-        fits: whether the run is as near the other circle as a run of it would be.
-        label: of the other circle.
-    """
+    """How much better another circle explains a run."""
 
     ratio: float
     fits: bool
@@ -48,12 +42,7 @@ class _Explained:
 
 
 def of_its_test(one: Seen, both: Together | None) -> Finding:
-    """Return whether another circle of the plan explains the readings better than the circle of the run's own test.
-
-    Args:
-        one: the run.
-        both: it and the runs of other tests; None where there are none.
-    """
+    """Return whether another circle of the plan explains the readings better than the circle of the run's own test."""
     every = [*_measured(one, both), *_predicted(one)]
     if not every:
         return undecided(

@@ -28,13 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Runs of different tests beside one another; the first is the one that is judged.
-
-    Attributes:
-        runs: n runs.
-        first: form of the first.
-        others: those of the others.
-    """
+    """Runs of different tests beside one another; the first is the one that is judged."""
 
     runs: tuple[Seen, ...]
     first: Forms

@@ -13,12 +13,7 @@ from dbbstation.results.sampling import SampledCircle
 
 @dataclass(frozen=True)
 class CheckedRun:
-    """A run of a session.
-
-    Attributes:
-        run: its name.
-        findings: of its circle.
-    """
+    """A run of a session."""
 
     run: str
     findings: tuple[Finding, ...]
@@ -29,10 +24,7 @@ class CheckedFile:
     """A file, or a session.
 
     Attributes:
-        file: as given.
-        format: that it has.
         ok: whether nothing is wrong with it.
-        summary: what it is.
         runs: of a session whose runs were judged; absent else.
     """
 
@@ -45,14 +37,7 @@ class CheckedFile:
 
 @dataclass(frozen=True)
 class DryRunResult:
-    """The programs of a plan, tried on a machine.
-
-    Attributes:
-        plan: file of the plan.
-        machine: file of the machine.
-        programs: how many were tried.
-        ok: whether `program` would write all of them.
-    """
+    """The programs of a plan, tried on a machine."""
 
     plan: str
     machine: str
@@ -62,12 +47,7 @@ class DryRunResult:
 
 @dataclass(frozen=True)
 class SampledPlanResult:
-    """What an instrument sees of a plan.
-
-    Attributes:
-        plan: file of the plan.
-        circles: one for each test.
-    """
+    """What an instrument sees of a plan."""
 
     plan: str
     circles: tuple[SampledCircle, ...]
@@ -78,10 +58,6 @@ class CheckResult:
     """What `check` found.
 
     Attributes:
-        files: each of them.
-        dry_runs: of every plan on the machine.
-        sampling: of every plan by the instrument.
-        problems: what is wrong.
         warnings: what is worth knowing.
     """
 

@@ -72,8 +72,6 @@ class RunWithoutCircle:
     """A run whose recording shows no circle.
 
     Attributes:
-        session: name of its session.
-        test: name of its test.
         direction: `ccw` or `cw`.
         repeat: counts runs of this test and direction.
         problem: why it shows none.
@@ -98,32 +96,16 @@ class CircleFiguresResult:
     """Figures of one circle.
 
     Attributes:
-        session: name of its session.
-        test: name of its test.
         direction: `ccw` or `cw`.
         repeat: counts runs of this test and direction.
-        problem: None.
-        tilt_deg: of the platform [deg].
-        elevation_deg: of the bar [deg].
-        radius_mm: of the circle [mm].
-        bar_mm: nominal length of the bar [mm].
-        feed_mm_min: commanded [mm/min].
-        samples: of the turn.
-        samples_lost: of the recording.
         g_um: circular deviation G, minimum zone [µm].
         g_least_squares_um: circular deviation about the least-squares centre [µm].
         f_um: radial deviations F about the least-squares centre [µm].
-        f_about_commanded_centre_um: radial deviations F about the commanded centre [µm].
-        radius_error_um: radius less commanded radius [µm].
         mean_radial_error_um: mean length less commanded length [µm].
         centre_um: least-squares centre less commanded centre [µm].
-        harmonics: of the radius.
-        reversal_steps: steps where an axis reverses.
         closure: from the end of the turn to its beginning; None where it cannot be told.
         drift_um_per_turn: of lengths over a turn; None where there is no second pass [µm].
         feed_shown_mm_min: that the recording shows; None where it cannot be told.
-        noise_um: of the recording.
-        uncertainty: budget of each figure, by its name.
         findings: what was found of it; absent where these were not asked for.
     """
 
@@ -182,15 +164,9 @@ class PairFigures:
     """Figures of both directions of a circle.
 
     Attributes:
-        session: name of its session.
-        test: name of its test.
         repeat: counts runs of this test.
         g_um: bidirectional circular deviation G(b), minimum zone [µm].
-        g_least_squares_um: the same about the least-squares centre [µm].
         d_um: mean bidirectional radial deviation D [µm].
-        h_um: hysteresis H [µm].
-        h_deg: where that is [deg].
-        uncertainty: budget of each figure, by its name.
     """
 
     session: str
@@ -209,12 +185,8 @@ class QuickLookResult:
     """Signatures of serial axes in one circle.
 
     Attributes:
-        session: name of its session.
-        test: name of its test.
         repeat: counts runs of this test.
-        directions: that went in.
         symptoms: empty where there are too few samples.
-        form_rms_um: of the form [µm]; None there.
         left_rms_um: of what signatures leave [µm]; None there.
     """
 

@@ -39,7 +39,6 @@ class MeasuredCircle:
     """One accepted run.
 
     Attributes:
-        session: name of its session.
         entry: what the session says of it.
         analysis: its figures; None where its recording shows no circle.
         problem: why it shows none; empty where it does.
@@ -57,13 +56,7 @@ class MeasuredCircle:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPair:
-    """One circle in both directions.
-
-    Attributes:
-        one: run of the direction that was measured first.
-        other: run of the other direction.
-        analysis: figures of both.
-    """
+    """One circle in both directions."""
 
     one: MeasuredCircle
     other: MeasuredCircle
@@ -78,7 +71,6 @@ class Circled:
         circles: in the order in which they were measured.
         pairs: both directions of one test, repeat and mounting.
         warnings: what was found beside.
-        sessions: that were read.
     """
 
     circles: tuple[MeasuredCircle, ...]
@@ -92,9 +84,7 @@ class CirclesResult(Framed):
     """Figures of measured circles after ISO 230-4, as `circles --json` prints them.
 
     Attributes:
-        edition: of the standard.
         filter: of G, F and H, in words.
-        reference_circle: about which each figure is taken.
         false_alarms_per_run: that the limits of findings are made for.
         runs: figures of each circle with their budgets; lengths in µm.
         pairs: the same of both directions together.
@@ -122,8 +112,6 @@ def circles_result(found: Circled, chosen: Filter, *, quick_look: bool = False) 
     """Return the figures of circles.
 
     Args:
-        found: the circles.
-        chosen: filter that they were worked out with.
         quick_look: look for signatures of serial axes.
     """
     return CirclesResult(

@@ -20,23 +20,13 @@ class ComparedRun:
     """One run of B less the same run of A.
 
     Attributes:
-        test: name of the test.
         direction: `ccw` or `cw`.
         number: of the comparison in this test and direction.
-        repeats_a: runs of A that went in.
-        repeats_b: runs of B that went in.
         differs: whether what was found is there in this run beyond doubt.
-        found_rms_um: of what was found [µm].
-        found_sigmas: standard deviations by which that is out.
         rms_um: of the whole smooth difference [µm].
-        noise_rms_um: that noise alone leaves in it [µm].
         centre_shift_um: by how much the centre moved, x and y [µm].
-        centre_shift_uncertainty_um: standard uncertainty of either [µm].
-        mean_radial_change_um: by how much the mean length changed [µm].
-        mean_radial_change_uncertainty_um: its standard uncertainty [µm].
         circularity_um: greatest less least of the difference about its centre [µm].
         peak_um: greatest difference, with its sign [µm].
-        peak_theta_deg: where that is [deg].
         by_angle_um: means over ten degrees from +X [µm].
     """
 
@@ -65,7 +55,6 @@ class DirectionHalves:
     """Parts of the difference that are the same in both directions, and opposite.
 
     Attributes:
-        same_um: rms of the part that is the same [µm].
         opposite_um: rms of the part that changes its sign [µm].
     """
 
@@ -78,11 +67,7 @@ class LargestEffect:
     """Where a cause does most.
 
     Attributes:
-        test: name of the test.
         direction: `ccw` or `cw`.
-        theta_deg: first and last angle [deg].
-        peak_um: greatest value, with its sign [µm].
-        text: in words.
     """
 
     test: str
@@ -94,14 +79,7 @@ class LargestEffect:
 
 @dataclass(frozen=True)
 class VariableSpan:
-    """Where along a variable a cause is large.
-
-    Attributes:
-        variable: its name.
-        low: from this value; `from` in JSON.
-        high: to this value; `to` in JSON.
-        unit: of both.
-    """
+    """Where along a variable a cause is large."""
 
     variable: str
     low: Annotated[float, Field(serialization_alias="from")]
@@ -114,26 +92,17 @@ class ComparedCause:
     """What was found of one cause.
 
     Attributes:
-        name: of the cause.
         form: which strut, test or session, where it is there; else empty.
-        named: whether it has a name in the catalogue.
         verdict: one of the six words of docs/verdicts.md.
         acts: `always` or `once`.
         persists: it happened once, and other tests tell of it, too.
         recurs: a wave over the time that other tests foretell.
         gains: in tests that did not choose it; None where these were not asked for.
-        probability: that it is there.
-        log_evidence: log Bayes factor.
-        ambiguous_with: causes that would do about as well.
         equivalent: causes that these sessions cannot tell from it; `class` in JSON.
         rms_um: of its effect [µm]; None where it is not there.
-        share: of all that was found; likewise.
         taken_up: share that a new calibration would take up; likewise.
         opposite: share that changes its sign with the direction; likewise.
-        where: where it does most; likewise.
         spans: where along variables it is large.
-        parameters: with their uncertainties.
-        text: in words.
     """
 
     name: str
@@ -163,11 +132,7 @@ class CauseNotAsked:
     """A cause that needs what these sessions do not have.
 
     Attributes:
-        name: of the cause.
         form: empty.
-        named: True.
-        verdict: `not-testable`.
-        text: what it lacks.
     """
 
     name: str
@@ -182,9 +147,7 @@ class ComparisonResidual:
     """The residual beside everything found.
 
     Attributes:
-        beyond_noise: whether that is more than noise.
         probability: that noise alone leaves as much.
-        text: in words.
     """
 
     beyond_noise: bool
@@ -194,12 +157,7 @@ class ComparisonResidual:
 
 @dataclass(frozen=True)
 class NotComparable:
-    """A test that both sessions have and that cannot be compared.
-
-    Attributes:
-        test: its name.
-        text: why.
-    """
+    """A test that both sessions have and that cannot be compared."""
 
     test: str
     text: str
@@ -210,28 +168,12 @@ class ComparisonResult(Framed):
     """Where two sessions differ, B less A.
 
     Attributes:
-        a: session A.
-        b: session B.
         text: what it comes to, in words.
-        differ: whether they differ.
-        probability_of_difference: that they do.
-        runs_compared: how many.
-        runs_different: those that differ beyond doubt.
-        difference_rms_um: of all that differs [µm].
-        beyond_chance_rms_um: of what was found [µm].
-        noise_rms_um: that noise alone leaves [µm].
-        strut_change_noticed_um: change of a strut's length that would have been found [µm].
-        held_out: `tested` or `not-tested`.
         held_out_worse: whether what was found predicts worse than nothing; None where not tested.
         held_out_rms_um: errors of tests that took no part [µm].
         runs: largest difference first.
         directions: parts that are alike and opposite; None where only one direction was measured.
         cancelling: effects that cancel each other; None where none do.
-        organised_text: what was found, in short.
-        causes: those that are there first.
-        left: the residual.
-        only_in_a: tests that only A has.
-        only_in_b: tests that only B has.
         not_comparable: tests that cannot be compared.
         averaged: tests whose repeats were averaged.
         unlike: what else was not alike; `notes` in JSON.

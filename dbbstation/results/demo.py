@@ -44,7 +44,6 @@ class MeasuredBeforeAfter:
         centre_deviation_um: length of the least-squares centre's offset.
         mean_radial_error_um: mean of length less radius.
         circularity_um: circular deviation with the bar's noise.
-        circularity_30_upr_um: the same without it.
     """
 
     centre_deviation_um: float
@@ -58,7 +57,6 @@ class DemoCircle:
     """The first circle of a test in its first direction.
 
     Attributes:
-        test: its name.
         before: under nominal programs.
         after: under compensated programs.
     """
@@ -117,11 +115,8 @@ class DemoResult:
     """Files and figures of a demonstration.
 
     Attributes:
-        folder: where everything is.
-        runs: of each test, before and after.
         calibration: what `calibrate` left.
         diagnosis: what `diagnose` found.
-        report: what `report` says.
         printed: everything that `diagnose` and `report` printed as JSON, by the command.
     """
 

@@ -31,7 +31,6 @@ class CircularityLeft:
     """Circularity that is left of one run [µm].
 
     Attributes:
-        test: name of the test.
         direction: `ccw` or `cw`.
         repeat: counts runs of this test and direction.
         before: under the kinematic calibration [µm].
@@ -51,11 +50,8 @@ class WorkspaceGain:
 
     Attributes:
         error_rms_um: without the common shift [µm].
-        error_greatest_um: at most [µm].
-        at_pose: where that is.
         uncertainty_rms_um: standard uncertainty of the joint model there; None where not known [µm].
         common_shift_um: mean of X, Y and Z [µm].
-        error_with_shift_rms_um: with it [µm].
         uncertainty_with_shift_rms_um: likewise; None where not known [µm].
     """
 
@@ -73,14 +69,9 @@ class MisfitLocation:
     """Where the misfit of the kinematic calibration is large.
 
     Attributes:
-        test: name of the test.
         direction: `ccw` or `cw`.
-        theta_deg: first and last angle [deg].
         strut: 1 to 6; None where no one stands out.
         variable: what it follows; None where nothing does.
-        share: of the whole misfit.
-        peak_um: largest value, with its sign [µm].
-        text: in words.
     """
 
     test: str
@@ -106,15 +97,11 @@ class CauseResult:
         unconcealed_rms_um: part of that which no kinematic parameter can imitate [µm].
         gain: log Bayes factor.
         stability: selection frequency.
-        probability: given the catalogue of causes.
         equivalent: causes that these recordings cannot tell apart from it; `class` in JSON.
         log_evidence: the gain, under its older name.
         acts: `always` or `once`.
         persists: it happened once, and held-out tests tell of it, too.
-        sigmas: standard deviations out.
         gains: in tests that were held back; None where none were.
-        parameters: with their uncertainties.
-        text: in words.
     """
 
     name: str
@@ -141,9 +128,7 @@ class CurveFollows:
     """What an unmodelled effect is a function of.
 
     Attributes:
-        variable: name of the variable.
         kind: of curve, such as `wave`; empty for the usual one.
-        moves: what moves.
     """
 
     variable: str
@@ -153,13 +138,7 @@ class CurveFollows:
 
 @dataclass(frozen=True)
 class UnexplainedPoint:
-    """One point of a curve.
-
-    Attributes:
-        at: where, in the variable's unit.
-        value_um: the error there [µm].
-        uncertainty_um: its standard uncertainty [µm].
-    """
+    """One point of a curve."""
 
     at: float
     value_um: float
@@ -173,8 +152,6 @@ class UnexplainedCurve:
     Attributes:
         variable: what it follows, as printed.
         period_mm: of a wave of strut length [mm]; None for all others.
-        follows: what it is a function of, and what it moves.
-        unit: of the variable.
         strut: 1 to 6; None where all struts follow it, or no strut's error is meant.
         form: which of its kind, in words; empty where there is one.
         period: of a wave, in the variable's unit; None for what is none.
@@ -182,7 +159,6 @@ class UnexplainedCurve:
         convention: what was taken out of it because fitted parameters make that; empty where nothing was.
         readings_um: root mean square of what it does to the readings [µm].
         unconcealed_um: of what the fitted machine parameters leave of that [µm].
-        points: least first.
     """
 
     variable: str
@@ -204,10 +180,8 @@ class UnexplainedResult:
     """The unmodelled residual.
 
     Attributes:
-        rms_um: beyond noise [µm].
         strut: 1 to 6; None where it is not one strut's.
         variable: what it follows; None where nothing does clearly.
-        text: in words.
         curve: the error along the variable; None where nothing organises it.
     """
 
@@ -223,11 +197,7 @@ class ParameterShift:
     """Bias of a parameter of the kinematic calibration.
 
     Attributes:
-        parameter: source and parameter.
         before_um: without the causes that were found [µm].
-        after_um: with them [µm].
-        shift_um: the difference [µm].
-        uncertainty_um: standard uncertainty of `after_um` [µm].
     """
 
     parameter: str
@@ -242,16 +212,7 @@ class ProposedTest:
     """A circle to measure next.
 
     Attributes:
-        text: in words.
-        x_mm, y_mm, z_mm: its centre [mm].
-        a_deg, b_deg: tilts [deg].
-        elevation_deg: of the bar [deg].
-        feed_mm_min: along the path [mm/min].
-        wait_s: before it [s].
         source: cause whose uncertainty it brings down.
-        sigma_before: standard uncertainty now.
-        sigma_after: standard uncertainty then.
-        unit: of both.
     """
 
     text: str
@@ -276,24 +237,15 @@ class DiagnosisFigures(Framed):
     Attributes:
         mismatch: whether the recordings differ from the kinematic model.
         probability: of that misfit by chance.
-        noise_um: of one reading [µm].
-        misfit_rms_um: beyond noise [µm].
-        residual_rms_um: within mountings [µm].
         held_out_rms_um: error of predicting held-out tests [µm].
-        held_out_normalised: the same over its stated uncertainty.
         held_out: `tested`, or `not-tested` where the tests are too few.
         held_out_worse: whether what was found predicts worse; None where not tested.
-        circularity_um: left of every run.
         workspace: how far both models are apart; None where nothing was found.
         outliers: kept out of the fits.
-        locations: where the misfit is, the largest first.
-        sources: what was found of every cause.
         cancelling: effects of named causes on the readings that cancel each other; None where none do.
         unexplained: the unmodelled residual.
-        parameter_shift: bias of the kinematic calibration, the largest first.
         second_start_agrees: whether a second search came to the same causes; None where there was none.
         next_test: what to measure next; None: no proposal.
-        further_tests: after that.
     """
 
     mismatch: bool

@@ -16,15 +16,11 @@ class CuredRun:
     """One run with and without a cause; G up to 30 undulations per revolution.
 
     Attributes:
-        test: name.
         direction: `ccw` or `cw`.
         repeat: of the test and direction.
         g_um: circular deviation that the cause would make by itself [µm].
         centre_um: how far it moves the centre, X and Y [µm].
-        measured_g_um: circular deviation as measured [µm].
-        cured_g_um: if the cause were cured [µm].
         measured_centre_um: centre less the commanded one, X and Y [µm].
-        cured_centre_um: if the cause were cured [µm].
     """
 
     test: str
@@ -44,20 +40,15 @@ class CauseContribution:
 
     Attributes:
         cause: name of the source; `geometry` for all kinematic parameters together.
-        sources: that would go with it.
         verdict: of the diagnosis; empty of the geometry, and where no diagnosis was made.
         g_um: mean circular deviation that it would make by itself [µm].
         g_u_um: standard uncertainty of that; None where not known.
         centre_um: mean distance by which it moves the centres [µm].
         centre_u_um: standard uncertainty of that; None where not known.
-        workspace_um: root mean square distance over the workspace by which it moves the tool, about a common shift [µm]; None where it
-            follows more than the pose.
+        workspace_um: root mean square distance over the workspace by which it moves the tool, about a common shift [µm]; None
+            where it follows more than the pose.
         workspace_u_um: standard uncertainty of that; None where not known.
         measured_g_um: mean circular deviation as measured [µm].
-        cured_g_um: the same if the cause were cured [µm].
-        cure: how to cure it.
-        confirm: how to confirm it.
-        runs: one by one.
     """
 
     cause: str
@@ -77,12 +68,7 @@ class CauseContribution:
 
 
 def effect_results(effects: Sequence[CauseEffect], verdicts: Mapping[str, str]) -> tuple[CauseContribution, ...]:
-    """Return causes in the order of what they contribute.
-
-    Args:
-        effects: the greatest first.
-        verdicts: of a diagnosis, by cause.
-    """
+    """Return causes in the order of what they contribute."""
     return tuple(_result(one, verdicts.get(one.name, "")) for one in effects)
 
 

@@ -16,15 +16,12 @@ class EvaluationResult(Framed):
     """What a model leaves of recordings, and how true the machine moves without compensation.
 
     Attributes:
-        runs: figures of every run.
         nominal_rms_um: measured less predicted length over all runs under the nominal machine [µm].
-        residual_rms_um: the same under the model's machine [µm].
         flatness_um: of X, Y = ±190 mm, as the model predicts it of programs that are not compensated [µm].
         flatness_u_um: its standard uncertainty; None where it is not known [µm].
         parallelism_um: of a move along X, likewise [µm].
         parallelism_u_um: its standard uncertainty; None where it is not known [µm].
         plane_uncertainty_not_known_because: why one of both is not known; None where both are.
-        plane_z_mm: commanded Z of that plane [mm].
         plane_without: sources that are left out there, because no pose alone says what they do.
         tolerances: of the shop, held against every circle; None where another result holds them.
     """

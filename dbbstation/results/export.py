@@ -7,14 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ExportResult:
-    """A table that was written.
-
-    Attributes:
-        table: its file.
-        runs: in it.
-        rows: in it, one for each sample.
-        columns: names, with units.
-    """
+    """A table that was written."""
 
     table: str
     runs: int

@@ -21,10 +21,6 @@ class FleetValue:
     """One number that a task found of a machine.
 
     Attributes:
-        kind: of quantity.
-        quantity: its name.
-        unit: of value and uncertainty.
-        value: in its unit.
         uncertainty: standard uncertainty; None where it is not known.
         of: circle that it was measured on, in words; empty where it is none of a circle.
         logarithmic: whether it is a positive size, of which ratios are compared.
@@ -60,9 +56,7 @@ class FleetFound:
 
     Attributes:
         values: numbers that can be compared with those of other machines.
-        causes: of a diagnosis.
         headline: in a few words.
-        notes: what was noticed.
     """
 
     values: tuple[FleetValue, ...]
@@ -77,15 +71,14 @@ class FleetSession:
 
     Attributes:
         session: its folder, from the folder that was named.
-        machine: serial number, or the name in its machine file, with the session where each is a machine of its own; empty where the
-            session cannot be read.
+        machine: serial number, or the name in its machine file, with the session where each is a machine of its own; empty where
+            the session cannot be read.
         started: start of its first run, ISO 8601; None where none is noted.
         state: `done`, `up-to-date` or `failed`.
         problem: why it failed; empty where it did not.
         files: what was written of it, within the folder of the results.
         headline: in a few words what was found.
         compared: whether the comparison of machines has it: the last session of each machine.
-        notes: what was noticed.
         values: that the task found.
     """
 
@@ -106,15 +99,8 @@ class Scored:
     """One quantity of one machine, held against its sisters.
 
     Attributes:
-        machine: whose.
-        session: that it comes from.
-        kind: of quantity.
-        quantity: its name.
         of: circle in words; empty for none.
-        unit: of value and uncertainty.
-        value: in its unit.
         uncertainty: standard uncertainty; None where not known.
-        sisters: machines that it is held against.
         usual: middle of those; None where nothing can be said.
         scatter: standard deviation of those, beyond their uncertainties; None likewise.
         score: standard normal where the machine is like its sisters; None likewise.
@@ -149,8 +135,6 @@ class SharedCause:
 
     Attributes:
         name: of the error source.
-        found_in: machines in which it is `identified` or `happened`.
-        machines: that were asked for it.
         false_claims: how many of those in `found_in` are expected to be wrong, by the probabilities of the diagnoses.
     """
 
@@ -166,9 +150,6 @@ class FleetComparison:
 
     Attributes:
         false_alarms: probability that a fleet of like machines has any value marked as unlike.
-        machines: that were compared.
-        quantities: that were compared.
-        scored: every value with its score.
         causes: that were found anywhere.
         notes: what was not compared, and why.
     """
@@ -193,8 +174,6 @@ class FleetResult(Framed):
 
     Attributes:
         task: `calibrate`, `circles`, `diagnose` or `report`.
-        folder: of the results.
-        table: file with every value.
         page: file with a row for each machine.
         sessions: in the order of their names.
         notes: which sessions were counted as one machine, or each as its own, since they have no serial number.

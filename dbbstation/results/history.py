@@ -19,7 +19,6 @@ class HistorySession:
     Attributes:
         name: of its folder, from the folder of the history.
         started: start of its first accepted run, ISO 8601.
-        sha256: of its session file.
     """
 
     name: str
@@ -34,14 +33,7 @@ class HistorySession:
 
 @dataclass(frozen=True)
 class ChangedQuantity:
-    """By how much a quantity changed.
-
-    Attributes:
-        quantity: in words.
-        difference: in `unit`.
-        u_difference: its standard uncertainty.
-        unit: of both.
-    """
+    """By how much a quantity changed."""
 
     quantity: str
     difference: float
@@ -54,11 +46,7 @@ class HistoryChange:
     """What changed on a machine from one session on.
 
     Attributes:
-        verdict: `changed` or `stands out`.
-        since: the session from which it is so.
-        found: the session that showed it.
         beside: what else is new in that session, in words.
-        quantities: that changed, the largest first, by its uncertainty.
     """
 
     verdict: str
@@ -76,8 +64,6 @@ class HistoryEvent:
         verdict: `changed` or `stands out`.
         since: name of the session from which it is so.
         found: name of the session that showed it.
-        difference: from the level before, in the quantity's unit.
-        u_difference: its standard uncertainty.
         decided_by: `stated-uncertainty` or `control-chart`.
     """
 
@@ -94,11 +80,9 @@ class HistoryValue:
     """One quantity in one session, with what the chart made of it; None where it was not watched.
 
     Attributes:
-        session: its name.
         started: start of the session, ISO 8601.
         value: mean over the runs of the session, in the quantity's unit.
         u: its standard uncertainty; None where not known.
-        level: between changes, in the same unit.
         z: standard normal where nothing changes.
         cusum_high: cumulative sum upwards.
         cusum_low: cumulative sum downwards.
@@ -124,18 +108,14 @@ class QuantityHistory:
         test: name of the test; None for a parameter.
         direction: `ccw` or `cw`; None for a parameter.
         of: circle in words; of a parameter its error source.
-        unit: of the values.
-        verdict: what its history says.
         why_not: why it is not watched; None where it is.
         limit: greatest size by the shop's tolerances; None where there is none.
         conformity: of the last value with that limit [ISO 14253-1].
         exceeded_sessions: how many are beyond it by more than U.
         level: of the last stretch.
-        u_level: its standard uncertainty.
         scatter_in_u: scatter of the last stretch, in stated uncertainties.
         sessions_lacking: sessions that are needed until the next one can be held against those before.
         decided_by: `stated-uncertainty` or `control-chart`; None where nothing was decided.
-        watched_sessions: sessions that were held against others.
         events: in time order.
         values: in time order.
     """
@@ -167,7 +147,6 @@ class WatchLimits:
 
     Attributes:
         reference: what a cumulative sum loses with each session.
-        decision_interval: sum from which a quantity has changed.
         single_limit: size from which a single session stands out.
     """
 
@@ -183,11 +162,7 @@ class MachineHistoryResult:
     Attributes:
         machine: serial number or name.
         sessions: in time order.
-        watched_quantities: how many are watched.
-        chart: limits that they are watched with; None where none is.
         false_alarms_expected: over this history if nothing changed.
-        verdicts: how many quantities have each verdict.
-        changes: what changed, by the session that showed it.
         quantities: circles first, in the order of tests, then parameters.
     """
 
@@ -207,7 +182,6 @@ class LeftOut:
 
     Attributes:
         name: of its folder or file.
-        problem: why.
     """
 
     name: str
@@ -219,13 +193,8 @@ class HistoryResult(Framed):
     """Histories of the machines whose sessions lie in a folder.
 
     Attributes:
-        coverage_factor: k of U = k u.
         false_alarms_per_session: that the limits are made for, all quantities of a machine together.
-        baseline_sessions: sessions from which scatter is known.
         figures: what the figures of circles mean.
-        machines: one for each machine.
-        left_out: sessions and models that could not be used.
-        remarks: on sessions.
         worked_out: sessions and models that were read now; the others came from the index.
         model_warnings: what has to be said of the model of each session, by the session's name; `remarks` begin with it.
     """

@@ -11,9 +11,6 @@ class TakenRun:
     """A run of the new session.
 
     Attributes:
-        file: that it comes from.
-        run: its name.
-        samples: how many.
         computed: what was worked out and is in no file.
     """
 
@@ -28,10 +25,8 @@ class ImportResult:
     """What was taken in.
 
     Attributes:
-        session: folder of the session.
         written: whether it was; False for a dry run.
         mapping: what columns mean, as the mapping's file has it.
-        runs: of the session.
         statements: what was assumed, worked out or left out; the session notes them.
     """
 

@@ -19,17 +19,8 @@ class InstrumentResult:
     """An instrument.
 
     Attributes:
-        name: of the instrument.
         profile: variant that is shown; empty where there is one.
-        title: in words.
         line: settings of its serial line, as its protocol file has them.
-        mode: how readings are had from it.
-        readings_per_second: at its usual rate.
-        not_verified: statements about it that nobody has verified.
-        has_checksum: whether a message has one.
-        counts_samples: whether it numbers its readings.
-        range_mm: least and greatest reading.
-        profiles: variants that it has.
         protocol: everything that its file says; absent in the list.
     """
 
@@ -58,8 +49,6 @@ def instrument_result(protocol: Protocol, profiles: Iterable[str], *, whole: boo
     """Return an instrument.
 
     Args:
-        protocol: of the instrument.
-        profiles: variants that it has.
         whole: with everything that its file says.
     """
     return InstrumentResult(

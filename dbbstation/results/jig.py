@@ -27,13 +27,7 @@ class MeasuredBall:
 
 @dataclass(frozen=True)
 class SheetResult:
-    """What `jig sheet` wrote.
-
-    Attributes:
-        jig: the file.
-        balls: by name.
-        not_in_the_sheet: balls of the jig before that are not in the new one.
-    """
+    """What `jig sheet` wrote."""
 
     jig: str
     balls: Mapping[str, MeasuredBall]
@@ -42,15 +36,7 @@ class SheetResult:
 
 @dataclass(frozen=True)
 class HolderScatter:
-    """A standard deviation with its interval.
-
-    Attributes:
-        s_um: standard deviation [µm].
-        low_um: lower end of its interval [µm].
-        high_um: upper end [µm].
-        standard_uncertainty_um: of the standard deviation [µm].
-        degrees_of_freedom: that it rests on.
-    """
+    """A standard deviation with its interval."""
 
     s_um: float
     low_um: float
@@ -65,13 +51,9 @@ class HolderResult:
 
     Attributes:
         repeatability_um: standard deviation per axis, as a jig file has it [µm].
-        together: of all coordinates.
         axes: of x, y and, where it was measured, z.
         level: probability of the intervals.
         rms_distance_um: root mean square of the distance from the mean place [µm].
-        mean_distance_um: mean of that distance [µm].
-        places: number of places.
-        mountings: in all.
         p_axes_alike: probability of a ratio of variances as great as this if all axes scatter alike.
         of_cmm_um: standard deviation of the CMM's readings that was taken off [µm].
     """
@@ -93,7 +75,6 @@ class HoldersResult:
     """What `jig holders` found.
 
     Attributes:
-        holders: by name.
         jig: file that it was written to; None for none.
     """
 

@@ -23,12 +23,9 @@ class VariableResult:
     """A column that the difference may follow.
 
     Attributes:
-        name: of the column.
         kind: such as `angle` or `time`.
         unit: of its values; empty where it has none.
         period: after which it is the same again, in that unit; None where it has none.
-        low: least value.
-        high: greatest value.
     """
 
     name: str
@@ -41,24 +38,14 @@ class VariableResult:
 
 @dataclass(frozen=True)
 class OffsetResult(Value):
-    """Measured less simulated value on average.
-
-    Attributes:
-        significant: whether it is there beyond its uncertainty.
-    """
+    """Measured less simulated value on average."""
 
     significant: bool
 
 
 @dataclass(frozen=True)
 class SearchBeginning:
-    """What a search that began in one way ended at.
-
-    Attributes:
-        beside: what it began beside.
-        log_odds: of what it ended at, over what is reported.
-        effects: that it ended at.
-    """
+    """What a search that began in one way ended at."""
 
     beside: str
     log_odds: float
@@ -76,7 +63,6 @@ class NoiseResult:
         order: of the autoregression that describes neighbours.
         degrees_of_freedom: of Student's t; None where it is normal.
         grows_with: variable that its variance grows with; None where it is the same everywhere.
-        beginnings: what searches with other beginnings ended at.
     """
 
     sigma: float
@@ -94,7 +80,6 @@ class ResidualRms:
 
     Attributes:
         before: with parameters refitted and nothing found.
-        after: with what was found.
     """
 
     before: float
@@ -106,11 +91,8 @@ class HeldOutPart:
     """Errors of one part that took no part in anything, in the unit of the table.
 
     Attributes:
-        name: of the part.
-        rows: in it.
         as_simulated: rms of measured less simulated value.
         before: with parameters refitted.
-        after: corrected.
     """
 
     name: str
@@ -125,11 +107,8 @@ class HeldOutRms:
     """Errors of all held-out parts, in the unit of the table.
 
     Attributes:
-        as_simulated: rms of measured less simulated value.
         before: with parameters refitted.
-        after: corrected.
         worse: whether corrected values predict worse than those as simulated.
-        folds: part by part.
     """
 
     as_simulated: float
@@ -144,10 +123,8 @@ class VariableShare:
     """What of the mismatch follows one variable.
 
     Attributes:
-        variable: its name.
         rms: of all effects over it, in the unit of the table.
         share: of all that is explained, what these bring alone.
-        lost: what is lost of it without them.
         terms: how many effects.
     """
 
@@ -163,28 +140,18 @@ class EffectResult:
     """What was found of one effect.
 
     Attributes:
-        name: of the effect.
         verdict: one of the six words of docs/verdicts.md.
         acts: `always` or `once`.
         persists: it happened once, and other parts tell of it, too.
         recurs: it happened more than once.
         gains: in parts that did not choose it; None where these were not asked for.
         form: family of forms; None for physics of one's own.
-        variables: that it follows.
-        probability: that it is there.
-        log_bayes_factor: of it, given all else that was found.
-        rms: of it, in the unit of the table.
         sigmas: norm of it over its standard deviation.
         confounded: R² of it on the parameters.
-        values: its numbers with their uncertainties.
-        spans: where it is large.
-        rows_there: rows that show it.
         rows: first and last row of what happened once.
         blocks: size in each run, by name.
         equivalent: effects that these rows cannot tell from it.
-        ambiguous_with: effects that would do about as well.
         resembles: R² of it on named forms.
-        text: in words.
     """
 
     name: str
@@ -216,10 +183,8 @@ class RefittedResult:
     """A parameter of the simulation, fitted anew.
 
     Attributes:
-        name: `offset`, or of the parameter.
         before: change alone, by ordinary least squares.
         after: change beside what was found.
-        shift: from the one to the other.
         confounded: R² of the parameter on what was found.
         known: standard uncertainty to which it was known before; None where it was free.
         stated: whether the user gave that.
@@ -238,12 +203,7 @@ class RefittedResult:
 
 @dataclass(frozen=True)
 class NextMeasurement:
-    """What to measure next.
-
-    Attributes:
-        text: in words.
-        variables: that it varies.
-    """
+    """What to measure next."""
 
     text: str
     variables: tuple[str, ...]
@@ -255,24 +215,16 @@ class MismatchResult(Framed):
 
     Attributes:
         unit: of measured and simulated values; empty where it has none.
-        row_count: rows that were compared; `rows` in JSON.
         blocks: names of the runs.
         variables: that the difference may follow.
         levels: whether anything differs, what it follows, which law it is.
         mismatch: whether there is more than noise.
         offset: measured less simulated on average; None where none was allowed.
-        noise: of one row.
-        residual_rms: before and after.
-        held_out: `tested` or `not-tested`.
         held_out_rms: errors of held-out parts; None where not tested.
         cancelling: effects that cancel each other; None where none do.
-        led_by: what of it follows which variable, largest first.
-        findings: effects, those that are there first.
         parameters: of the simulation, fitted anew.
         left: whether something is left beyond noise.
         second_start_agrees: whether a search that begins with nothing ends at the same effects.
-        second_start_log_odds: of what that ends at, over what was found.
-        next: what to measure next.
         not_asked: physics of one's own that could not be asked, and why, by name.
         out: file of the corrected table; absent where none was written.
         figure: file of the figure; absent where none was written.

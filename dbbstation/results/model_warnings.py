@@ -25,21 +25,13 @@ def model_warnings(identified: IdentifiedModel) -> tuple[str, ...]:
 
 
 def lacks_physics(report: Mapping[str, Any]) -> bool:
-    """Return whether the fit of a model said that physics is missing.
-
-    Args:
-        report: numbers of the fit, as the model file has them.
-    """
+    """Return whether the fit of a model said that physics is missing."""
     misfit = report.get("misfit")
     return isinstance(misfit, Mapping) and misfit.get("missing_physics") is True
 
 
 def missing_physics_warnings(report: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the warning that physics is missing; empty where chance explains what the model leaves.
-
-    Args:
-        report: numbers of the fit.
-    """
+    """Return the warning that physics is missing; empty where chance explains what the model leaves."""
     if not lacks_physics(report):
         return ()
     misfit = report["misfit"]
@@ -56,7 +48,6 @@ def exceeds(rms_um: float, probability: float) -> str:
 
     Args:
         rms_um: beyond noise and mountings [µm].
-        probability: of that by chance.
     """
     return f"the residual exceeds noise and mountings by {rms_um:.2f} µm rms (probability by chance {chance_in_words(probability)})"
 

@@ -40,11 +40,7 @@ def comparison_result(
     """Return everything that a comparison reports; lengths in µm, runs largest first.
 
     Args:
-        found: what was found.
         unlike: what else was not alike.
-        a: session A.
-        b: session B.
-        drawing: draws it.
         notes: what was noticed in the files.
     """
     largest_first = sorted(found.runs, key=lambda run: (-run.differs, -float(np.sum(run.found_mm**2)), -run.rms_mm))

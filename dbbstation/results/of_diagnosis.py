@@ -39,7 +39,6 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
     """Return everything that a diagnosis says.
 
     Args:
-        diagnosis: what was found.
         lacking: why further sources could not be looked at, by name.
     """
     rest = diagnosis.unexplained
@@ -98,10 +97,6 @@ def diagnosis_result(
     """Return the whole result of a diagnosis.
 
     Args:
-        figures: what it says.
-        effects: of each cause.
-        model: the joint model.
-        drawing: draws the diagnosis in a format.
         notes: what was noticed on the way.
     """
     own = {one.name: getattr(figures, one.name) for one in fields(DiagnosisFigures)}
@@ -109,11 +104,7 @@ def diagnosis_result(
 
 
 def kept_of(figures: DiagnosisFigures) -> dict[str, object]:
-    """Return what a model file keeps of the diagnosis that it comes from: what speaks against its causes.
-
-    Args:
-        figures: what the diagnosis says.
-    """
+    """Return what a model file keeps of the diagnosis that it comes from: what speaks against its causes."""
     open_ones = (one for one in figures.sources if one.verdict == Verdict.AMBIGUOUS)
     groups = {frozenset((one.name, *one.ambiguous_with)): [one.name, *one.ambiguous_with] for one in open_ones}
     return {

@@ -57,10 +57,7 @@ def history_result(
     """Return histories as a result.
 
     Args:
-        machines: their histories.
-        asked: how they were worked out.
         left_out: sessions and models that could not be used, by name, with the reason.
-        remarks: on sessions.
         worked_out: sessions and models that were read now.
         model_warnings: what has to be said of the model of each session, by the session's name.
     """

@@ -41,7 +41,6 @@ def mismatch_result(
     Args:
         found: the comparison.
         table: columns of the files, with the corrected simulation; None: none.
-        drawing: draws it.
         notes: what was noticed in the files.
     """
     compared = found.table

@@ -31,12 +31,7 @@ HIDDEN = 0.1
 
 
 def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -> SimulatorResult:
-    """Return everything that is reported of a simulator.
-
-    Args:
-        answer: the comparison.
-        simulations: how many were run.
-    """
+    """Return everything that is reported of a simulator."""
     found, settled, model = answer.found, answer.found.settled, answer.model
     return SimulatorResult(
         simulator=model.name,

@@ -12,11 +12,8 @@ class DrawnCircle:
     """A run on the sheet.
 
     Attributes:
-        session: name of its session.
-        test: its name.
         direction: `ccw` or `cw`.
         repeat: counts runs of this test and direction.
-        g_um: circular deviation G [µm].
         u_g_um: its standard uncertainty; None where not known [µm].
         centre_um: least-squares centre less the commanded one [µm].
     """
@@ -35,11 +32,8 @@ class PlotResult:
     """A figure.
 
     Attributes:
-        figure: its file.
         kind: what it shows of the circles.
-        filter: of the figures, in words.
         drawn: runs in drawing order.
-        not_drawn: repeats that are left out.
         one_direction_only: tests that were measured in one direction, in words.
     """
 

@@ -26,8 +26,6 @@ class PredictionResult(Framed):
 
     Attributes:
         file: table that was written; None where none was.
-        poses: how many.
-        greatest_error_um: greatest distance of the actual position from the commanded one [µm].
         error_rms_um: root mean square of these [µm].
         common_shift_um: mean of X, Y and Z, which a program whose zero is set on the part does not feel [µm].
         error_about_mean_rms_um: root mean square without it [µm].
@@ -78,7 +76,6 @@ def prediction_result(
     """Return the result of a prediction.
 
     Args:
-        identified: the model.
         commanded: shape (n, 6) [mm, deg].
         actual: shape (n, 6) [mm, deg].
         uncertainty_mm: shape (n, 3) [mm]; NaN where not known.

@@ -23,21 +23,17 @@ class WrittenProgram:
 
     Attributes:
         file: that was written; its name where none was.
-        sha256: of its text.
         points: moves at feed.
         greatest_correction_um: of a programmed point; None in a nominal program [µm].
         chord_error_um: largest distance between a move and the path that it stands for [µm].
-        chord_asked_um: that was asked for [µm].
         model_uncertainty_um: greatest standard uncertainty of the tool tip along the path; None where not known [µm].
         model_uncertainty_by_axis_um: the same of X, Y and Z each; None in a nominal program.
         model_uncertainty_not_known_because: why; None where it is known.
         tilt_left_um: correction of the tilt that was left out, as felt 100 mm from the tip [µm].
         feed_s: time of all moves at feed, as the control plans them [s].
-        nominal_feed_s: of the program that it was made from [s].
         rapid_s: time of all rapids, as the control plans them at the machine's greatest feed [s].
-        nominal_rapid_s: of the program that it was made from [s].
-        merged_um: distance of points that were left out from the lines in their place; None where short moves were not made one [µm].
-        text: the program.
+        merged_um: distance of points that were left out from the lines in their place; None where short moves were not made one
+            [µm].
         cost: what a preference cost, in words; empty without one.
         slower_rapids: what rapids lose, in words; empty where that is next to nothing.
         merged: what making short moves one costs, in words; empty where none were.
@@ -69,11 +65,9 @@ class ProgramsResult(Framed):
     """Programs, nominal or compensated.
 
     Attributes:
-        dialect: that they are written in.
         model_sha256: of the model's file; None where no file was given.
         acceleration_mm_s2: that pieces are chosen for; None where the dialect says no look-ahead [mm/s²].
         acceleration_known: whether the machine file states it.
-        programs: one after the other.
         model_warnings: what speaks against the model, such as physics that it lacks; empty of nominal programs.
         acceleration_in_words: the acceleration, and where it is known from; empty where there is none.
     """
@@ -115,12 +109,8 @@ def programs_result(
     """Return programs as a result.
 
     Args:
-        written: file and program of each.
-        dialect: that they are written in.
         machine: that compensated programs are for; None of nominal ones.
-        model_sha256: of the model's file.
         notes: what was noticed on the way.
-        model_warnings: what speaks against the model.
     """
     planned = None if dialect.look_ahead is None else machine
     return ProgramsResult(

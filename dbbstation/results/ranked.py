@@ -18,8 +18,6 @@ class Ranked:
     """Causes beside the circles.
 
     Attributes:
-        session: whose circles they act on.
-        effects: the greatest first.
         verdicts: of the diagnosis that the model comes from, by cause.
         why_not: why there are none; empty where there are.
     """
@@ -31,12 +29,7 @@ class Ranked:
 
 
 def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:
-    """Return the causes in the order of what they contribute, one sentence each with the cure.
-
-    Args:
-        ranked: the causes.
-        coverage_factor: k of U = k u.
-    """
+    """Return the causes in the order of what they contribute, one sentence each with the cure."""
     told = []
     for rank, one in enumerate(ranked.effects, start=1):
         g, g_u = with_uncertainty(one.g_um, expanded_uncertainty(one.g_u_um, coverage_factor))

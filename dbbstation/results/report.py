@@ -20,7 +20,6 @@ class ReportVerdict:
 
     Attributes:
         kind: `within`, `exceeded`, `cannot tell` or `none`, where nothing was held against anything.
-        headline: in one sentence.
         reasons: one sentence for each tolerance that is not kept.
         to_do: what to do, in order.
     """
@@ -51,10 +50,8 @@ class WorstCircle:
     """The circle with the largest figure that a tolerance is for.
 
     Attributes:
-        test: its name.
         direction: `ccw` or `cw`; `both` of both directions together.
         repeat: counts runs of this test and direction.
-        um: its figure [µm].
         expanded_um: U = k u of it [µm]; None where not known.
         why_not: why it is not known; None where it is.
     """
@@ -72,12 +69,11 @@ class HeldTolerance:
     """A tolerance held against circles [ISO 14253-1].
 
     Attributes:
-        quantity: which figure it is for.
         filter: of that figure in words; None where none acts on it.
-        largest_um: the limit [µm].
         tests: that it holds for; empty for all.
         directions: that it holds for; empty for both.
-        conformity: `exceeded` where one circle exceeds it, else `cannot tell` where one is within U of it; None where it holds for none.
+        conformity: `exceeded` where one circle exceeds it, else `cannot tell` where one is within U of it; None where it holds
+            for none.
         within: whether no circle exceeds it or is undecided.
         exceeded: how many circles exceed it.
         undecided: how many lie within U of it.
@@ -111,11 +107,7 @@ class ComparedTolerance(HeldTolerance):
 
 @dataclass(frozen=True, kw_only=True)
 class ToleranceOfTest(ComparedTolerance):
-    """A tolerance held against the circles of one test.
-
-    Attributes:
-        test: its name.
-    """
+    """A tolerance held against the circles of one test."""
 
     test: str
 
@@ -125,7 +117,6 @@ class MeasuredSize:
     """A figure of one circle as measured.
 
     Attributes:
-        um: its size [µm].
         u_um: its standard uncertainty [µm]; None where a cause of unknown size counts.
     """
 
@@ -138,12 +129,8 @@ class MeasuredFigures:
     """Figures of one circle as measured, by what they are, beside those of the same test, direction and repeat before.
 
     Attributes:
-        session: name of its session.
-        test: its name.
         direction: `ccw` or `cw`.
         repeat: counts runs of this test and direction.
-        now: its figures.
-        before: figures before; None where it was not measured then.
     """
 
     session: str
@@ -156,12 +143,7 @@ class MeasuredFigures:
 
 @dataclass(frozen=True)
 class MeanAndLargest:
-    """Mean and largest of a figure over circles.
-
-    Attributes:
-        mean_um: mean [µm].
-        largest_um: largest [µm].
-    """
+    """Mean and largest of a figure over circles."""
 
     mean_um: float
     largest_um: float
@@ -172,8 +154,6 @@ class MeasuredMean:
     """Mean and largest of a figure over the circles; where there are circles before, over those that were measured both times.
 
     Attributes:
-        quantity: which figure.
-        circles: how many.
         now: over the circles; None without circles.
         before: over the same circles before; None without those.
     """
@@ -194,16 +174,9 @@ class ReportResult(Framed):
     """The numbers of a report, and where it was written.
 
     Attributes:
-        report: the page.
         pdf: the same on paper; None where it was not printed.
         verdict: what the shop's tolerances say.
-        certificate: whether it is a certificate.
-        model_warnings: what has to be said of the model.
-        coverage_factor: k of U = k u.
         tolerances: of the shop, held against the circles.
-        tolerances_by_test: the same for the circles of each test.
-        measured: figures of each circle as measured.
-        measured_means: mean and largest of each figure.
         circles: figures after ISO 230-4.
         causes: what each cause of the model contributes, the greatest first.
         causes_of: session whose circles they act on; None where there are none.

@@ -33,8 +33,6 @@ def verdict_of(
 
     Args:
         held: tolerances; empty where the shop has none.
-        found: the circles, with their findings.
-        coverage_factor: k of U = k u.
         identified: a model beside the circles; None where none is given.
         ranked: its causes, of which the first page names the greatest first; None where none is given.
     """

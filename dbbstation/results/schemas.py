@@ -75,9 +75,6 @@ _PROVENANCE = {
 def result_schema(command: str) -> dict[str, Any]:
     """Return the JSON Schema of what a command prints with `--json`.
 
-    Args:
-        command: its name.
-
     Raises:
         KeyError: the command has none.
     """

@@ -26,15 +26,11 @@ class ListedRun:
     """A run of a session.
 
     Attributes:
-        run: its name.
-        test: name of its test.
         direction: `ccw` or `cw`.
         repeat: counts runs of this test and direction.
         mounting: of the ball; None where nobody counted.
         started: ISO 8601; None where not noted.
-        state: what was decided of it.
         reason: why; None for none.
-        counts: of its samples; None where not noted.
         file: of its recording, in the session's folder.
     """
 
@@ -55,8 +51,6 @@ class ListedSession:
     """The runs of a session.
 
     Attributes:
-        session: its name.
-        runs: that it has.
         missing: circles of its plan that have no accepted run.
     """
 
@@ -70,11 +64,8 @@ class ListedEvent:
     """An event of a session.
 
     Attributes:
-        event: its number.
         at: when, ISO 8601; None where that is not known.
-        what: what happened.
         about: runs or keys of the session file that it is about.
-        link: of the event in the chain.
     """
 
     event: int
@@ -89,7 +80,6 @@ class SessionEvents:
     """The event log of a session.
 
     Attributes:
-        session: its name.
         events: in their order.
         anchor: link of the last; None without a log.
     """
@@ -104,8 +94,6 @@ class SimulatedSession:
     """A session that was simulated.
 
     Attributes:
-        session: its folder.
-        runs: how many it has.
         tests: of the plan that were run.
     """
 

@@ -27,8 +27,6 @@ class ShopTolerance:
     """A tolerance of the shop.
 
     Attributes:
-        quantity: which figure it is for.
-        largest_um: the limit [µm].
         filter: of the figure in words; None where none acts on it.
         tests: that it holds for; empty for all.
         directions: that it holds for; empty for both.
@@ -47,8 +45,6 @@ class SettingsResult:
 
     Attributes:
         files: that were read, the first that has a key decides.
-        values: by key.
-        tolerances: of the shop.
         tolerances_from: file that they come from; None where there are none.
     """
 

@@ -19,9 +19,6 @@ class SimulatedOutput:
     """An output of the simulator.
 
     Attributes:
-        name: of the output.
-        unit: of it.
-        divided_by: its residuals, to be compared with those of other outputs.
         noise: standard deviation of one row of it, in its unit.
     """
 
@@ -33,12 +30,7 @@ class SimulatedOutput:
 
 @dataclass(frozen=True)
 class SimulatedRun:
-    """A recording.
-
-    Attributes:
-        name: of its file.
-        rows: in it.
-    """
+    """A recording."""
 
     name: str
     rows: int
@@ -49,8 +41,6 @@ class SimulationRms:
     """Root mean square of measured less simulated values.
 
     Attributes:
-        as_simulated: with the parameters as stated.
-        refitted: with the parameters refitted.
         corrected: with missing terms put in.
     """
 
@@ -64,8 +54,6 @@ class SimulationNoise:
     """Noise of one row.
 
     Attributes:
-        sigma: standard deviation.
-        rows_as_one: neighbours that count as one row.
         degrees_of_freedom: of Student's t; None where it is normal.
     """
 
@@ -76,12 +64,7 @@ class SimulationNoise:
 
 @dataclass(frozen=True)
 class HeldOutSimulation(SimulationRms):
-    """Errors of one part that took no part.
-
-    Attributes:
-        name: of the part.
-        rows: in it.
-    """
+    """Errors of one part that took no part."""
 
     name: str
     rows: int
@@ -93,7 +76,6 @@ class HeldOutSimulations(SimulationRms):
 
     Attributes:
         worse: whether corrected values predict worse than those as simulated.
-        parts: part by part.
     """
 
     worse: bool
@@ -105,23 +87,14 @@ class PortTerm:
     """What was found of one term.
 
     Attributes:
-        name: of the term.
         verdict: one of the six words of docs/verdicts.md.
-        port: at which it acts.
         about: what the model file says of that.
         form: how it follows its signals.
-        put_in: whether the corrected simulator has it.
-        probability: that it is there.
-        log_bayes_factor: of it, given all else that was found.
-        rms: of its effect.
         sigmas: norm of its effect over its standard deviation.
         confounded: R² of its effect on the parameters.
         linear_and_true_differ_by: how far the linear answer is from the simulated one; None where not known.
-        values: its numbers with their uncertainties.
         gains: in parts that did not choose it; None where these were not asked for.
         equivalent: terms that these recordings cannot tell from it.
-        ambiguous_with: terms that would do about as well.
-        text: in words.
     """
 
     name: str
@@ -148,12 +121,9 @@ class SimulatorParameterResult:
     """A parameter of the simulator.
 
     Attributes:
-        name: of it.
-        unit: of it.
         stated: as the model file states it.
         refitted: without any term.
         corrected: with what was found put in.
-        shift: from the one to the other.
         shift_over_u: in standard uncertainties of the first; None where that is not known.
         confounded: R² of it on what was found.
         not_told_apart_from: parameters that the recordings cannot tell from it; None where they can.
@@ -175,14 +145,11 @@ class SeparatingInput:
     """What to record to tell two terms apart.
 
     Attributes:
-        text: in words.
-        terms: both.
         part: stretch of the recordings in which they differ most.
         sigmas: standard deviations by which they differ there.
         repeats: of that stretch until they are distinguished.
         input: under which they would differ most, in words; None where none that was tried does better than those recorded.
         input_sigmas: standard deviations by which they would differ under it, in a recording as long.
-        recorded_sigmas: the same under the inputs as recorded.
     """
 
     text: str
@@ -200,10 +167,7 @@ class SimulationsRun:
     """How many simulations it took.
 
     Attributes:
-        run: that many.
         most: that were allowed; None where nobody set a limit.
-        one_s: time of one [s].
-        kept: that had been run before and were not run again.
     """
 
     run: int
@@ -217,24 +181,12 @@ class SimulatorResult(Framed):
     """What a simulator lacks.
 
     Attributes:
-        simulator: its name.
-        unit: of its first output.
-        outputs: of it.
-        runs: recordings.
         levels: whether anything differs, which signals at which ports it follows, which term it is.
-        mismatch: whether it lacks anything.
-        rms: of all residuals.
-        noise: of one row.
         settled: whether the search ended at one set of terms.
         stopped: why it ended early; empty where it did not.
-        held_out: `tested` or `not-tested`.
         held_out_rms: errors of held-out parts; None where not tested.
-        findings: terms, those that are there first.
-        parameters: of the simulator.
         left: whether something is left beyond noise.
-        next: what to record next.
         not_asked: terms that were not compared in the end, and why, by name.
-        simulations: how many were run.
         out: file of the missing terms as code; absent where none was written.
         corrected: file of the corrected values; absent where none was written.
         figure: file of the figure; absent where none was written.

@@ -13,14 +13,7 @@ from dbbstation.sources.contract import ErrorSource
 
 @dataclass(frozen=True)
 class SourceParameter:
-    """A parameter of a cause.
-
-    Attributes:
-        name: with its unit at the end.
-        unit: of its value.
-        usual_size: one prior standard deviation, in its unit.
-        meaning: in words.
-    """
+    """A parameter of a cause."""
 
     name: str
     unit: str
@@ -33,16 +26,8 @@ class SourceDescription:
     """Everything that a cause says of itself.
 
     Attributes:
-        name: of the error source.
         belongs_to: `machine`, `session`, `mounting` or `instrument`.
         role: what becomes of it: fitted in every calibration, a candidate of the diagnosis, or the keeper of a curve.
-        what: what it is.
-        shows: how it shows.
-        confirm: how to confirm it.
-        cure: how to cure it.
-        equation: of its effect.
-        origin: of the equation.
-        needs: what it needs of a run.
         varies_with: what real machines' departure from its formula follows; None: the pose.
         form_uncertainty: share of the effect by which real machines depart from the formula, one standard deviation.
         parameters: on a machine; None where no machine was given.

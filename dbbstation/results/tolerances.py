@@ -29,8 +29,6 @@ class ToleratedCircle:
     """Figures of one circle that may have a tolerance.
 
     Attributes:
-        session: name of its session.
-        test: name of its test.
         direction: `ccw` or `cw`; `both` of both directions together.
         repeat: counts runs of this test and direction.
         sizes: by figure; G is about the least-squares circle, up to 30 undulations per revolution. Of both directions: empty.
@@ -62,10 +60,8 @@ class Held:
     """A tolerance held against circles.
 
     Attributes:
-        tolerance: the limit.
         conformity: exceeded where one circle exceeds it, else undecided where one is; None where it holds for none.
         worst: the circle with the largest figure; None where it holds for none.
-        size: of that figure.
         exceeded: how many circles exceed it.
         undecided: how many lie within U of the limit.
         circles: how many it holds for.
@@ -86,7 +82,6 @@ def tolerated_circles(
     """Return the figures of measured circles that may have a tolerance; without runs that show no circle.
 
     Args:
-        circles: as measured.
         tolerances: whose figures and filters are worked out too.
     """
     wanted = [
@@ -110,12 +105,7 @@ def tolerated_circles(
 
 
 def tolerated_pairs(pairs: Iterable[MeasuredPair], tolerances: Sequence[Tolerance]) -> tuple[ToleratedCircle, ...]:
-    """Return the figures of both directions together that tolerances are for.
-
-    Args:
-        pairs: as measured.
-        tolerances: of the shop.
-    """
+    """Return the figures of both directions together that tolerances are for."""
     wanted = dict.fromkeys((one.figure, one.upr) for one in tolerances if one.figure in OF_BOTH_DIRECTIONS)
     return tuple(
         ToleratedCircle(

@@ -35,7 +35,6 @@ class Result:
 
     Attributes:
         progress: None: not begun.
-        stage: what it does now.
         passed_s: time since it began, until it ended [s].
         answer: its result as JSON has it; empty until it is done.
         failure: what it said where it failed.
@@ -54,14 +53,11 @@ class After:
     """Works on one session, one step at a time; results go into a new folder beside it, or stand there from before.
 
     Args:
-        session: its folder.
         model: of an earlier calibration, that the circles are held against until this one has a model; None: none.
         settings: file of the shop's settings where one was named; None: those that are found.
         start: begins a job, in a process of its own.
 
     Attributes:
-        session: its folder.
-        results: how each step stands.
         former: session that an acceptance holds it against; None: none was chosen.
         kept: copies of the models in force then.
     """

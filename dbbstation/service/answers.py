@@ -34,14 +34,7 @@ class CalibrationAnswer:
     """What is shown of a calibration; lengths in µm.
 
     Attributes:
-        parameters_identified: how many.
-        nominal_rms_um: what the nominal machine leaves.
-        residual_rms_um: what the model leaves.
-        residual_within_mounting_rms_um: the same after each mounting's shift.
-        noise_um: of a reading.
         misfit: beyond noise and mountings.
-        outliers: what was kept out.
-        directions_lost: what was not identified, in words.
         gaps: what the plan cannot see, in words.
         plan_check: whether the tests can show a wrong plan.
     """
@@ -72,9 +65,6 @@ class DiagnosisAnswer:
 
     Attributes:
         mismatch: whether the calibration leaves more than noise and mountings.
-        misfit_rms_um: how much more.
-        noise_um: of a reading.
-        sources: causes with their verdicts.
         unexplained: what no cause explains.
         next_test: what to measure next; None for nothing.
     """
@@ -108,7 +98,6 @@ class VerdictAnswer:
 
     Attributes:
         kind: `within`, `exceeded`, `cannot tell` or `none`.
-        headline: in one sentence.
         reasons: one sentence for each tolerance that is not kept.
         to_do: what to do, in order.
     """
@@ -135,8 +124,6 @@ class HeldAnswer:
     """A tolerance held against circles.
 
     Attributes:
-        quantity: which figure it is for.
-        largest_um: the limit [µm].
         conformity: `within`, `exceeded` or `cannot tell`; None where it holds for none.
         worst: the circle with the largest figure; None likewise.
     """

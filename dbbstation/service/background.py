@@ -12,11 +12,7 @@ _Outcome = TypeVar("_Outcome")
 
 
 class Background(Generic[_Outcome]):
-    """One piece of work, begun at once.
-
-    Args:
-        work: what is done.
-    """
+    """One piece of work, begun at once."""
 
     def __init__(self, work: Callable[[], _Outcome]) -> None:
         self._work = work

@@ -29,12 +29,9 @@ class Stated:
     """What somebody states of bar and calibrator.
 
     Attributes:
-        serial_number: of the bar.
         calibrator: serial number of the block.
         calibrator_mm: its length at 20 degC [mm].
-        calibrator_u_um: standard uncertainty of that [µm].
         certified: date of its certificate, YYYY-MM-DD.
-        temp_c: temperature of the bar now [degC].
     """
 
     serial_number: str
@@ -52,9 +49,6 @@ class Calibrated:
     Attributes:
         path: of the file that was written.
         long_um: how much the bar reads too long [µm].
-        u_um: standard uncertainty of that [µm].
-        drift_um: how far it drifted meanwhile [µm].
-        drifted: whether that matters.
     """
 
     path: Path
@@ -68,7 +62,6 @@ class BarCalibration:
     """Borrows the instrument while the bar is on its calibrator; close it whatever happens.
 
     Args:
-        line: the instrument.
         count: good readings that are averaged.
 
     Attributes:
@@ -76,7 +69,6 @@ class BarCalibration:
         failure: what ended the reading; None while all is well.
         found: of the last calibration; None before it is through.
         done: readings that have come of those that are averaged.
-        count: as given.
     """
 
     def __init__(self, line: HeldLine, count: int = USUAL_READINGS) -> None:

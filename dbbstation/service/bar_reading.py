@@ -32,8 +32,6 @@ def read_on_calibrator(
     """Return the mean of so many good readings, less those that a bar that stands cannot have.
 
     Args:
-        source: started instrument.
-        count: good readings.
         resolution_um: last digit of the display [µm]; None: as the readings show.
         progress: told how many of how many have come.
 
@@ -62,10 +60,7 @@ def bar_file(
     """Return the calibration as its file has it.
 
     Args:
-        found: the readings.
         of_bar: serial number, temperature with its uncertainty, expansion, as `BarFile` names them.
-        calibrator: as `CalibratorSchema` has it.
-        instrument: name.
         now: the time of day with its zone.
 
     Raises:

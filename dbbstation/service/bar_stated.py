@@ -31,8 +31,6 @@ def fault_of(
     """Return what is wrong with a text that was typed; empty where nothing is.
 
     Args:
-        name: of the value, as the names of `Stated`.
-        text: as typed.
         reads_mm: what the instrument reads on the calibrator [mm]; None: nothing, or only what it was told.
         stroke_mm: travel of the gauge either way [mm]; None: not known.
         today: the date; None: that of the computer.

@@ -55,9 +55,7 @@ class SequenceOpened:
     Attributes:
         tasks: runs that the plan asks for, in their order.
         open: those without an accepted recording.
-        session: where the recordings are.
         known: what judged runs of the session say, in the order they were recorded.
-        virtual: whether machine and instrument are virtual.
     """
 
     tasks: tuple[Task, ...]
@@ -88,11 +86,7 @@ class Board:
         allowed: commands that it takes now.
         announced: the run that is next or goes on.
         tasks: planned runs in their order.
-        marks: how each of them stands.
-        session: where the recordings are.
         virtual: whether machine and instrument are virtual.
-        sample: the last one.
-        rate: of the readings.
         lost: samples that the line lost during the run that goes on, or went on last.
         doubtful: samples of that run that may have been damaged on the line.
         swept_deg: travelled since the feed-in [deg].
@@ -102,7 +96,6 @@ class Board:
         running: direction of the run that is on its circle; None where none is.
         results: what completed runs say, the last ones.
         runs: every run that was recorded whole, also in earlier sittings, by its name.
-        verdicts: on them, by their names.
         reasons: why some do not count, by their names.
         completed: the run that waits for a verdict, or waited last.
         fault: what ended the sequence.

@@ -40,8 +40,6 @@ def candidates(kind: CandidateFormat, under: Path, *, shipped: bool = True) -> t
     """Return the files of a format, those under a folder first; copies inside sessions are left out.
 
     Args:
-        kind: which format.
-        under: folder to search, and the folders in it.
         shipped: whether those of the package are offered too.
     """
     own = [path for path in _files(under, DEPTH) if _is(kind, path)]

@@ -84,8 +84,6 @@ class Choice:
         bar: file of the bar's calibration; None: none.
         bar_waiver: why it is measured without; empty: it is not.
         programs: folder of NC programs; None: plain nominal circles.
-        operator: name.
-        serial_number: of the machine.
         job: job or order number.
         ambient_temp_c: temperature of the shop now [degC]; None: not read. A session that exists gets it as a note.
         order: of the tests; a session that exists keeps its own.
@@ -129,8 +127,6 @@ class Prepared:
     """A choice that was read and checked.
 
     Attributes:
-        job: ready to be opened.
-        protocol: of the instrument.
         line: instrument and port.
         runs: that are left to be measured; of a new session all of the plan.
         circles_s: time that their circles take at their planned feeds [s].
@@ -158,8 +154,6 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
     """Read what was chosen and dry-run it; nothing is opened or written.
 
     Args:
-        choice: with nothing missing.
-        limits: of the shop.
         model: that circles are judged by; None: the nominal machine.
 
     Raises:

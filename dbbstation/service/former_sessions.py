@@ -27,7 +27,6 @@ class InForce:
     """What the accepted circles of a session ran by.
 
     Attributes:
-        circles: accepted runs.
         compensated: how many of them ran a compensated program.
         programs: folder of the session's copies of the programs; None where the control ran plain circles.
         models: files that the programs were compensated with, as far as they were found.
@@ -46,9 +45,7 @@ class Former:
     """A session measured before.
 
     Attributes:
-        folder: of the session.
         measured: start of its last accepted run.
-        in_force: what its circles ran by.
     """
 
     folder: Path
@@ -91,7 +88,6 @@ def former_sessions(
     about the same ball in the same place. Before it has an accepted run, that holds for every test of its plan.
 
     Args:
-        now: the session.
         under: folder to search, and the folders in it.
         tests: that must have been run there; None: those above.
     """
@@ -118,7 +114,6 @@ def in_force(session: SessionFolder, models: dict[str, Path]) -> InForce:
     """Return what the accepted circles of a session ran by.
 
     Args:
-        session: that was measured.
         models: model files by their SHA-256.
     """
     runs = session.in_state(RunState.ACCEPTED)

@@ -49,12 +49,7 @@ USUAL_VIRTUAL = "streaming-encoder"
 
 @dataclass(frozen=True, eq=False)
 class Opened:
-    """A job whose sequence can be started.
-
-    Attributes:
-        prepared: what is measured.
-        runner: runs it.
-    """
+    """A job whose sequence can be started."""
 
     prepared: Prepared
     runner: Runner
@@ -67,7 +62,6 @@ class Front:
     Attributes:
         under: working folder, in which sessions and files are looked for.
         memory: of last choices.
-        limits: of the shop.
         observers: told of everything that happens in a sequence.
         model: that circles are judged by; None: the nominal machine.
         given: what the command line or the shop's settings say; holds over what is remembered.
@@ -142,11 +136,7 @@ class Front:
         return [*ports(), *((name, "no hardware, to try it") for name in VIRTUAL)]
 
     def probe(self, line: Line) -> ProbeOutcome:
-        """Return what answers at a port; takes some seconds.
-
-        Args:
-            line: instrument and port.
-        """
+        """Return what answers at a port; takes some seconds."""
         if line.virtual:
             return ProbeOutcome(line.port, answers=True, text="is switched on when it is needed")
         try:
@@ -159,12 +149,7 @@ class Front:
         return probe(protocol, line.port, line.baud)
 
     def hold(self, protocol: Protocol, line: Line) -> HeldLine | None:
-        """Return the instrument, which stays open from now on until another one is asked for; None of a virtual one.
-
-        Args:
-            protocol: of the instrument.
-            line: where it is.
-        """
+        """Return the instrument, which stays open from now on until another one is asked for; None of a virtual one."""
         return None if line.virtual else self._held.line(protocol, line.port, line.baud)
 
     def release(self) -> None:
@@ -249,8 +234,6 @@ class Front:
         """Return what is wrong with a text that was typed of bar or calibrator; empty where nothing is.
 
         Args:
-            name: of the value, as the names of `Stated`.
-            text: as typed.
             line: instrument; one that shows what it was told says nothing of the calibrator's length.
             reads_mm: what it reads now [mm]; None: nothing.
         """
@@ -341,12 +324,7 @@ class Front:
 
 
 class NoNumberError(ValueError):
-    """A text that should be a number is none.
-
-    Args:
-        name: of the value.
-        text: that was given.
-    """
+    """A text that should be a number is none."""
 
     def __init__(self, name: str, text: str) -> None:
         self.name, self.text = name, text

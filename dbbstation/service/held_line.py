@@ -41,7 +41,6 @@ class HeldLine:
     An instrument that fails meanwhile is opened again, as often as it takes.
 
     Args:
-        protocol: of the instrument.
         port: name or URL.
         baud: where the instrument is not set to the usual rate.
         clock: what stamps the readings [s].
@@ -49,7 +48,6 @@ class HeldLine:
         log: where every byte is written down; the caller closes it.
 
     Attributes:
-        protocol: as given.
         latest: the last reading seen; None before one came, and while none comes.
         failure: why none comes; None while all is well.
         rate: of the readings seen.

@@ -25,7 +25,6 @@ def last_traces(folder: Path, test: str) -> dict[Direction, LiveTrace]:
 
     Args:
         folder: of the session that is measured now; the former ones lie beside it.
-        test: name of the test.
 
     Raises:
         InputError: the session that is measured now cannot be read.

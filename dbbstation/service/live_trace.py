@@ -45,10 +45,6 @@ class LiveTrace:
 
     Only the full turn is kept, not the overshoots; samples that are no length on the circle break the line. Of samples that lie
     closer than can be drawn, the extremes are kept.
-
-    Args:
-        run: which run.
-        circle: as commanded.
     """
 
     def __init__(self, run: RunId, circle: Circle) -> None:
@@ -152,7 +148,6 @@ class Derived:
 
     Attributes:
         view: less what: its least-squares circle, or then also the other direction.
-        measured: the trace.
         deviation_um: what is left of it; not a number where the line breaks, shape (n,) [µm].
         largest_um: greatest of them, without sign [µm].
     """
@@ -190,7 +185,6 @@ def difference(ccw: Derived, cw: Derived) -> Derived | None:
 
     Args:
         ccw: one complete trace, centred.
-        cw: the other.
     """
     placed = np.isfinite(cw.theta_deg)
     if not placed.any():

@@ -75,8 +75,6 @@ class Remembered:
         machine: file of the nominal machine; None: none yet.
         plan: file of the plan; None: none yet.
         line: instrument and port.
-        operator: name.
-        serial_number: of the machine.
         sessions: folders, the last first, each with what it was measured by.
     """
 

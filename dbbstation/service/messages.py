@@ -22,7 +22,6 @@ class Message:
 
     Attributes:
         weight: how much it matters.
-        text: the words.
     """
 
     weight: Weight

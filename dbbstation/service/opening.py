@@ -21,8 +21,6 @@ def opener(job: Job, line: HeldLine, *, observers: Sequence[Observer] = ()) -> O
     """Return what borrows the instrument and opens the session, each time anew.
 
     Args:
-        job: what is measured.
-        line: the instrument.
         observers: told of everything after storage, before the screen.
     """
 

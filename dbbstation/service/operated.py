@@ -40,7 +40,6 @@ class Operated:
 
     Attributes:
         path: of the file; what it names lies beside it.
-        job: what it says.
     """
 
     path: Path
@@ -102,8 +101,6 @@ class Answered:
     """The answer on a session.
 
     Attributes:
-        word: in one word.
-        reasons: a sentence each.
         to_do: what to do, in order.
         report: of everything; None where none could be made.
     """
@@ -118,8 +115,6 @@ class JobAnswer:
     """Holds the circles of a session against the job's tolerances, by a report.
 
     Args:
-        operated: the job.
-        session: its folder.
         missing: runs of the plan that have no accepted recording, as people read them.
         start: begins a job, in a process of its own.
     """
@@ -156,9 +151,7 @@ def answer_of(verdict: VerdictAnswer, missing: Sequence[str], report: Path | Non
     What exceeds a limit does so whatever is missing; what is within says nothing of circles that were not measured.
 
     Args:
-        verdict: of the report.
         missing: runs of the plan without an accepted recording.
-        report: its file.
     """
     kinds = {str(one): one for one in Conformity}
     word = kinds.get(verdict.kind, Conformity.UNDECIDED)
@@ -182,11 +175,7 @@ def instrument_of(path: Path, job: JobFile) -> str:
 
 
 def instrument_faults(path: Path) -> list[Problem]:
-    """Return what is wrong with the instrument that a job names: there is none of that name, or no such variant.
-
-    Args:
-        path: of a job that can be read.
-    """
+    """Return what is wrong with the instrument that a job names: there is none of that name, or no such variant."""
     faults: list[Problem] = []
     document = read_document(path, JobFile, faults)
     job = None if document is None else validate(document, JobFile, faults)

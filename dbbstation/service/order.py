@@ -38,8 +38,6 @@ def ordered(plan: InlinePlan, order: Order, gate: Gate = Gate.PLAN) -> InlinePla
     """Return the plan with its tests in an order.
 
     Args:
-        plan: as its file has it.
-        order: of the tests.
         gate: what is repeated at the end; a plan that names tests to repeat keeps its own.
     """
     domain = plan.to_domain()

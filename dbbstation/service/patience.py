@@ -30,7 +30,6 @@ def driver_patience(time_scale: float, *, waits: bool = False) -> DriverPatience
     """Return what `Instrument` takes on a clock that runs `time_scale` times faster than real.
 
     Args:
-        time_scale: of the clock.
         waits: the machine sends nothing between runs.
     """
     if waits:

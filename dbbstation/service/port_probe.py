@@ -43,10 +43,8 @@ def probe(protocol: Protocol, port: str, baud: int | None = None, patience_s: fl
     """Ask a port for a reading of an instrument.
 
     Args:
-        protocol: of the instrument that is expected.
         port: name or URL.
         baud: where the instrument is not set to the usual rate.
-        patience_s: how long to wait [s].
     """
     try:
         with Instrument(protocol, port, baud=baud, timeout_s=patience_s) as source:

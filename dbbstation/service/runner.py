@@ -32,9 +32,6 @@ class OpenStation:
     """A station ready to run, its storage subscribed.
 
     Attributes:
-        station: the engine.
-        schedule: what is left to do.
-        session: where the recordings are.
         known: what judged runs of the session say, from disk.
         virtual: whether machine and instrument are virtual.
     """

@@ -31,7 +31,6 @@ def seat(length_mm: float, circle: Circle) -> BarAtFeedIn:
     """Return how the bar stands at the feed-in point of a circle.
 
     Args:
-        length_mm: reading [mm].
         circle: that is run next.
     """
     long_mm = length_mm - (circle.bar_mm + circle.feed_in_mm)

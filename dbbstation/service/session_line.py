@@ -19,7 +19,6 @@ def line_to_go_on(folder: Path, remembered: Line, given: Line) -> Line:
     A virtual session goes on with a virtual machine, whatever the shop's settings name; a real one never does.
 
     Args:
-        folder: of the session.
         remembered: what it was measured by last, as this computer remembers.
         given: the same with what command line and settings say.
     """

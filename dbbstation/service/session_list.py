@@ -30,10 +30,7 @@ class SessionLine:
     """One session.
 
     Attributes:
-        folder: of the session.
         changed: when its file was written last.
-        plan: name of its plan.
-        machine: name of its machine.
         accepted: runs of the plan that have an accepted recording.
         planned: runs of the plan.
         unjudged: runs that wait for a verdict.

@@ -30,7 +30,6 @@ def note_temperature(folder: Path, degc: float) -> None:
     """Note the present temperature; while a sequence runs, it takes an `AddNote` instead.
 
     Args:
-        folder: of the session.
         degc: temperature of the shop [degC].
 
     Raises:

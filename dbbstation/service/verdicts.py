@@ -20,7 +20,6 @@ def give_verdict(folder: Path, command: Judge) -> None:
     """Note another verdict in the session.
 
     Args:
-        folder: of the session.
         command: the run, and whether it counts.
 
     Raises:

@@ -34,7 +34,6 @@ class Helper:
     An observer of the station.
 
     Args:
-        cell: what is helped at.
         programs: NC programs that command runs, by test and direction; those that have none are plain circles.
     """
 
@@ -68,7 +67,6 @@ class VirtualPlace:
     """Where the virtual things are.
 
     Attributes:
-        port: of the instrument.
         clock: their time [s].
         helper: to be subscribed to the station.
         wire: the instrument, for showing what faults look like.
@@ -93,11 +91,7 @@ def virtual_place(
     """Switch on a machine with errors drawn at random, and an instrument that reads the bar on it.
 
     Args:
-        machine: nominal machine.
-        plan: what can be run on it.
-        protocol: of the instrument.
         time_scale: how much faster than real time it goes.
-        seed: of the errors; the same seed makes the same machine.
         programs: NC programs that command runs, by test and direction.
 
     Raises:

@@ -47,12 +47,7 @@ class WorkProgress(StrEnum):
 class BackgroundWork:
     """One job, begun at once.
 
-    Args:
-        job: what is to be done.
-        folder: where it is done.
-
     Attributes:
-        job: as given.
         stage: what it does now, as it says itself; empty before it says anything.
     """
 

@@ -47,13 +47,7 @@ class _File(BaseModel):
 
 @dataclass(frozen=True)
 class StepsBefore:
-    """What was done with a session as it is now.
-
-    Attributes:
-        folder: of the results.
-        counted: key of the session.
-        steps: what was done, by the name of the step.
-    """
+    """What was done with a session as it is now."""
 
     folder: Path
     counted: str
@@ -64,9 +58,7 @@ def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
     """Keep what was done beside its results; where that cannot be written, only the next start lacks it.
 
     Args:
-        folder: of the results.
         key: of the session, as `counted` has it.
-        steps: what was done, by the name of the step.
     """
     with suppress(OSError, OutputError):
         file = _File(key=key, steps=steps)
@@ -77,9 +69,6 @@ def steps_before(session: Path) -> StepsBefore | None:
     """Return the last folder of results of a session that is still the same, and what was done; None where none is.
 
     A step whose file is gone is left out.
-
-    Args:
-        session: its folder.
     """
     session = session.absolute()
     kept = sorted(session.parent.glob(f"{session.name}-results*/{FILE}"), key=lambda file: -file.stat().st_mtime)

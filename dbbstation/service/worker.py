@@ -70,9 +70,6 @@ def main() -> None:
 def done(job: SessionJob) -> Mapping[str, object]:
     """Do a job in the working folder; return its result as JSON has it.
 
-    Args:
-        job: what is to be done.
-
     Raises:
         StationError: whatever the task raises.
         ValueError: the job lacks a file that its task needs.

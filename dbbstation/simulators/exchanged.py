@@ -37,7 +37,6 @@ class ExchangedSimulator(Simulator):
 
     Args:
         ports: names of the signals at each port, by its name.
-        outputs: names of the outputs.
     """
 
     def __init__(self, ports: Mapping[str, tuple[str, ...]], outputs: tuple[str, ...]) -> None:

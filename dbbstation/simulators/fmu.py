@@ -23,10 +23,8 @@ class FmuSimulator(ExchangedSimulator):
     """An FMU. Its outputs are taken at equal steps, and by straight lines between them where rows are not.
 
     Args:
-        path: of the FMU.
         variables: name of the FMU's variable, by our name, where they differ; signals are named `port.signal`, or `signal`.
         ports: names of the signals at each port, by its name.
-        outputs: names of the outputs.
         limit_s: longest time that a simulation may take [s].
     """
 

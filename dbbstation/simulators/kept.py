@@ -37,7 +37,6 @@ class KeptSimulations:
 
     Args:
         content: hash of the simulator's files.
-        model: with its recordings.
 
     Attributes:
         problem: why nothing can be kept, in words; empty where it can.
@@ -62,7 +61,6 @@ class KeptSimulations:
         """What is kept of simulations.
 
         Args:
-            asks: for which.
             shape: of the outputs of each run, by its number.
         """
         found: dict[SimulationRequest, SimulationOutcome] = {}

@@ -46,10 +46,7 @@ class LoadedSimulator:
         path: of `model.yaml`.
         source: Python file of the simulator, or what runs its program or FMU.
         file: what `model.yaml` says.
-        model: what is compared.
-        tables: recordings as they were read.
         own: physics of the user's own at ports.
-        own_files: that it came from.
     """
 
     path: Path

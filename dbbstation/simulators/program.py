@@ -35,7 +35,6 @@ class ProgramSimulator(ExchangedSimulator):
     Args:
         command: program and arguments; files beside the model file are named by their whole path.
         ports: names of the signals at each port, by its name.
-        outputs: names of the outputs.
         limit_s: longest time that it may take [s].
     """
 
@@ -112,12 +111,7 @@ def _read(path: Path) -> dict[str, NDArray[np.float64]]:
 
 
 def whole_command(words: tuple[str, ...], folder: Path) -> tuple[str, ...]:
-    """Return a command with its files beside the model file by their whole path.
-
-    Args:
-        words: of the command.
-        folder: of the model file.
-    """
+    """Return a command with its files beside the model file by their whole path."""
     return tuple(str((folder / word).absolute()) if (folder / word).is_file() else word for word in words)
 
 

@@ -43,16 +43,12 @@ class Runs:
     """Simulations of one simulator. Use it as a context: its processes end with it.
 
     Args:
-        loaded: simulator with its recordings.
         count: of processes; None: one for each core; 0: this one does it all, and nothing limits its time.
         most: simulations that may be run; None: what ten minutes hold.
         keeps: whether simulations are kept on disk, and those that are kept there are not run again.
 
     Attributes:
-        ran: simulations that were run.
-        found: simulations that had been kept.
         most: that may be run; an estimate that is made better while they run, where only their time is limited.
-        seconds: that they took.
     """
 
     def __init__(

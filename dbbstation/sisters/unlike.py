@@ -46,9 +46,7 @@ class Sisters:
     """Machines held against their sisters, quantity by quantity; arrays have shape (q, n), NaN where nothing is known.
 
     Attributes:
-        unlike: whether a machine is unlike its sisters.
         score: standard normal where it is like them, from those that are not unlike.
-        middle: of those sisters, in the quantity's unit.
         scatter: their standard deviation beyond their uncertainties, in the quantity's unit.
         smallest_seen: departure from the middle from which on a machine would count as unlike, in the quantity's unit.
     """
@@ -143,15 +141,7 @@ def _middle(
 
 @dataclass(frozen=True, eq=False)
 class _Departure:
-    """One machine of each quantity, held against others; arrays have shape (q,).
-
-    Attributes:
-        off: its departure from their middle.
-        spread: standard deviation of that where it is like them.
-        freedom: degrees of freedom of `spread`.
-        middle: of the others.
-        scatter: of the others.
-    """
+    """One machine of each quantity, held against others; arrays have shape (q,)."""
 
     off: NDArray[np.float64]
     spread: NDArray[np.float64]

@@ -64,10 +64,9 @@ class SetUpErrors:
     """What a micrometer read of balls that were put up at the spindle [CAL III-A, IV]; NaN where nobody measured.
 
     Attributes:
-        fixed_ball_mm: fixed ball less tool tip while the machine stood at the ball's commanded place, machine frame,
-            shape (3,) [mm].
+        fixed_ball_mm: fixed ball less tool tip while the machine stood at the ball's commanded place, machine frame, shape (3,)
+            [mm].
         moving_ball_mm: moving ball less tool tip, platform frame, shape (3,) [mm].
-        uncertainty_mm: of each reading, one standard deviation [mm].
     """
 
     fixed_ball_mm: NDArray[np.float64]
@@ -95,27 +94,24 @@ class Setup:
     Names are unique over all sessions of a fit: runs that share a name share that error.
 
     Attributes:
-        session: the session folder.
-        mounting: one putting-up of one ball.
         ball: entry of the CMM sheet.
-        instrument: the bar.
         fixed_ball_mm: centre of the fixed ball as the CMM knows it, machine frame, shape (3,) [mm].
         mounting_repeatability_mm: of the holder, one standard deviation, for all axes or each, shape (3,) [mm].
         ball_uncertainty_mm: of the CMM, one standard deviation per axis [mm].
         bar_uncertainty_mm: of the bar's calibrated length, one standard deviation; of a bar that nobody calibrated more than any
             calibrator leaves [mm].
-        bar_reads_long_mm: reading less true distance, as calibrator and temperature let expect it: part of every reading,
-            and never taken off one [mm].
+        bar_reads_long_mm: reading less true distance, as calibrator and temperature let expect it: part of every reading, and
+            never taken off one [mm].
         bar_length_mm: distance of the balls at which the bar was calibrated; None where nobody calibrated it [mm].
-        place_known: False for a ball that was put up under the spindle: `fixed_ball_mm` is where the machine was told
-            to stand then, and nobody knows where the ball is.
+        place_known: False for a ball that was put up under the spindle: `fixed_ball_mm` is where the machine was told to stand
+            then, and nobody knows where the ball is.
         set_up_errors: micrometer readings of such a ball; None where there are none.
         plate: jig plate that the ball stands on; None where it stands in no bore.
         run: name of the run; empty where it has none.
-        start_uncertainty_deg: how well the beginning of its turn is known along the travel, one standard deviation;
-            zero where angles were recorded [deg].
-        moving_s: beginning and end of every run of the session, in order, on the clock of `Motion.time_s` [s]; empty
-            where nobody noted them.
+        start_uncertainty_deg: how well the beginning of its turn is known along the travel, one standard deviation; zero where
+            angles were recorded [deg].
+        moving_s: beginning and end of every run of the session, in order, on the clock of `Motion.time_s` [s]; empty where nobody
+            noted them.
         thermometers: what each of them showed over the session, by the name of its column without the unit.
     """
 
@@ -189,13 +185,7 @@ class Motion(WithLogged):
         return self.once("struts", machine, lambda: inverse(machine.hexapod, self.frames(machine)))
 
     def once(self, what: str, machine: Machine | None, work: Callable[[], Worked]) -> Worked:
-        """Something that hangs on the motion and a machine's joints alone, worked out once as long as these are asked for.
-
-        Args:
-            what: names it.
-            machine: whose joints; None for what hangs on the motion alone.
-            work: works it out.
-        """
+        """Something that hangs on the motion and a machine's joints alone, worked out once as long as these are asked for."""
         joints, known = None if machine is None else machine.hexapod, self._known.get(what)
         if known is None or known[0] is not joints:
             known = self._known[what] = joints, work()
@@ -247,13 +237,12 @@ class Parameter:
 
     Attributes:
         name: unique within the source; its unit is its last part where it has one.
-        unit: as printed.
         plausible: usual size, one standard deviation, in that unit.
         meaning: one line with the sign.
-        grid: values to search over, where the effect is not proportional to the parameter (a time constant, a
-            phase); empty for an amplitude, which the effect is proportional to.
-        tolerance: standard deviation that the machine file states, in that unit: a fit takes it for known; None where
-            nothing is stated.
+        grid: values to search over, where the effect is not proportional to the parameter (a time constant, a phase); empty for
+            an amplitude, which the effect is proportional to.
+        tolerance: standard deviation that the machine file states, in that unit: a fit takes it for known; None where nothing is
+            stated.
         newer: True for one that the source had not always: models written before lack it, and it is zero there.
         positive: True for what cannot be negative, such as a compliance or a friction: where a fit says so beyond its
             uncertainty, something else is at work.
@@ -307,7 +296,6 @@ def of_each_strut(
 
     Args:
         name: of the parameter; `{}` stands for the strut, 1 to 6.
-        unit: as printed.
         plausible: usual size, one standard deviation, in that unit.
         meaning: one line with the sign; `{}` stands for the strut.
         positive: True for what cannot be negative.
@@ -455,7 +443,6 @@ class ErrorSource(ABC):
 
         Args:
             motion: the run, or as much of its beginning as is known: it shows which way the struts set out.
-            machine: nominal.
             values: of the parameters, shape (p,).
         """
         return None
@@ -471,7 +458,6 @@ class ErrorSource(ABC):
 
         Args:
             motion: the stretch, in time order; `straight`.
-            machine: nominal.
             values: of the parameters, shape (p,).
             state: of `begin`, or behind the stretch before; it stays as it is, so that a stretch can be asked for again.
         """
@@ -495,9 +481,7 @@ class ErrorSource(ABC):
         Args:
             motion: a command that nearly leads there.
             reached: the stretch as this source alone should let the struts come to it.
-            machine: nominal.
             values: of the parameters, shape (p,).
-            state: before the stretch.
         """
         raise NotImplementedError
 
@@ -638,7 +622,6 @@ class Fitted:
     """A source with values for one of its sets, as a model carries it.
 
     Attributes:
-        source: the cause.
         values: parameter values in the order of `source.parameters`, shape (p,).
         shared: name of the set, empty for the machine's own sources.
     """

@@ -91,7 +91,6 @@ def sources_named(names: Iterable[str], known: Mapping[str, ErrorSource] | None 
     """Sources by their names.
 
     Args:
-        names: of the sources.
         known: every error source by name; those of the package and of installed ones if None.
 
     Raises:

@@ -39,7 +39,6 @@ class Job:
     """What is measured, on what, into what.
 
     Attributes:
-        machine: nominal machine.
         plan: with its jig inline, as it goes into the session.
         folder: of the session; made, or gone on with.
         details: noted when the session is made; a session that exists keeps what it has.
@@ -93,7 +92,6 @@ class Workplace:
     Attributes:
         station: subscribe to it, send it commands, run it.
         schedule: what is done and left.
-        writer: of the session folder.
         judge: knows the figures and findings of every run that counts.
     """
 
@@ -117,10 +115,8 @@ def assemble(
     """Open the session and build the station; storage is its first observer.
 
     Args:
-        job: what is measured.
         source: started instrument.
         unreadable: what its driver rejected so far, by what was wrong with it.
-        asked: whether it is asked for each reading.
 
     Raises:
         InputError: the folder holds another session, or one with faults.

@@ -39,7 +39,6 @@ class Autopilot:
     """Drives a sequence to its end; an observer of the station.
 
     Args:
-        send: takes commands, `Station.send`.
         hands: moves the machine.
     """
 

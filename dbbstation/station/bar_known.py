@@ -30,7 +30,6 @@ def check_bar_known(bar: Bar | None, plan: Plan, now: datetime, largest_age_h: f
 
     Args:
         bar: as the session is to note it; None where nothing is known.
-        plan: what is measured.
         now: the time of day with its zone.
         largest_age_h: age of a calibration beyond which it is stale [h].
 

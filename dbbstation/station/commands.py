@@ -47,11 +47,7 @@ class Repeat:
 
 @dataclass(frozen=True)
 class Reject:
-    """The run does not count; go on to the next. What lacks an accepted run is named at the end.
-
-    Attributes:
-        reason: as of `Repeat`.
-    """
+    """The run does not count; go on to the next. What lacks an accepted run is named at the end."""
 
     reason: str = ""
 
@@ -71,7 +67,6 @@ class GoTo:
     """Measure another test next, also one that was left out or has its runs already; then go on from there.
 
     Attributes:
-        test: name of the test.
         direction: sense of travel; None: whichever is left to do.
     """
 
@@ -84,10 +79,8 @@ class Judge:
     """Give a run another verdict, at any time after it was recorded: a wrong one is taken back so.
 
     Attributes:
-        test: name of the test.
         direction: sense of travel.
         repeat: of this test and direction, from 1.
-        accepted: whether the run counts.
         reason: why it does not; kept with the recording.
     """
 

@@ -36,7 +36,6 @@ class Patience:
     Attributes:
         for_machine_s: for the bar at the feed-in point, and there for the feed-in [s].
         turn_factor: as many times the time that the circle takes at its feed.
-        turn_extra_s: and so much more [s].
     """
 
     for_machine_s: float = 600.0
@@ -56,7 +55,6 @@ class CircleWatch:
     """Tells when the machine is on the circle though nothing is recorded, from readings in time order.
 
     Args:
-        circle: as commanded.
         waits_for_feed_in: whether a bar that stands at the circle's length is on it only after it came from outside.
     """
 

@@ -27,7 +27,6 @@ class RunId:
     """Which run of the session.
 
     Attributes:
-        test: name of the test.
         direction: sense of travel.
         repeat: counts the runs of this test and direction in the session, from 1.
         mounting: counts how often a ball was put up in the session, from 1.
@@ -53,9 +52,8 @@ class Sample:
         length_mm: distance between the ball centres [mm]; None where the instrument gave no number.
         status: `ok`, `doubtful`, `overrange` or `fault`.
         said: what the instrument said where the status is not `ok`; why it is doubted where it is `doubtful`.
-        lost: samples lost immediately before this one.
-        phi_deg: progress along the turn as far as it can be told live, 0 to 360 on the full turn, negative on the
-            overshoot before it, above 360 behind it [deg]; None off the circle.
+        phi_deg: progress along the turn as far as it can be told live, 0 to 360 on the full turn, negative on the overshoot
+            before it, above 360 behind it [deg]; None off the circle.
         t_uncertainty_s: standard uncertainty of `t_s` [s]; None where the instrument sends by itself.
     """
 
@@ -73,7 +71,6 @@ class StateChanged:
     """The sequencer is in another state.
 
     Attributes:
-        state: the new one.
         commands: what it takes now.
     """
 
@@ -86,13 +83,11 @@ class RunAnnounced:
     """What is measured next, and what a person has to do for it.
 
     Attributes:
-        run: which run.
         ball: the ball on the table with its bore (None: it stands in none) and holder, or put up under the spindle.
         circle: the circle: bar length, tilt, elevation, feed, centre.
         put_up: the ball has to be put up; otherwise it stands there already and is not touched.
         program: NC program that commands the run; empty: the plain nominal circle.
         number: of the run in the sequence, from 1.
-        count: runs in the sequence.
         instructions: the same in words, one step per entry.
         sampling: what the instrument sees of the circle at its feed; None where its rate is not known.
     """
@@ -110,11 +105,7 @@ class RunAnnounced:
 
 @dataclass(frozen=True)
 class ReadingsSeen:
-    """Readings in time order, while no run is recorded: for a live display only.
-
-    Attributes:
-        samples: at least one.
-    """
+    """Readings in time order, while no run is recorded: for a live display only."""
 
     samples: tuple[Sample, ...]
 
@@ -124,7 +115,6 @@ class RunStarted:
     """The bar stands outside the circle: from now on every sample belongs to the run.
 
     Attributes:
-        run: which run.
         program: NC program that commands it; empty: the plain nominal circle.
     """
 
@@ -134,12 +124,7 @@ class RunStarted:
 
 @dataclass(frozen=True)
 class SamplesRecorded:
-    """Samples of the run that goes on, in time order.
-
-    Attributes:
-        run: which run.
-        samples: at least one.
-    """
+    """Samples of the run that goes on, in time order."""
 
     run: RunId
     samples: tuple[Sample, ...]
@@ -150,7 +135,6 @@ class FeedInSeen:
     """The bar came onto the circle.
 
     Attributes:
-        run: which run.
         t_s: since the run's first sample [s].
     """
 
@@ -163,7 +147,6 @@ class RunProgress:
     """How far the run is; sent once per degree at most.
 
     Attributes:
-        run: which run.
         swept_deg: travelled since the feed-in [deg].
         of_deg: from feed-in to feed-out, both overshoots included [deg].
     """
@@ -178,10 +161,7 @@ class RunCompleted:
     """The recording has ended, nothing is added to it any more.
 
     Attributes:
-        run: which run.
-        samples: how many it has.
         lost: samples that the line lost during it.
-        figures: of its circle; None where there is none.
         problem: why it cannot be used; empty where it can.
         findings: all that was looked for in its circle; empty where it has none.
         doubtful: samples that may have been damaged on the line; they are kept, and in no figure.
@@ -211,7 +191,6 @@ class RunRestored:
     """A run that was recorded before waits for its verdict still; its figures follow as those of any completed run.
 
     Attributes:
-        run: which run.
         samples: of its turn, in time order, thinned; empty where it has none.
     """
 
@@ -221,12 +200,7 @@ class RunRestored:
 
 @dataclass(frozen=True)
 class FeedInMissed:
-    """The machine is on the circle, and nothing is recorded.
-
-    Attributes:
-        run: that is announced.
-        problem: what was seen, and what to do.
-    """
+    """The machine is on the circle, and nothing is recorded."""
 
     run: RunId
     problem: str
@@ -250,7 +224,6 @@ class RunAccepted:
     """The run counts.
 
     Attributes:
-        run: which run.
         reason: why, although something was found wrong with it; empty where nothing was.
     """
 
@@ -260,12 +233,7 @@ class RunAccepted:
 
 @dataclass(frozen=True)
 class RunRejected:
-    """The run does not count; its recording is kept.
-
-    Attributes:
-        run: which run.
-        reason: why.
-    """
+    """The run does not count; its recording is kept."""
 
     run: RunId
     reason: str
@@ -276,7 +244,6 @@ class RunLate:
     """The machine did not come: no recording was begun, the run is announced again.
 
     Attributes:
-        run: which run.
         problem: what was waited for and how long.
     """
 
@@ -289,8 +256,6 @@ class CommandRefused:
     """A command that the state does not take; nothing happened.
 
     Attributes:
-        command: which.
-        state: in which.
         why: in words, with what can be done instead.
     """
 
@@ -332,7 +297,6 @@ class Fault:
     """Instrument or storage failed; the sequence ends here. What was recorded is kept.
 
     Attributes:
-        error: what is wrong, where, what to do.
         interrupted: the run that went on, kept as far as it came; None where none did.
     """
 

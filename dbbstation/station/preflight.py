@@ -14,11 +14,6 @@ if TYPE_CHECKING:
 def check_plan(plan: Plan, machine: Machine, *, file: str) -> None:
     """Dry-run a plan.
 
-    Args:
-        plan: what is to be measured.
-        machine: nominal machine.
-        file: of the plan, for messages.
-
     Raises:
         InputError: a test whose begin and end the readings cannot show; every such test is named.
         TravelError: a circle leaves the machine's travel; names test, direction, pose and limit.
@@ -41,11 +36,6 @@ def check_plan(plan: Plan, machine: Machine, *, file: str) -> None:
 
 def check_range(plan: Plan, range_mm: tuple[float, float], *, file: str) -> None:
     """Hold the lengths of a plan's circles against what an instrument reads.
-
-    Args:
-        plan: what is to be measured.
-        range_mm: lowest and highest length of the instrument.
-        file: of the plan, for messages.
 
     Raises:
         InputError: a circle or its feed-in lies outside; every such test is named.

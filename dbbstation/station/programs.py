@@ -33,8 +33,6 @@ class RunProgram:
     """A program that commands one run.
 
     Attributes:
-        name: of its file.
-        content: its bytes.
         model_sha256: of the model file that it was compensated with; empty where none.
     """
 

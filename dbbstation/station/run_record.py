@@ -40,7 +40,6 @@ class RunRecall(Protocol):
         """Return the whole run.
 
         Args:
-            run: which run.
             behind: its last samples, which observers have not been told of yet.
 
         Raises:
@@ -52,7 +51,6 @@ def recording_of(run: RunId, samples: Sequence[Sample]) -> Recording:
     """Return samples of a run as a recording.
 
     Args:
-        run: which run.
         samples: in time order, each with a number.
     """
     return Recording(
@@ -68,12 +66,9 @@ class RunRecord:
     """One run while it is recorded.
 
     Attributes:
-        run: which run.
-        circle: as commanded.
         started_s: time of the first sample on the driver's clock [s].
         fed_in_s: of the feed-in edge, since the first sample [s]; None before.
         fed_out_s: of the feed-out edge, likewise.
-        samples: how many it has.
         lost: samples that the line counted as lost, wherever in the run.
         lost_on_turn: those from feed-in to feed-out, and doubtful ones there: both are missing in the circle.
         doubtful: samples that may have been damaged on the line, wherever in the run.

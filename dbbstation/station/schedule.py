@@ -20,7 +20,6 @@ class Task:
     """One run that the plan asks for.
 
     Attributes:
-        test: name of the test.
         direction: sense of travel.
         occurrence: 1, or 2 where the plan repeats the test at its end.
     """
@@ -40,8 +39,6 @@ class NextRun:
     """A task with the numbers that its recording gets.
 
     Attributes:
-        run: the recording.
-        put_up: its ball has to be put up first.
         number: of the task in the sequence, from 1.
     """
 
@@ -54,7 +51,6 @@ class Schedule:
     """Keeps count of runs and mountings.
 
     Args:
-        plan: what is to be measured.
         next_repeat: which repeat of a test and direction is free; the session folder knows.
         recorded: runs of the session so far, in the order they were started, of every state.
     """

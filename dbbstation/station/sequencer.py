@@ -62,7 +62,6 @@ class Waiting:
     """A run that was recorded before and has no verdict.
 
     Attributes:
-        completed: what its recording says.
         samples: of its turn, in time order, thinned; empty where it has none.
     """
 
@@ -84,8 +83,6 @@ class Sequencer:
     Each method returns what happened, in order.
 
     Args:
-        plan: what is measured.
-        schedule: what is left of it.
         recorded: gives back the run that goes on, once it is complete.
         programs: name of the NC program that commands a test and direction; the plan's nominal circle where absent.
         patience: how long is waited for the machine.

@@ -35,7 +35,6 @@ class Storage:
     """Writes a session as it happens; an observer of the station.
 
     Args:
-        writer: of the session folder.
         now: the time of day with its zone.
         programs: NC program, kept in the session already, by test and direction.
         unreadable: what the driver rejected so far, by what was wrong with it.
@@ -96,7 +95,6 @@ class Storage:
         """Return the run that goes on, from its journal; a `Recorded` of the sequencer.
 
         Args:
-            run: which run.
             behind: its last samples, which are not in the journal yet.
 
         Raises:

@@ -28,7 +28,6 @@ def unjudged(
     """Return what waits for a verdict, in the order it was recorded.
 
     Args:
-        session: whose runs.
         judge: finds out what is wrong with a run that holds a circle.
     """
     return [_waiting(session, entry, judge) for entry in session.runs if entry.state is RunState.COMPLETE]

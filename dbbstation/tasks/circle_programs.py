@@ -61,25 +61,19 @@ def write_circle_programs(
     """Write the programs of a plan's circles, all or none; each is checked against the machine's travel first.
 
     Args:
-        plan_file: test plan.
-        machine_file: machine.
-        out: folder to write to.
         dialect: language of the control: a name, or the path of a Python file.
         model: file of the model to compensate with; None: nominal programs.
         tests: names of tests to take; empty for all.
         exclude: names of tests to leave out.
-        step_deg: angle between points [deg].
         clearance_mm: height of rapid moves above the first point [mm]; None: the bar stays on, without rapids and stops.
         chord_um: greatest distance between a straight move and the circle, of compensated programs [µm].
         prefer: what to keep where chord error and feed cannot both be kept.
         accept_chord_um: chord error that is accepted where the one asked for is missed [µm].
         time_s: start of the programs after the session's start [s], for models that depend on time.
         largest_correction_mm: a model that shifts any point by more is refused [mm].
-        force: overwrite programs.
         known: every error source by name, for the file of the model.
         provenance: asked, when all is read, where the programs come from.
         progress: told how many programs are done.
-        stop: asked after each program whether to stop.
         say: told of causes in the model that nobody knows.
 
     Raises:

@@ -100,7 +100,6 @@ def load_circles(
         chosen: filter of G, F and H.
         tests: names of tests to take; empty for all.
         exclude: names of tests to leave out.
-        findings: whether to judge the runs.
         model: where circles are expected; None: by the nominal machine.
         progress: called with how many of how many runs of a session are done.
 

@@ -43,7 +43,6 @@ def compare(
 
     Args:
         a: session folder; its readings are the simulation of B.
-        b: session folder.
         tests: names of tests to take; empty for all.
         exclude: names of tests to leave out.
         hold_out: choose everything anew without each group of tests, which asks whether causes predict others.

@@ -53,8 +53,6 @@ class Diagnosed:
     """Recorded sessions with their diagnosis.
 
     Attributes:
-        recorded: the sessions.
-        diagnosis: what was found in them.
         lacking: why further candidates could not be looked at, by name.
     """
 

@@ -29,11 +29,7 @@ class SchedulerError(StationError):
 
 @dataclass(frozen=True)
 class Ended:
-    """A piece of work whose process ended before it was done, also where it worked alone.
-
-    Attributes:
-        why: in words.
-    """
+    """A piece of work whose process ended before it was done, also where it worked alone."""
 
     why: str
 
@@ -170,10 +166,6 @@ def _check_workers(client: Any, address: str) -> None:  # noqa: ANN401 - distrib
 
 def refuse_other_program(identity: dict[str, str], whose: str) -> None:
     """Refuse a program that differs from this one: its numbers would not be those of this one.
-
-    Args:
-        identity: of the other.
-        whose: in words.
 
     Raises:
         SchedulerError: it differs.

@@ -64,7 +64,6 @@ def export(
         tests: names of tests to take; empty for all.
         exclude: names of tests to leave out.
         states: of runs to take; empty for all.
-        force: overwrite.
         provenance: asked, when all is read, where the table comes from.
         progress: told how many runs are done.
         stop: asked after each run whether to stop.
@@ -123,7 +122,6 @@ class Exporting:
 
     Attributes:
         runs: sessions with their runs, in order.
-        names: of the columns.
     """
 
     runs: tuple[tuple[SessionFolder, RunEntry], ...]
@@ -165,7 +163,6 @@ def angles_deg(recording: Recording, circle: Circle) -> NDArray[np.float64]:
 
     Args:
         recording: of a whole run, or cut to the circle already.
-        circle: as commanded.
 
     Raises:
         TraceError: neither angles nor the edges of a circle.
@@ -183,7 +180,6 @@ def blocks(
     """Yield the columns of one run after the other: numbers with NaN where there are none, texts as lists.
 
     Args:
-        what: is exported.
         progress: told how many of how many runs are done.
         say: told of runs whose angles cannot be computed.
 
@@ -250,8 +246,6 @@ def write_csv(
     Numbers have as many digits as it takes to read back the same bits; a number that is not there is an empty cell.
 
     Args:
-        path: of the table.
-        what: is exported.
         provenance: asked when all is read.
         progress: told how many runs are done.
         say: told of what is missing.
@@ -285,8 +279,6 @@ def write_parquet(
     """Write the table as Parquet, one row group per run, with provenance and meanings in its metadata; return the number of rows.
 
     Args:
-        path: of the table.
-        what: is exported.
         provenance: asked when all is read.
         progress: told how many runs are done.
         say: told of what is missing.

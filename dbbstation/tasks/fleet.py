@@ -53,8 +53,6 @@ class _Named:
     """A session of the fleet.
 
     Attributes:
-        name: its path in the folder that was named.
-        folder: where it is.
         session: what its file says; None where that cannot be read.
         inputs: SHA-256 of the files that decide what comes out of it.
         problem: why it cannot be read; empty where it can.
@@ -112,16 +110,12 @@ def fleet(
     Args:
         folders: that hold session folders, at most four folders deep, or session folders.
         task: `calibrate`, `circles`, `diagnose` or `report`.
-        out: folder of the results.
-        options: of the task.
-        processes: of this computer.
         scheduler: address of a Dask scheduler whose workers do it in place of them; empty for none.
         false_alarms: probability that like machines show any value as unlike.
         apart: each session without a serial number is of a machine of its own; else those of one name are of one machine.
         anew: work everything out again.
         provenance: asked, when all is done, where table and page come from.
         progress: told how many sessions are done.
-        stop: asked after each session whether to stop.
         say: told what is noticed.
 
     Raises:

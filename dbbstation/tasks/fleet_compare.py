@@ -32,9 +32,6 @@ class Sister:
 
     Attributes:
         name: serial number, or the name in its machine file.
-        session: name of the session.
-        machine: nominal machine of the session.
-        found: what the task found.
     """
 
     name: str
@@ -53,7 +50,6 @@ def compared(sisters: Sequence[Sister], false_alarms: float) -> FleetComparison:
     the nominal machine: they are compared between machines of one nominal geometry only.
 
     Args:
-        sisters: each machine once.
         false_alarms: probability that like machines show any value as unlike.
     """
     kinds, notes = _geometries(sisters)

@@ -30,9 +30,6 @@ def write_fleet_table(path: Path, result: FleetResult, provenance: Provenance, *
 
     Args:
         path: of the table, .csv or .parquet.
-        result: of the fleet.
-        provenance: where it comes from.
-        force: overwrite.
 
     Raises:
         OutputError: the ending is another; the file exists and `force` is not given; pyarrow is not installed.

@@ -44,11 +44,9 @@ class FleetOptions:
     Attributes:
         sources: names of error sources, as `calibrate` and `diagnose` take them; None: as these choose.
         method: how ball positions are known, as `calibrate` takes it.
-        law_over_time: as `calibrate` takes it.
         findings: judge every run, as `circles` does.
         tests: names of tests to take; empty for all.
         exclude: names of tests to leave out.
-        source_files: Python files with error sources of one's own.
         settings: of the shop, for a report.
     """
 
@@ -78,9 +76,6 @@ class FleetPiece:
     """One session that is to be worked on.
 
     Attributes:
-        task: what is done.
-        folder: of the session.
-        options: that are asked for.
         inputs: SHA-256 of the files that decide what comes out, by path.
         program: identity of the program that asks.
     """

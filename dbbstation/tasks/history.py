@@ -55,8 +55,6 @@ def history(
 
     Args:
         folder: that holds session folders, and models of `calibrate` or `diagnose`.
-        asked: how trends are worked out.
-        source_files: with error sources of models.
         rebuild: read everything anew.
         now: the time; None: the clock's.
         progress: told how many of how many files are done.
@@ -141,13 +139,7 @@ class _Unreadable:
 
 
 class _Reading:
-    """Reads sessions and models, from the index where it knows them.
-
-    Attributes:
-        of: files in all.
-        left_out: name and reason of those that cannot be read.
-        worked_out: how many were read.
-    """
+    """Reads sessions and models, from the index where it knows them."""
 
     def __init__(self, kept: Kept, progress: Callable[[int, int], None], of: int) -> None:
         self.of = of
@@ -168,8 +160,6 @@ class _Reading:
         """Return the figures of all files that can be read by their names, in their order; the name in them may be another.
 
         Args:
-            files: by name.
-            kind: class of the figures.
             work: works them out, or says why it cannot.
             others: further files that decide what comes out.
             processes: how many to work such files out with.

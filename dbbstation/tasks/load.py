@@ -83,7 +83,6 @@ def loaded(sessions: Sessions | Recorded, tests: Sequence[str], exclude: Sequenc
     """Return sessions, read where they are not yet; of those that are, the tests that were chosen.
 
     Args:
-        sessions: paths, or what `load` returned.
         tests: names of tests to take; empty for all.
         exclude: names of tests to leave out.
         telling: told how far it is and what was noticed.
@@ -218,9 +217,8 @@ def _with_thermometers(
     """Tell every run what the thermometers of its session showed in all runs: those that all runs in use have.
 
     Args:
-        observations: runs in use.
-        logs: of each session, when runs with thermometers began [s] and what they hold, those that were left out too: leaving
-            one out must not change where growth is counted from.
+        logs: of each session, when runs with thermometers began [s] and what they hold, those that were left out too: leaving one
+            out must not change where growth is counted from.
     """
     of = {}
     for session, runs in logs.items():

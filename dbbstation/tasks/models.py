@@ -34,7 +34,6 @@ def model_of(model: Model, known: Mapping[str, ErrorSource] | None = None) -> Id
     """Return a model, read where it is a file.
 
     Args:
-        model: a file, a model, or a result that has one.
         known: every error source by name; None: the package's and those of installed packages.
 
     Raises:

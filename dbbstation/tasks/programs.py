@@ -34,9 +34,6 @@ def inverse_of(
     """Return the model to compensate with; the header of programs will name its file and its sessions by hash.
 
     Args:
-        model: a model, a file of one, or a result that has one.
-        known: every error source by name, for a file.
-        time_s: start of a program after the session's start [s].
         largest_mm: greatest correction that is applied [mm].
         prefer: what to keep where chord error and feed cannot both be kept.
         accept_chord_um: chord error that is accepted where the one asked for is missed [µm].
@@ -58,9 +55,7 @@ def origin_of(named: Mapping[str, Path], inverse: Inverse | None, provenance: Pr
     """Return what the header of a program says of its origin: files by their part in it, program, command, other inputs.
 
     Args:
-        named: the files that were given, by what they are.
         inverse: the model to compensate with, which says in the header where it comes from by itself.
-        provenance: of the command or script.
 
     Raises:
         InputError: a file cannot be read.

@@ -75,19 +75,14 @@ def report(
     """Write a report of measured circles: one HTML file that opens anywhere, without network, and prints to A4.
 
     Args:
-        sessions: session folders or session files.
-        out: HTML file to write.
         settings: of the shop, with its tolerances.
         before: session that was measured before, to put beside.
         model: a model, a file of one, or the result of `calibrate` or `diagnose`, to put beside.
         job: what was measured for, where the session does not say it or says something else.
-        place: where it was measured.
         certificate: refuse a report that lacks what a certificate needs.
         pdf: file to print to, by an installed Chromium; None: none.
-        coverage_factor: k of U = k u.
         tests: names of tests to take; empty for all.
         exclude: names of tests to leave out.
-        force: overwrite.
         known: every error source by name, for a file of a model.
         provenance: asked, when all is read, where the report comes from.
         progress: told each stage.
@@ -154,9 +149,7 @@ def _read(
     """Return the runs of sessions, read once for all parts of a report, or why they cannot be read.
 
     Args:
-        paths: of the sessions.
         chosen: tests to take, and to leave out.
-        telling: told how far it is.
     """
     try:
         return loaded(paths, *chosen, telling)
@@ -186,9 +179,6 @@ def _ranked(
 
     Args:
         recorded: runs: those before, where there are some; or why they cannot be read.
-        names: of their sessions.
-        identified: the model.
-        telling: told each stage.
     """
     telling.stage("effects of causes")
     try:

@@ -38,9 +38,6 @@ if TYPE_CHECKING:
 def session_figures(folder: Path) -> SessionFigures:
     """Read a session and work out the figures of its accepted runs.
 
-    Args:
-        folder: of the session.
-
     Raises:
         InputError: every fault of its files; no accepted run.
     """
@@ -147,10 +144,6 @@ def _lacks(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[st
 
 def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures:
     """Read the machine's parameters of a model.
-
-    Args:
-        path: of its file.
-        source_files: with error sources that it may name.
 
     Raises:
         InputError: every fault of the file.

@@ -54,11 +54,9 @@ def simulate(
 
     Args:
         model: a model, a file of one, or the result of `calibrate` or `diagnose`.
-        plan: test plan.
         out: session folder to make.
         tests: names of tests to take; empty for all.
         exclude: names of tests to leave out.
-        samples: per turn.
         interval_s: time from the start of one run to the next [s].
         known: every error source by name, for a file of a model.
         progress: told each run.

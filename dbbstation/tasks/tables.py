@@ -73,8 +73,6 @@ class Tabulated:
     """Files read.
 
     Attributes:
-        table: as it is compared.
-        names: of the columns that all files have.
         columns: texts by name, rows as they are in `table`.
         notes: what was left out, and why.
     """

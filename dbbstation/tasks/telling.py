@@ -35,11 +35,6 @@ class Telling:
 
     Args:
         progress: told each stage as it begins.
-        stop: asked at each stage whether to stop.
-        say: told each note.
-
-    Attributes:
-        notes: so far.
     """
 
     def __init__(

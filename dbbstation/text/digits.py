@@ -12,12 +12,7 @@ SIGNIFICANT = 2
 
 
 def expanded_uncertainty(u: float | None, coverage_factor: float) -> float | None:
-    """Return U = k u; None where u is not known.
-
-    Args:
-        u: standard uncertainty.
-        coverage_factor: k.
-    """
+    """Return U = k u; None where u is not known."""
     return None if u is None else coverage_factor * u
 
 
@@ -30,13 +25,7 @@ def decimals_of(expanded: float) -> int:
 
 
 def with_uncertainty(value: float, expanded: float | None, plain: int = 1) -> tuple[str, str]:
-    """Return a value and its expanded uncertainty as they are printed: to the same decimals.
-
-    Args:
-        value: any unit.
-        expanded: in the same unit; None where it has none.
-        plain: decimals of a value that has no uncertainty.
-    """
+    """Return a value and its expanded uncertainty as they are printed: to the same decimals."""
     if expanded is None:
         return f"{value:z.{plain}f}", "-"
     decimals = decimals_of(expanded)

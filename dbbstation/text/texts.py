@@ -10,10 +10,8 @@ class Texts:
     """What a cause says of itself.
 
     Attributes:
-        what: what it is.
         shows: how it shows in the recordings that it is looked for in.
         confirm: how to confirm it on the machine or the drive.
-        cure: how to cure it.
         equation: the equation, in words or symbols.
         origin: where the equation comes from.
     """

@@ -108,7 +108,6 @@ class BallPath:
     Attributes:
         theta_deg: angles about the ball, from +X towards +Y, within 0 to 360, shape (n,) [deg].
         centre_mm: of the circle, from the ball, shape (2,) [mm].
-        radius_mm: of the circle [mm].
         deviation_mm: radial deviations of the points from the circle, shape (n,) [mm].
     """
 

@@ -54,9 +54,7 @@ def by_angle(
     """Means over sectors of the turn, by rising angle: for drawing.
 
     Args:
-        raw: the circle.
         curves: at its samples, shape (n,) each.
-        sectors: of the turn.
 
     Returns:
         Angle from +X towards +Y, shape (s,) [deg], and each curve, shape (s,).

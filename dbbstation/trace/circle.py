@@ -22,13 +22,11 @@ class RawCircle(WithLogged):
 
     Attributes:
         name: what to call the run in messages.
-        circle: the circle as commanded.
         t_s: time since the recording's first sample [s].
         phi_deg: progress along the turn, 0 up to 360 [deg].
-        length_mm: distance between the ball centres [mm].
         logged: what was logged beside the bar, by the name of its column.
-        start_uncertainty_deg: how well the beginning of the turn is known, one standard deviation; zero where angles
-            were recorded [deg].
+        start_uncertainty_deg: how well the beginning of the turn is known, one standard deviation; zero where angles were
+            recorded [deg].
     """
 
     name: str
@@ -53,11 +51,8 @@ class CentredCircle:
     """A circle after centre compensation [CAL eq 6]: its position on the machine is gone and cannot come back.
 
     Attributes:
-        name: of the raw circle.
-        circle: as commanded.
         theta_deg: angle from +X towards +Y, shape (n,) [deg].
         deviation_mm: radial deviation from the best-fit circle, shape (n,) [mm].
-        radius_mm: radius of the best-fit circle [mm].
     """
 
     name: str

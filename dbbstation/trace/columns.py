@@ -42,9 +42,6 @@ class Column:
     """One numeric column.
 
     Attributes:
-        name: as the file has it.
-        kind: what it is, and who reads it.
-        unit: as printed.
         meaning: one line with the sign.
         decimals: as written by the station.
         size: greatest plausible absolute value, in that unit.

@@ -82,13 +82,10 @@ def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircl
 
     Args:
         recording: of a whole run.
-        circle: as commanded.
-        counted_lost: samples that the line counted as lost in it.
 
     Raises:
-        TraceError: no feed-in or feed-out, a gap, a bar that left the circle, or a feed that is not the
-            programmed one; with the lost samples first where the line counted some or the times show some, since these
-            may be the cause.
+        TraceError: no feed-in or feed-out, a gap, a bar that left the circle, or a feed that is not the programmed one; with the
+            lost samples first where the line counted some or the times show some, since these may be the cause.
     """
     try:
         return _cut(recording, circle)
@@ -157,8 +154,6 @@ def progress_deg(recording: Recording, circle: Circle, edges: tuple[float, float
     """Progress of every sample along the turn by the programmed feed, 0 at its start, shape (n,) [deg].
 
     Args:
-        recording: as recorded.
-        circle: as commanded.
         edges: times of feed-in and feed-out [s].
     """
     return FULL_TURN_DEG / 2.0 + (recording.t_s - (edges[0] + edges[1]) / 2.0) * circle.turning_deg_s
@@ -247,7 +242,6 @@ def _edge(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle, f
     Args:
         t: times, rising or falling, shape (n,) [s].
         length: lengths, shape (n,) [mm].
-        circle: as commanded.
         first: index of the first sample below half the feed-in.
     """
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
@@ -306,9 +300,6 @@ def overlap_feed_under(
     believed. Noise that was read off the whole turn counts where it makes more.
 
     Args:
-        recording: with its overlap.
-        circle: as commanded.
-        edges: of the arc, as of `edges_of`.
         noise_mm: standard deviation of white noise, per sample, that would give slow figures the same uncertainty [mm].
 
     Returns:
@@ -420,7 +411,6 @@ def one_turn_deg(theta_deg: NDArray[np.float64], circle: Circle) -> NDArray[np.f
 
     Args:
         theta_deg: from +X towards +Y, in order of time, with or without steps of a turn, shape (n,) [deg].
-        circle: as commanded.
     """
     travelled = circle.direction.sign * (np.unwrap(theta_deg, period=FULL_TURN_DEG) - circle.start_deg)
     first, last = float(travelled.min()), float(travelled.max())

@@ -15,7 +15,6 @@ class DriveRecording:
     """Samples of one drive, in time order.
 
     Attributes:
-        name: of the recording, for messages.
         t_s: time, rising, shape (n,) [s].
         position_mm: along the drive's axis, shape (n,) [mm].
         force_n: that drives it, positive towards greater positions, shape (n,) [N].

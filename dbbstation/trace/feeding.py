@@ -40,7 +40,6 @@ class FeedingWay:
     Attributes:
         phi_deg: progress along the turn at its corner with the circle [deg].
         way_um: length outside less length at the corner [µm].
-        u_um: its standard uncertainty by noise [µm].
     """
 
     phi_deg: float
@@ -55,7 +54,6 @@ def feeding_ways(
 
     Args:
         recording: of a whole run, without angles.
-        circle: as commanded.
         edges: times of feed-in and feed-out, of `trace.cut.edges_of` [s].
     """
     good = recording.good
@@ -73,8 +71,6 @@ def _way(
     """Way and its standard uncertainty at one corner [µm].
 
     Args:
-        recording: its samples that can be used.
-        circle: as commanded.
         behind_s: how long each was taken on the circle's side of the edge, shape (n,) [s].
         along_deg: arc from the corner to where each was taken, shape (n,) [deg].
     """

@@ -24,7 +24,6 @@ def transmission(undulations: NDArray[np.float64], cut_off_upr: float) -> NDArra
 
     Args:
         undulations: per revolution, shape (k,).
-        cut_off_upr: cut-off k_c in undulations per revolution.
     """
     return np.asarray(np.exp2(-((undulations / cut_off_upr) ** 2)), dtype=np.float64)
 

@@ -42,8 +42,6 @@ def share_lost(lost: int, kept: int, unusable: int = 0) -> str:
     """Return how many samples were lost, in words with the share of all.
 
     Args:
-        lost: number of samples that are missing.
-        kept: number of samples that are there.
         unusable: of the missing ones, how many are recorded but cannot be used.
     """
     how = "were lost or cannot be used" if unusable else "were lost"
@@ -54,9 +52,6 @@ def too_many_lost(lost: int, kept: int, largest_percent: float, unusable: int = 
     """Return what is wrong with a run that lost so many samples; empty where that is within the limit.
 
     Args:
-        lost: number of samples that were lost.
-        kept: number of samples that were recorded.
-        largest_percent: share of all that may be lost [%].
         unusable: of the lost ones, how many are recorded but cannot be used.
     """
     if 100.0 * lost <= largest_percent * (lost + kept):

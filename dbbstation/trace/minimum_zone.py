@@ -35,8 +35,6 @@ class MinimumZone:
 
     Attributes:
         centre_mm: their centre (x, y) [mm].
-        inner_mm: radius of the inner one [mm].
-        outer_mm: radius of the outer one [mm].
     """
 
     centre_mm: tuple[float, float]

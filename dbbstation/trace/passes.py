@@ -31,7 +31,6 @@ class Passes:
     Attributes:
         phi_deg: progress of the first pass, counted from the start of the turn, shape (n,) [deg].
         apart_um: second pass less first, shape (n,) [µm].
-        turn_s: time between them [s].
     """
 
     phi_deg: NDArray[np.float64]

@@ -69,13 +69,7 @@ class Reachable:
         self._on_turn_mm_s = min(across_mm_s, feed_mm_s)
 
     def note(self, t_s: float, length_mm: float, t_uncertainty_s: float = 0.0) -> None:
-        """Take a reading that is held against nothing, while nobody knows how fast the bar is moved.
-
-        Args:
-            t_s: its time [s].
-            length_mm: it [mm].
-            t_uncertainty_s: standard uncertainty of its time, of a rectangle [s].
-        """
+        """Take a reading that is held against nothing, while nobody knows how fast the bar is moved."""
         self._believe(_Seen(t_s, length_mm, t_uncertainty_s))
 
     @classmethod
@@ -93,9 +87,6 @@ class Reachable:
         """Return why a reading cannot be the bar's length; empty where it can.
 
         Args:
-            t_s: its time [s].
-            length_mm: it [mm].
-            t_uncertainty_s: standard uncertainty of its time, of a rectangle [s].
             on_turn: the machine is on the full turn, not on its way to the circle or from it.
         """
         one, last = _Seen(t_s, length_mm, t_uncertainty_s), self._good

@@ -19,12 +19,7 @@ class Steady:
     """Mean of readings of one length.
 
     Attributes:
-        mean_mm: mean [mm].
-        uncertainty_mm: its standard uncertainty, resolution included [mm].
-        scatter_mm: standard deviation of single readings [mm].
         drift_mm: mean of the last batch minus that of the first [mm].
-        resolution_mm: step of the readings [mm].
-        count: readings.
     """
 
     mean_mm: float

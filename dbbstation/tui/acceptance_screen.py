@@ -35,7 +35,6 @@ class AcceptanceScreen(RowScreen):
     """Pushed over the results.
 
     Args:
-        after: does the work.
         search: looks for sessions that this one can be held against.
     """
 

@@ -21,13 +21,7 @@ if TYPE_CHECKING:
 
 
 class ChooseQuestion(ModalScreen[int | None]):
-    """Returns the place of what was chosen; None where nothing was.
-
-    Args:
-        title: what is asked for.
-        labels: what can be chosen.
-        at: place that is offered first.
-    """
+    """Returns the place of what was chosen; None where nothing was."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,q,ctrl+c", "dismiss(None)", "Back")]
 
@@ -58,12 +52,7 @@ class ChooseQuestion(ModalScreen[int | None]):
 
 
 class TypeQuestion(ModalScreen[str | None]):
-    """Returns what was typed, without blanks about it; None where nothing was asked of it.
-
-    Args:
-        title: what is asked for.
-        text: what stands there first.
-    """
+    """Returns what was typed, without blanks about it; None where nothing was asked of it."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,ctrl+c", "dismiss(None)", "Back")]
 

@@ -32,8 +32,6 @@ class BarScreen(RowScreen):
     """Owns the instrument until it is left.
 
     Args:
-        front: opens the instrument.
-        line: which, and where.
         then: told the file of the calibration when it is left with one.
     """
 

@@ -63,8 +63,6 @@ def largest(texts: Sequence[str], width: int, height: int) -> tuple[int, int]:
 
     Args:
         texts: each in one line of its own, all of one size.
-        width: columns there are.
-        height: rows there are for one text.
     """
     points = max(len(_points(text)[0]) for text in texts)
     wide, high = max(width // points, 1), max(height // HIGH, 1)

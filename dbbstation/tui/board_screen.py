@@ -147,7 +147,6 @@ def ask_to_give_up(screen: BoardScreen, act: str, then: Callable[[bool | None], 
     """Ask whether to give up the circle that is being recorded; one question at a time.
 
     Args:
-        screen: knows the circle.
         act: what was asked for, as a verb with a capital letter.
         then: called with the answer.
     """

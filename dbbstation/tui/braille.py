@@ -36,7 +36,6 @@ def light(plane: Plane, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
     """Raise the dots at points; those outside the plane are left out.
 
     Args:
-        plane: changes.
         x: dots to the right of the plane's left edge, shape (n,).
         y: dots below its upper edge, shape (n,).
     """

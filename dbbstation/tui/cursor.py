@@ -19,7 +19,6 @@ def mark_chosen(options: OptionList, rows: Sequence[Content]) -> None:
     """Show rows with the mark before the chosen one.
 
     Args:
-        options: the list.
         rows: as they are without a mark; as many as the list has, or more.
     """
     for place, row in enumerate(rows[: options.option_count]):

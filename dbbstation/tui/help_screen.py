@@ -25,7 +25,6 @@ class HelpScreen(ModalScreen[None]):
     """Stands before the screen that it explains.
 
     Args:
-        name: under which the texts have that screen.
         without: keys of every screen that cannot be pressed here.
     """
 

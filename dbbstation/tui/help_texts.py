@@ -14,7 +14,6 @@ class Help:
     """Help on one screen.
 
     Attributes:
-        title: name of the screen.
         shows: what stands on it, a paragraph each.
         keys: a sentence for each key, by Textual's name of the key.
     """

@@ -23,11 +23,7 @@ if TYPE_CHECKING:
 
 
 class MessagesScreen(ModalScreen[None]):
-    """Stands before the screen whose messages it has.
-
-    Args:
-        messages: oldest first.
-    """
+    """Stands before the screen whose messages it has."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,j,q", "dismiss", "Close")]
 

@@ -41,7 +41,6 @@ class NewScreen(RowScreen):
     Args:
         reception: does work in the background, opens jobs.
         front: knows what can be chosen.
-        choice: what stands there first.
     """
 
     help_name = "new"

@@ -47,9 +47,7 @@ class JobScreen(RowScreen):
     """At the bottom of the stack: what is measured, and the few things that may be changed.
 
     Args:
-        reception: opens the job.
         front: reads and checks.
-        operated: the job.
     """
 
     help_name = "job"
@@ -200,9 +198,7 @@ class AnswerScreen(ExplainedScreen):
     """The one answer, in large letters, with its reasons and what to do.
 
     Args:
-        answer: works it out.
         back: called when it is left.
-        virtual: whether the machine is.
     """
 
     help_name = "answer"

@@ -48,7 +48,6 @@ class ChosenTest:
 
     Attributes:
         tests: names in the plan's order.
-        at: place of the chosen one.
         way: 0 for its first direction, 1 for its second.
         back: 0 for its last run, 1 for the one before, and so on.
     """

@@ -33,13 +33,7 @@ _MARGIN_DOTS = 4.0
 
 @dataclass(frozen=True)
 class Dial:
-    """Where things lie in a field of cells.
-
-    Attributes:
-        columns: of the field.
-        rows: of the field.
-        cell_aspect: height of a cell over its width.
-    """
+    """Where things lie in a field of cells."""
 
     columns: int
     rows: int
@@ -105,11 +99,8 @@ def draw_trace(
     """Add a trace to a plane: every sample's dot, and the line from each to the next.
 
     Args:
-        plane: changes.
-        dial: of the plane's size.
         theta_deg: angles, shape (n,) [deg].
         deviation_um: bar length minus nominal; not a number where the line breaks, shape (n,) [µm].
-        scale_um: deviation at the outer ring [µm].
         thick: draw it two dots wide, the second outside the first.
     """
     share = share_of(deviation_um, scale_um)

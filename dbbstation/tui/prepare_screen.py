@@ -41,9 +41,7 @@ class PrepareScreen(RowScreen):
     Args:
         reception: opens the job.
         front: writes programs.
-        choice: what was chosen.
         prepared: what became of it; it was checked.
-        changed: told of a choice that was changed here.
     """
 
     help_name = "prepare"

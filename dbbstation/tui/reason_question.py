@@ -27,7 +27,6 @@ class ReasonQuestion(ModalScreen[str | None]):
     """Returns the reason; None where all stays as it is.
 
     Args:
-        run: name of the run.
         counts: ask why it counts, and not why it does not.
     """
 

@@ -32,11 +32,7 @@ _STYLES = {
 
 
 class ResultsScreen(RowScreen):
-    """Pushed over the sessions or the screen beside the machine.
-
-    Args:
-        after: does the work.
-    """
+    """Pushed over the sessions or the screen beside the machine."""
 
     help_name = "results"
 

@@ -16,10 +16,8 @@ class Shown:
     """Plan and plate.
 
     Attributes:
-        plan: its name.
         bores: number of each bore of the jig plate with its x, y on the plate [mm].
         cell_aspect: height of a terminal's cell over its width.
-        tests: of the plan, by name.
     """
 
     plan: str

@@ -28,7 +28,6 @@ class StartScreen(RowScreen):
     """At the bottom of the stack where no job was given.
 
     Args:
-        reception: opens jobs.
         front: knows sessions.
     """
 

@@ -24,10 +24,6 @@ class Happened:
 
     Args:
         events: all of them, in order.
-
-    Attributes:
-        crash: none.
-        sent: commands that nobody took.
     """
 
     alive = False
@@ -69,7 +65,6 @@ async def still_svg(
 
     Args:
         shown: plan and plate.
-        events: what happened.
         size: columns and rows.
         theme: dark or light.
         press: keys pressed after that.

@@ -19,11 +19,7 @@ def banner(*, virtual: bool) -> Content:
 
 
 class TitleLine(Panel):
-    """One line over the whole width.
-
-    Args:
-        plan: name of the plan.
-    """
+    """One line over the whole width."""
 
     def __init__(self, plan: str, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)

@@ -97,7 +97,6 @@ class TraceView(Widget):
 
         Args:
             circle: what the dial is labelled for; None before the first run.
-            traces: those of one test, by direction.
             head: the direction that runs now; a mark shows where it is.
             beneath: circles of the session before, drawn dim.
         """

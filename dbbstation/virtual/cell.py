@@ -29,7 +29,6 @@ class VirtualCell:
     Before a run and while a ball is put up the bar lies aside. After a run it stands where the run ended.
 
     Args:
-        machine: the machine.
         clock: virtual time [s].
     """
 

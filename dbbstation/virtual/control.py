@@ -44,7 +44,6 @@ class CellCommands:
     """Obeys the commands of the protocol.
 
     Args:
-        cell: what they act on.
         programs: turns the name of a program into what it commands; None: there are none.
     """
 
@@ -93,9 +92,6 @@ class ControlServer:
 
     Args:
         obey: turns a line into an answer.
-
-    Attributes:
-        url: where it listens.
     """
 
     def __init__(self, obey: Callable[[str], dict[str, object]]) -> None:

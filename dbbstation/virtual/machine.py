@@ -31,8 +31,6 @@ class Sizes:
     """How well the virtual measurement goes, one standard deviation each.
 
     Attributes:
-        noise_mm: of one reading [mm].
-        bar_uncertainty_mm: of the bar's length [mm].
         set_up_mm: of balls that are put up under the spindle, fixed and moving, per axis [mm].
     """
 
@@ -46,10 +44,7 @@ class VirtualRun:
     """A run computed before it starts.
 
     Attributes:
-        test: name of the test.
         direction: sense of travel.
-        mounting: number of the mounting it was made on.
-        path: as commanded.
         length_mm: true distance plus the bar's own error at the times of the path, shape (n,) [mm].
     """
 
@@ -69,7 +64,6 @@ class VirtualMachine:
 
     Args:
         truth: nominal machine with what is wrong with the actual one.
-        plan: balls and circles.
         seed: of mountings, ball coordinates, bar and noise.
         sizes: how well the measurement goes.
     """
@@ -118,7 +112,6 @@ class VirtualMachine:
         A ball that is put up under the spindle stands where the tool tip is when its mounting's first run begins.
 
         Args:
-            test: name of the test.
             direction: sense of travel.
             path: what a program commands; the plan's circle by default.
             begin_s: session time at which it will start, for errors that grow with time [s].

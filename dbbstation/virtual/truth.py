@@ -36,7 +36,6 @@ class MeasurementErrors:
 
     Args:
         seed: makes the same errors again; those of a ball do not depend on what else was mounted.
-        bar_uncertainty_mm: standard deviation of the bar's length error [mm].
         set_up_mm: of balls that are put up under the spindle by hand, standard deviation per axis [mm].
     """
 

@@ -66,11 +66,8 @@ def put_up(truth: MachineModel, circle: Circle, setup: Setup, balls: SetUp, at_s
     """Return what a set-up does to the bar: where the fixed ball came to stand, how the moving ball sits.
 
     Args:
-        truth: the machine as it is.
         circle: tells where and at which tilt the machine was told to stand.
-        setup: of the runs about the ball.
         balls: how they stand at the tool tip.
-        at_s: when, after the start of the session [s].
 
     Raises:
         KinematicsError: the machine cannot take the pose.

@@ -54,13 +54,12 @@ class VirtualInstrument:
     """A length instrument that is not there; use it in a `with` block, which switches it on and off.
 
     Args:
-        protocol: its wire.
-        length_mm_at: length in mm at a virtual time in s; None: the bar is not between the balls, which the instrument
-            tells in its own way as a fault. Called from the instrument's thread.
+        length_mm_at: length in mm at a virtual time in s; None: the bar is not between the balls, which the instrument tells in
+            its own way as a fault. Called from the instrument's thread.
         clock: virtual time; real time by default.
         rate_hz: samples per second of a stream, instead of the protocol's.
-        baud: rate that the device is set to. On a pseudo-terminal the rate of the program at the other end is known,
-            and where the two differ, both hear what a wrong baud rate makes of the bytes.
+        baud: rate that the device is set to. On a pseudo-terminal the rate of the program at the other end is known, and where
+            the two differ, both hear what a wrong baud rate makes of the bytes.
         pty: use a pseudo-terminal; otherwise a loopback socket.
         seed: of the moments, within its bounds, at which a device that is asked takes its length.
 

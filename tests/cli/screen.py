@@ -35,9 +35,7 @@ class Seen:
     """What a screen showed.
 
     Attributes:
-        raw: all that was sent to it.
         screens: its lines whenever they changed, without blanks at their ends and empty lines below.
-        coloured: some character had a colour.
     """
 
     raw: bytes = b""

@@ -20,7 +20,6 @@ class Seed:
     """Files of one kind with commands that read them.
 
     Attributes:
-        kind: what is spoilt.
         files: contents by path in the folder of the case.
         commands: lines, each with its share; they run in the folder of the case and write into `out/`.
         share: how often this seed is taken, against the others.

@@ -127,8 +127,6 @@ class Passage:
     """One place on the circle: the frames there, and what a program makes of them when the middle one is damaged.
 
     Args:
-        protocol: of the instrument.
-        place_deg: of the damaged frame.
         guarded: with parity, doubts and feed; without, a port as pyserial opens it and the decoder alone.
     """
 
@@ -203,9 +201,7 @@ class Unnoticed:
     """Damaged frames of one instrument.
 
     Attributes:
-        cases: how many, by what happened to them.
         wrong: those of which a wrong length came out as good, likewise.
-        worst_um: by how much at the most, with one damaged character [µm].
     """
 
     cases: Counter[str] = field(default_factory=Counter)
@@ -227,16 +223,7 @@ def unnoticed(
     pairs: int = PAIRS,
     seed: int = SEED,
 ) -> Unnoticed:
-    """Damage frames of an instrument and count what no one notices.
-
-    Args:
-        protocol: of the instrument.
-        guarded: see `Passage`.
-        places_deg: on the circle.
-        kinds: of errors of one character.
-        pairs: of errors, at each place.
-        seed: of these.
-    """
+    """Damage frames of an instrument and count what no one notices."""
     found, dice, wanted = Unnoticed(), random.Random(seed), set(kinds)  # noqa: S311 (no secret hangs on it)
     for place_deg in places_deg:
         passage = Passage(protocol, place_deg, guarded=guarded)

@@ -46,9 +46,7 @@ class Event:
         kind: RAPID, FEED, ARC, DWELL, PAUSE, OPTIONAL_STOP; SAID for messages, spindle, coolant, work systems, the end.
         pose: after it, in the coordinates of the program, shape (6,) [mm, deg].
         feed: of the tip [mm/min] and of moves that only turn [deg/min].
-        centre_mm: of an arc, X and Y [mm].
         turns: of an arc, positive counter-clockwise; 1 for less than a full turn or one.
-        dwell_s: of a dwell [s].
         unit_mm: length unit of the program at this place; printed numbers have four decimals of it [mm].
         corner: path control in force, as printed, lengths in millimetres.
         offset: of the work system in force, shape (6,) [mm, deg].
@@ -73,8 +71,6 @@ def printed(
     """Every call with its arguments as printed, and what PRINT writes; None where the program is refused.
 
     Args:
-        text: the program.
-        folder: for its files.
         parameters: numbered parameters that the control has at the start, lengths in inches.
     """
     assert RS274 is not None, "LinuxCNC's interpreter rs274 is not installed: package linuxcnc-uspace"

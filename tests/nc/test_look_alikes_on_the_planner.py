@@ -64,10 +64,6 @@ def beyond_bound(turned_rad: float, more: float) -> float:
     The first one has the deceleration a, and the second one begins where the first one is 2·P / sin(φ/2) from the corner, which is
     right where both have the same acceleration. With an acceleration r·a of the second one they are as far from the corner at
     the same time where the path is left by 4·r·cos(φ/2) / (1 + √r)² of P.
-
-    Args:
-        turned_rad: φ, the angle of the corner.
-        more: r.
     """
     return 4.0 * more * math.cos(turned_rad / 2.0) / (1.0 + math.sqrt(more)) ** 2
 

@@ -73,7 +73,6 @@ def off_the_path_mm(ran: Ran, path: Toolpath) -> float:
     """Greatest distance of a servo cycle from the straight moves of a program, in position [mm].
 
     Args:
-        ran: what the planner made of it.
         path: the program as it is read, without arcs, so that each move has a line of its own.
     """
     corners, lines = path.poses[path.is_move, :3], path.line[path.is_move]

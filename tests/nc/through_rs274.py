@@ -65,11 +65,6 @@ def compare(wanted: list[Event], done: list[Event], model: MachineModel) -> list
 def compare_elsewhere(groups: list[Group], wanted: list[Event], done: list[Event]) -> None:
     """With offsets in force, every move must end where the nominal one ends, but for its correction.
 
-    Args:
-        groups: as `compare` found them without offsets.
-        wanted: events of the nominal program with offsets.
-        done: events of the compensated one.
-
     Raises:
         DiffersError: a move ends elsewhere.
     """

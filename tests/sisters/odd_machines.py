@@ -29,11 +29,7 @@ class Counted:
     """What came of some draws.
 
     Attributes:
-        draws: how many.
         found: odd machines that were marked, of all.
-        odd: of all draws.
-        false_machines: machines that were marked and are not odd.
-        alarmed: draws with any of those.
     """
 
     draws: int

@@ -145,8 +145,6 @@ def concealed(machine: Machine, runs: list[Motion], derivative) -> tuple[NDArray
     """What the 24 kinematic parameters take of bar readings, by least squares at the nominal machine.
 
     Args:
-        machine: nominal.
-        runs: motions with a set-up.
         derivative: effect of each of p signatures on a motion.
 
     Returns:

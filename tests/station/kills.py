@@ -67,9 +67,7 @@ def record(folder: Path, told: int, pace_s: float = 0.0) -> None:
     event log and session file say so.
 
     Args:
-        folder: of the session; gone on with where it is there.
         told: file descriptor that takes the lines.
-        pace_s: pause behind each sample [s].
     """
 
     def tell(line: str) -> None:

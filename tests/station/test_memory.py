@@ -35,11 +35,7 @@ BOUND_BYTES = 2_000_000
 
 
 class LongRun:
-    """A bar that feeds in and then turns for as long as is asked; it quits in the middle of the turn.
-
-    Args:
-        count: samples behind the feed-in.
-    """
+    """A bar that feeds in and then turns for as long as is asked; it quits in the middle of the turn."""
 
     def __init__(self, count: int) -> None:
         self.count, self.sent, self.armed = count, 0, False

@@ -101,11 +101,9 @@ class Captured:
 
     Attributes:
         sent: what the sender says of the line.
-        tally: what the driver says of it.
         behind_s: longest time from a reading to the disk [s].
         lost: samples lost, as the sequence was told.
         memory: bytes in use, every half second.
-        cpu: share of one core.
     """
 
     sent: dict[str, float]

@@ -30,7 +30,6 @@ def misfit_of(calibration: Calibration, noise: Spectrum | None = None) -> Misfit
     """Misfit of what a fit leaves, by an F test of the low harmonics; where the balls stand in each mounting does not count.
 
     Args:
-        calibration: the fit.
         noise: measured elsewhere; read from the high harmonics of what the fit leaves if None.
     """
     fitted = int(np.count_nonzero(~calibration.layout.known.random)) - len(calibration.solution.held)
@@ -67,7 +66,6 @@ class LeftByFit:
 
     Attributes:
         probability: of that much by chance.
-        missing_physics: whether chance does not explain it.
     """
 
     probability: float

@@ -26,7 +26,6 @@ class PlanCheck:
     uses up, are the degrees of freedom that can contradict the plan.
 
     Attributes:
-        tests: number of tests.
         determined: directions that single tests determine, summed over the tests.
         identified: directions that all tests together determine.
         of_one_test: directions that the test that shows most determines.

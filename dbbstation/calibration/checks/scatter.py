@@ -36,8 +36,6 @@ class MountingOffset:
     """Where a ball came to stand in one putting-up, mounting and CMM error together.
 
     Attributes:
-        mounting: name of the putting-up.
-        ball: name of the ball.
         stated_mm: standard deviation of each coordinate as plan states it, shape (3,) [mm].
         shift_mm: best prediction, machine axes, shape (3,) [mm].
         spread_mm2: its covariance, shape (3, 3) [mm²].
@@ -71,7 +69,6 @@ class ScatterCheck:
         stated_um: standard deviation per axis, mounting and CMM together [µm].
         found_um: what they scatter by; None where the runs cannot tell [µm].
         interval_um: 95 % interval of that; None likewise [µm].
-        mountings: puttings-up of that size.
         fits: whether balls stand as well as stated, or better; None where the runs say too little.
         finding: where the stated size lies beside that interval; untold where the runs say too little.
     """

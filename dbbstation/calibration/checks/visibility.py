@@ -45,7 +45,6 @@ class WeakDirection:
     """A direction that the runs see least of those they see.
 
     Attributes:
-        text: in words.
         uncertainty: how far the parameter that it moves most may be off along it, one standard deviation.
         unit: of that; µm for lengths of the geometry.
     """
@@ -72,14 +71,11 @@ class Observability:
     """What the circles see of the machine's parameters.
 
     Attributes:
-        singular_values_mm: of the readings' sensitivity to parameters in units of their usual size, falling, without those
-            that are lost [mm].
-        condition: greatest over least of them.
+        singular_values_mm: of the readings' sensitivity to parameters in units of their usual size, falling, without those that
+            are lost [mm].
         indices: O1 to O5 of them.
-        weak_directions: least seen directions, the weakest first.
-        correlations: largest first.
-        leverage: by test, how many parameters' worth of what is known it brings; they add up to the parameters
-            identified, but for what tests share.
+        leverage: by test, how many parameters' worth of what is known it brings; they add up to the parameters identified, but
+            for what tests share.
     """
 
     singular_values_mm: tuple[float, ...]

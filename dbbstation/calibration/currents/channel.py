@@ -58,7 +58,6 @@ class CurrentChannel:
     """Runs with motor currents.
 
     Attributes:
-        motions: of these runs.
         current_a: measured, one array of shape (n, 6) per run [A].
         usable: samples that count, one array of shape (n, 6) per run: logged, not clipped, friction turned over.
         notes: what was left out and what cannot be told, in words.
@@ -187,9 +186,6 @@ def by_themselves(
     """Solve for the columns that some blocks touch, by these blocks alone.
 
     Args:
-        blocks: of one channel.
-        known: of all columns.
-        noise: of a reading, where blocks do not have their own.
         nominal: the same blocks where lost directions are looked for, if elsewhere.
 
     Returns:

@@ -70,12 +70,8 @@ def motor_findings(
     """Say what the currents left and what each channel tells by itself.
 
     Args:
-        layout: of the fit.
         channel: currents; None for a fit without them.
         x: values found, shape (k,).
-        solution: of both channels.
-        blocks: of both channels, those of `current_blocks` last.
-        nominal: the same at the nominal geometry.
         noise: of a bar reading.
     """
     if channel is None:

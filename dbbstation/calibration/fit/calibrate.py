@@ -80,19 +80,18 @@ class Calibration:
     """What a fit found.
 
     Attributes:
-        layout: its columns.
         x: values of all columns, shape (k,).
         solution: covariance, directions and what was held, of all columns.
         noise: of one bar reading.
         observations: the runs that went in.
         machine_residual_mm: per run, what the machine's own sources leave [mm].
         residual_mm: per run, what is left after the measurement's effects too [mm].
-        blocks: what the runs say of the columns, about the values found: one for the circle of each run, then those of
-            motor currents.
+        blocks: what the runs say of the columns, about the values found: one for the circle of each run, then those of motor
+            currents.
         directions_lost: what the recordings could not see, in words.
         directions_regularised: what they could not see and the machine file's tolerances stand in for, in words.
-        prescribed: parameters that were held at nominal in place of the lost directions; empty where the directions
-            themselves were.
+        prescribed: parameters that were held at nominal in place of the lost directions; empty where the directions themselves
+            were.
         currents: what the motor currents say; None where the fit does without them.
         at_limit: columns of nonlinear parameters that are held at an end of their range.
         settled: False where the last step still moved: values are those of that step.
@@ -261,11 +260,7 @@ def _approached(
     be held at nominal, and the curvature would stay. So the noise is read only where steps no longer halve what is left.
 
     Args:
-        layout: columns of the fit.
-        runs: as the fit looks at them.
-        nominal: blocks at the starting values.
         left: per run, what the starting values leave, shape (n,) [mm].
-        motion_of: motion of a run.
 
     Returns:
         Values of all columns, shape (k,), and blocks of the circles about them.

@@ -57,9 +57,7 @@ def as_known(method: Method, machine: Machine, observations: Sequence[Observatio
 
     Args:
         method: one of the paper's three.
-        machine: nominal machine.
-        observations: raw runs; the conventional methods take runs about the balls of a jig too, and forget where those
-            stand.
+        observations: raw runs; the conventional methods take runs about the balls of a jig too, and forget where those stand.
 
     Returns:
         The runs, their set-ups changed to what the method knows.

@@ -61,7 +61,6 @@ class RunNodes:
     """A run and its nodes.
 
     Attributes:
-        run: with all its samples.
         coarse: the same run with the nodes in place of the samples; its lengths say nothing.
         roots: R of each sector, shape (sectors, nodes, nodes).
         seen: Q^T of measured less nominal length, shape (sectors, nodes) [mm].

@@ -33,8 +33,6 @@ def calibrate_robust(
     """Fit, and fit again without the outliers.
 
     Args:
-        fit: calibrates runs.
-        observations: all runs.
         balls: look for balls off their place too, not only for runs that are no circle of this machine.
         begun: what was returned for these runs without balls, to go on from.
 

@@ -87,13 +87,7 @@ def _strange_from_um(rests_um: NDArray[np.float64]) -> float:
 def in_place_after_all(
     calibration: Calibration, runs: Sequence[Observation], outliers: Sequence[Outlier]
 ) -> tuple[list[Observation], tuple[Outlier, ...]]:
-    """Runs that belong, and the outliers that stay, where a fit knows physics that was not known when runs were left out.
-
-    Args:
-        calibration: of the runs that were kept, with that physics.
-        runs: all runs.
-        outliers: runs that were left out; others stay as they are.
-    """
+    """Runs that belong, and the outliers that stay, where a fit knows physics that was not known when runs were left out."""
 
     def named(run: Observation) -> tuple[str, str]:
         return run.setup.session, run.label

@@ -93,7 +93,6 @@ def free_ball(
 
     Args:
         fit: calibrates runs.
-        runs: all runs.
         mounting: name of the putting-up that is off.
         seats: of a fit of these runs.
         together: whether it stands alike in all of them, where that is known; seen from the seats if None.
@@ -122,7 +121,6 @@ def set_free(fit: Fit, before: Calibration, source: str, of: str) -> Step | None
     """Let what is off be anything from here on; None where the runs cannot be fitted without knowing it.
 
     Args:
-        fit: calibrates runs.
         before: the last fit.
         source: `mounting`, `ball-coordinate` or `bar-offset`.
         of: name of the mounting, ball or session that is off.
@@ -143,8 +141,6 @@ def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
 
     Args:
         fit: calibrates runs.
-        runs: all runs.
-        session: whose bar is off.
 
     Returns:
         What was found, the runs without its pull, and their fit.

@@ -78,7 +78,6 @@ class EvaluatedRun:
     """One run before, under the nominal machine, and after, under the model.
 
     Attributes:
-        test: name of the test.
         direction: `ccw` or `cw`.
         repeat: counts runs of this test and direction.
         measured: figures of the readings.
@@ -101,9 +100,7 @@ class Evaluation:
     """What a model makes of recordings.
 
     Attributes:
-        runs: figures of each run.
         residual_rms_um: measured minus predicted length over all runs, machine's sources only [µm].
-        nominal_rms_um: the same under the nominal machine [µm].
     """
 
     runs: tuple[EvaluatedRun, ...]
@@ -178,10 +175,8 @@ def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel
     Of what hangs on the pose alone: backlash has no place of its own, and a machine that warms none that stays.
 
     Args:
-        model: the machine as it is.
-        height_mm: commanded Z [mm].
-        corrected: what the machine's control believes instead, where a calibration has been entered; the
-            deviation is then what that calibration leaves.
+        corrected: what the machine's control believes instead, where a calibration has been entered; the deviation is then what
+            that calibration leaves.
 
     Raises:
         KinematicsError: the plane lies outside the workspace.

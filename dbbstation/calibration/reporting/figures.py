@@ -42,9 +42,7 @@ class SourceValues:
     """Parameters of one error source.
 
     Attributes:
-        name: of the source.
         shared: what has these values, such as a session or mounting; None of the machine.
-        parameters: by name.
     """
 
     name: str
@@ -58,8 +56,6 @@ class ParameterName:
 
     Attributes:
         source: error source that it belongs to.
-        parameter: its name there, with its unit.
-        unit: of its value.
     """
 
     source: str
@@ -74,7 +70,6 @@ class Covariance:
     Along `directions_lost` it has no variance: nothing was identified there, and values stay nominal.
 
     Attributes:
-        rows: name of each row and column.
         matrix: in the products of their units, shape (k, k).
     """
 
@@ -89,18 +84,12 @@ class CalibrationFigures:
     Attributes:
         runs: figures of every run, under the nominal machine and under the model.
         nominal_rms_um: measured less predicted length under the nominal machine [µm].
-        residual_rms_um: the same under the model's machine [µm].
-        residual_within_mounting_rms_um: the same after each mounting's shift of the ball [µm].
         noise_um: of one reading, from differences of neighbours [µm].
         misfit: the residual beyond noise and mountings.
-        noise_correlation_samples: samples after which noise is new.
-        parameters_identified: how many.
         directions_lost: what the tests cannot identify, in words.
         gaps: what is known of these all the same, in words.
-        plan_check: whether the tests are enough to check the plan.
         directions_regularised: what only tolerances of the machine file tell, in words.
         parameters_prescribed: held at nominal in place of directions, as `source.parameter`.
-        outliers: kept out of the fit.
         scatter: whether balls scatter as stated.
         observability: what the circles see.
         sources: values of the machine's parameters.
@@ -141,7 +130,6 @@ def calibration_figures(
     """Return everything that a fit says.
 
     Args:
-        calibration: the fit.
         evaluation: of its model, with the runs that it was made from.
         outliers: what was kept from pulling it.
     """
@@ -174,7 +162,6 @@ def report_of(figures: CalibrationFigures, **more: Any) -> dict[str, object]:  #
     """Return the numbers that a model file keeps of its fit.
 
     Args:
-        figures: of the fit.
         more: further numbers, by name.
     """
     return {**more, **{key: value for key, value in plain(figures).items() if key not in ELSEWHERE_IN_MODEL}}

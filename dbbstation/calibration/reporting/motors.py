@@ -30,15 +30,9 @@ class Motor:
     Attributes:
         motor: 1 to 6.
         gain_a_kn: current per force of the strut.
-        coulomb_n: friction at any speed.
-        viscous_ns_mm: friction per speed.
-        load_share_n_kn: friction per load.
-        asymmetry_n: what differs by direction.
         force_per_current: of the strut [N/A].
         torque_per_current: at the screw [Nm/A]; None where the machine file does not say its lead.
         residual_a: root mean square that the model leaves [A].
-        noise_a: of a reading [A].
-        noise_correlation_samples: samples after which noise is new.
         samples: readings that went in.
     """
 
@@ -62,7 +56,6 @@ class CurrentsFigures:
 
     Attributes:
         weight_taken_as_known_n: of the platform, on which forces rest [N].
-        motors: one after the other.
         centre_of_gravity: by coordinate and channel, `circles`, `currents` and `both` [mm]; None where a channel leaves it open.
         notes: what was left out and what cannot be told, in words.
     """

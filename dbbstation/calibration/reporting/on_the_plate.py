@@ -48,12 +48,8 @@ class CircleTest:
     """One test, all its runs together.
 
     Attributes:
-        name: of the test.
         ball_mm: centre of the fixed ball as the CMM knows it, machine frame, shape (3,) [mm].
-        circles: its runs.
-        circularity_um: greatest of its runs, before and after [µm].
-        centre_um: centre of the circle from the ball, mean of its runs, before and after, rows of x, y, shape (2, 2)
-            [µm].
+        centre_um: centre of the circle from the ball, mean of its runs, before and after, rows of x, y, shape (2, 2) [µm].
     """
 
     name: str

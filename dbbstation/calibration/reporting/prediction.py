@@ -35,7 +35,6 @@ class PredictedCircle:
         measured_um: circularity of the recording up to 30 undulations per revolution [µm].
         predicted_um: of what the machine's own sources make the bar read, by the same figure [µm].
         before_um: of what the nominal machine leaves; the same as measured where a plain circle was commanded [µm].
-        after_um: of what the model leaves [µm].
     """
 
     measured_um: float
@@ -53,8 +52,6 @@ def predicted_circles(
     """Compare the circularity of recordings with what a model says of them.
 
     Args:
-        model: with the machine's own sources.
-        observations: the recordings.
         progress: called with how many of how many runs are done.
 
     Raises:

@@ -46,7 +46,6 @@ def residual_map(observations: Sequence[Observation], residual_mm: Sequence[NDAr
     """Average what is left of every run, noise taken off, over ten degrees of angle.
 
     Args:
-        observations: runs.
         residual_mm: what a model leaves of each, shape (n,) [mm].
     """
     names = names_of_tests(observations)

@@ -20,8 +20,6 @@ class WorstRun:
 
     Attributes:
         run: test, direction and repeat.
-        worst_um: its figure [µm].
-        within: whether that is within tolerance.
     """
 
     run: str
@@ -34,8 +32,6 @@ class EvaluatedTolerance:
     """A tolerance, and the worst run under the nominal machine and under the model.
 
     Attributes:
-        quantity: which figure it is for.
-        largest_um: the limit [µm].
         tests: that it holds for; empty for all.
         directions: that it holds for; empty for both.
         before: under the nominal machine; None where it holds for no run.
@@ -56,7 +52,6 @@ def evaluated_tolerances(
     """Hold tolerances against runs, under the nominal machine and under the model.
 
     Args:
-        tolerances: of the shop.
         runs: with the circular deviation of low-passed readings.
     """
     return tuple(

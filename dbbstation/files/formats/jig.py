@@ -105,10 +105,8 @@ def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Pro
     """Check what balls say of bores and holders, on the raw data: other faults must not hide these.
 
     Args:
-        document: holds `balls`.
         jig: the mapping with the bores; None where there is no plate.
         holders: the mapping of holders, or their names.
-        faults: grows.
     """
     bores = _plain_bores(jig)
     for location, ball in document.entries("balls"):
@@ -194,7 +192,6 @@ def checked_jig(text: str, file: str) -> JigFile:
     """Return the jig that a text holds, checked as a file is.
 
     Args:
-        text: of a jig file.
         file: to name in messages: what the text was made from.
 
     Raises:

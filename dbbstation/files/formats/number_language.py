@@ -26,10 +26,6 @@ def is_number(text: str) -> bool:
 class NumberLanguage:
     """Decimal sign and separator of columns. There is no sign between thousands: `1.000` would have two meanings.
 
-    Attributes:
-        decimal: one of `DECIMALS`.
-        separator: one of `SEPARATORS`.
-
     Raises:
         InputError: both are commas: no reader could tell them apart.
     """

@@ -45,10 +45,6 @@ class PoseTable:
 def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
     """Read a table of poses.
 
-    Args:
-        path: of the table.
-        language: how its numbers are written.
-
     Raises:
         InputError: every missing column and every cell that is no finite number, with its line.
     """
@@ -108,14 +104,10 @@ def write_poses(
     """Write poses with their standard uncertainties and further columns, and beside the table where it comes from.
 
     Args:
-        path: of the table.
         poses: shape (n, 6) [mm, deg].
         uncertainty_mm: of X, Y and Z, shape (n, 3) [mm]; NaN, and then an empty cell, where not known.
         others: texts of further columns by name.
-        provenance: where the table comes from.
-        why_unknown: why an uncertainty is not known, for the rows where one is not.
         warning: what speaks against the model; empty for nothing.
-        force: overwrite.
 
     Raises:
         OutputError: the file exists and `force` is not given, or it cannot be written.

@@ -27,10 +27,8 @@ class Quantity:
     """A number in a unit, plausible between two sizes.
 
     Attributes:
-        unit: as printed.
         least: smallest plausible value, or size where `signed`.
         most: greatest plausible value, or size where `signed`.
-        or_zero: zero is allowed as well.
         signed: the range holds for the absolute value.
     """
 

@@ -36,8 +36,6 @@ class Setting:
     """One value.
 
     Attributes:
-        value: text or number.
-        file: that says so.
         line: in that file, from 1.
     """
 
@@ -57,7 +55,6 @@ class Settings:
 
     Attributes:
         values: by key with dots, such as `limits.largest_correction_mm`; a key that no file has is absent.
-        tolerances: what circles may have.
         tolerances_from: where these come from, `file:line`; empty where no file has any.
         files: that were read, the strongest first.
     """

@@ -44,11 +44,8 @@ def amend(
     """Take a session as it stands now, with another plan or machine where they are given, and note why.
 
     Args:
-        folder: of the session.
-        reason: why, in the words of who does it.
         made: the time of day with its zone.
         plan: file that takes the place of the session's plan, with its jig put into it; None: the one that is there.
-        machine: the same of the machine.
 
     Returns:
         What was changed.

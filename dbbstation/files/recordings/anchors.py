@@ -36,7 +36,6 @@ def anchor_told(folder: Path, anchor: str) -> Problem:
     """Return what a noted anchor says of a session; with a remedy where the session is not what it was then.
 
     Args:
-        folder: of the session.
         anchor: as it was noted, `SHORTEST` digits or more of it.
     """
     log = read_event_log(folder, [])

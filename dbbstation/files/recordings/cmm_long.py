@@ -29,7 +29,6 @@ def is_long(table: TableFile, columns: Mapping[str, str]) -> bool:
     """Return whether a table has a row per coordinate: no columns of axes, but one that says the axis and one with values.
 
     Args:
-        table: as read.
         columns: names of columns by what they are, as typed.
     """
     if {"x", "y"} & set(columns):
@@ -43,7 +42,6 @@ def wide(table: TableFile, columns: Mapping[str, str], unit: str) -> tuple[Table
     Rows of other characteristics, such as diameters, are left out.
 
     Args:
-        table: with a row per coordinate.
         columns: names of columns by what they are, as typed: `ball`, `axis`, `value`, `unit`, `u`.
         unit: of values where no column says it of each.
 

@@ -37,8 +37,8 @@ class Measured:
         bore: that it stands in; None where the sheet does not say it.
         holder: that it stands on; empty where the sheet does not say it.
         centre_mm: x, y, z [mm]; z is NaN where the sheet has none.
-        uncertainty_um: one standard deviation per axis, root mean square of those of the axes [µm]; None where the sheet has none.
-        line: of the file.
+        uncertainty_um: one standard deviation per axis, root mean square of those of the axes [µm]; None where the sheet has
+            none.
     """
 
     name: str
@@ -61,11 +61,9 @@ def read_sheet(
     """Read a sheet; DMIS by the ending of its name, else a table.
 
     Args:
-        path: of the file.
-        columns: names of columns by what they are: `ball`, `bore`, `holder`, `x`, `y`, `z`, `u` or `ux`, `uy`, `uz`; of a sheet with a
-            row per coordinate also `axis`, `value` and `unit`; others by name.
+        columns: names of columns by what they are: `ball`, `bore`, `holder`, `x`, `y`, `z`, `u` or `ux`, `uy`, `uz`; of a sheet
+            with a row per coordinate also `axis`, `value` and `unit`; others by name.
         unit: of a table's coordinates; None: as the sheet says, else mm.
-        coverage: k of the uncertainties U of a table; None where it has none.
         of_one_holder: a bore alone says which ball a row is.
         u_unit: of its uncertainties; None: as the sheet says, else that of coordinates.
 
@@ -129,16 +127,12 @@ def jig_of_sheet(
     """Return a jig whose balls are those of a sheet; plate and holders stay as they are.
 
     Args:
-        before: the jig so far.
-        measured: balls.
-        file: of the sheet, for messages.
-        names: names of balls in the jig by those in the sheet.
         uncertainty_um: standard uncertainty of balls whose sheet states none [µm]; None: they are refused.
         cmm_temp_c: of the plate while it was measured [degC]; None where nobody knows: the jig file says nothing of it then.
 
     Raises:
-        InputError: a ball that the jig does not know and the sheet does not place, twice the same, no uncertainty, or whatever no jig
-            file may say, such as a ball that lies at another bore.
+        InputError: a ball that the jig does not know and the sheet does not place, twice the same, no uncertainty, or whatever no
+            jig file may say, such as a ball that lies at another bore.
     """
     faults: list[Problem] = []
     balls: dict[str, BallSchema] = {}

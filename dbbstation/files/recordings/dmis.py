@@ -27,9 +27,7 @@ class DmisPoint:
     """One actual feature.
 
     Attributes:
-        name: its label.
         centre_mm: x, y, z in the frame that is set where it stands [mm].
-        line: of the file.
     """
 
     name: str

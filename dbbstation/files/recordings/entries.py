@@ -33,8 +33,6 @@ class CommandedProgram:
     """An NC program that was commanded.
 
     Attributes:
-        path: of its file.
-        sha256: of its file.
         model_sha256: of the model that it was compensated with; empty where none.
     """
 
@@ -77,9 +75,8 @@ class Counts:
 
     Attributes:
         received: samples in the run file.
-        lost: samples that the line lost between them.
-        rejected: samples of the file that no calculation uses, by what the instrument said of them; and bytes that were no sample,
-            by what was wrong with them (`unreadable checksum`).
+        rejected: samples of the file that no calculation uses, by what the instrument said of them; and bytes that were no
+            sample, by what was wrong with them (`unreadable checksum`).
     """
 
     received: int
@@ -103,7 +100,6 @@ class Note:
     """What somebody noted while a session was measured.
 
     Attributes:
-        made: when.
         text: in their words; empty for a temperature alone.
         ambient_temp_c: temperature of the shop then [degC]; None where it was not read.
     """
@@ -123,20 +119,17 @@ class RunEntry:
     """What the session says of one run.
 
     Attributes:
-        test: name of the test.
         direction: sense of travel.
         repeat: counts the runs of this test and direction, from 1.
         mounting: counts how often a ball was put up; None: one mounting per test.
         state: how far it has come.
         reason: why it was rejected, or accepted although its recording shows no circle; empty otherwise.
         started: when the first sample was taken; None where not noted.
-        path: of its file.
         sha256: of its file; empty while recording.
         program: what was commanded where it was not the plan's circle.
         centre_mm: centre of the circle as programmed, machine frame (x, y, z) [mm]; None: as planned.
         chain_sha256: its link in the chain of sealed runs; empty where it has none.
         counts: samples received, rejected and lost; None where not noted.
-        instrument: what read it; None where not noted.
     """
 
     test: str

@@ -48,7 +48,6 @@ class LoggedEvent:
         set_to: keys of the session file that took a value, None for those that were taken out.
         runs: entries that took the place of those of the same test, direction and repeat, or came behind all others.
         all_runs: the whole list, where it was put together otherwise; None where it was not.
-        link: of the line.
     """
 
     what: str
@@ -64,7 +63,6 @@ class EventLog:
     """The log as it was read.
 
     Attributes:
-        path: of its file.
         events: the lines up to the first that is not as it was written.
         end: bytes of these lines.
         size: bytes of the file.
@@ -167,7 +165,6 @@ def line_of(before: str, what: str, at: datetime | None, members: Mapping[str, A
         before: link of the line before it; empty for the first.
         what: happened, in a word or two.
         at: when; None where that means nothing.
-        members: from `change`.
     """
     moment = {} if at is None else {"at": at.astimezone(UTC).isoformat().replace("+00:00", "Z")}
     text = json.dumps({**moment, "what": what, **members}, ensure_ascii=False, allow_nan=False).encode()

@@ -30,7 +30,6 @@ class FolderFiles:
 
     Attributes:
         sessions: session files, with names that can be written in UTF-8.
-        models: files that may be models.
         closed: folders that cannot be looked into, with the reason.
     """
 

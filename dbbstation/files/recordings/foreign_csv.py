@@ -52,12 +52,9 @@ class ForeignTable:
     """A table made elsewhere.
 
     Attributes:
-        table: its columns.
-        language: how its numbers are written.
         units: what stands below the names of columns, by name; empty where nothing does.
         comments: `key: value` lines above the names, by key in small letters.
         data: the whole file.
-        comment_lines: number of the line of each comment, by key.
         repeated: numbers of lines in which the names of the columns come again: each run has a head of its own.
     """
 
@@ -74,7 +71,6 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
     """Read a table that another program wrote.
 
     Args:
-        path: of the file.
         language: how numbers are written; None: as fits best.
         encoding: of the text where no byte order mark tells it.
 
@@ -150,13 +146,7 @@ def _no_table(lines: list[str], language: NumberLanguage, file: str, stated: str
 
 
 def _heads_taken_out(body: list[str], names: int, language: NumberLanguage) -> tuple[list[str], tuple[int, ...]]:
-    """Return the lines of a table without further heads, and where those are: each run of an export may have title and names of its own.
-
-    Args:
-        body: lines of the file from the names on.
-        names: place of the line of names.
-        language: how numbers are written.
-    """
+    """Return the lines of a table without further heads, and where those are: each run of an export may have title and names of its own."""
     head = body[names].strip()
     again = [k for k in range(names + 1, len(body)) if body[k].strip() == head]
     kept = list(body)

@@ -69,7 +69,6 @@ def run_line(values: Sequence[float | str], names: Sequence[str], *, exact: bool
     """Return one line of a run file with its checksum.
 
     Args:
-        values: one per column.
         names: of the columns, without the checksum.
         exact: write as many digits as it takes to read back the same bits.
 
@@ -94,8 +93,6 @@ class RunWriter:
     """Appends samples to one run; a context manager that leaves the `.part` in place unless it was sealed.
 
     Args:
-        folder: the session's `runs` folder.
-        test: name of the test.
         direction: sense of travel.
         repeat: of this test and direction; must be free.
         names: columns in order, without the checksum; `t_s` and `length_mm` among them.

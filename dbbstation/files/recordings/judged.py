@@ -42,7 +42,6 @@ def judge_session(
     """Judge runs of a session.
 
     Args:
-        session: the session.
         wanted: its runs with their recordings, in the order in which they were recorded.
         model: of the machine; None: only the usual sizes of what machines have are known.
         progress: told how many of how many runs are analysed.
@@ -69,11 +68,7 @@ def run_of(
     """Return one run of a session as it is judged.
 
     Args:
-        session: the session.
-        run: which.
-        recording: of it.
         model: of the machine; None: only the usual sizes of what machines have are known.
-        planned: of `planned_circles`.
     """
     circle, recording = session.circle(run), replace(recording, name=run.label)
     # A compensated program is there to put the circle where it is planned. That is where it is expected.

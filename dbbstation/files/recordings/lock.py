@@ -38,10 +38,6 @@ _NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL, errno.
 class SessionLock:
     """The right to write into a session, held until it is closed or the process ends.
 
-    Args:
-        folder: of the session.
-        patience_s: how long another process may go on writing into it [s].
-
     Attributes:
         held: whether the file system gave a lock; False where it knows none.
 

@@ -42,15 +42,12 @@ class FinishedRun:
     """A run that exists whole, such as a simulated one.
 
     Attributes:
-        test: name of the test.
         direction: sense of travel.
         columns: by name, each of shape (n,), in the columns' units.
         repeat: of this test and direction.
         mounting: counts how often a ball was put up; None: one mounting per test.
         started: when the first sample was taken; None where that means nothing.
         program: name and bytes of the NC program that was commanded, None for the plan's circle.
-        model_sha256: of the model that the program was compensated with.
-        state: as the session notes it.
         reason: why it was rejected; empty otherwise.
         texts: columns that are no numbers, such as `status`, n texts each.
         exact: write as many digits as it takes to read back the same bits, not those that instruments resolve.
@@ -81,11 +78,7 @@ def write_session(
     """Write a whole session at once; all of it or nothing.
 
     Args:
-        folder: of the session.
-        machine: nominal.
-        plan: as run.
         runs: in order.
-        details: what it notes beside them.
         more: further files by path in the folder.
 
     Raises:
@@ -130,11 +123,7 @@ def make_session_folder(
     """Make the folder of a session, sealed and with its event log; all of it or nothing.
 
     Args:
-        folder: of the session.
-        machine: nominal.
-        plan: as run.
         details: what it notes beside the runs.
-        entries: of its runs.
         files: content by path in the folder, of everything but machine, plan and session file.
         at: when, for the log; None for a session that is computed: the same one has the same bytes then.
 

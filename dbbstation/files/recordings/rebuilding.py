@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 def rebuild(folder: Path) -> tuple[str, int]:
     """Write the session file as the event log has it; what stood there is kept.
 
-    Args:
-        folder: of the session.
-
     Returns:
         Where the former session file is kept, empty where there was none; how many events there are.
 

@@ -36,7 +36,6 @@ class RunFile:
     """A run with what its file says beside the samples.
 
     Attributes:
-        recording: the samples.
         header: what the `# key: value` lines say, by key.
         unknown_columns: text of columns that this program does not know, by name, one entry per sample.
         status: what the instrument said of each sample; empty where nothing was noted.
@@ -56,7 +55,6 @@ def read_run(path: Path, *, sha256: str = "") -> RunFile:
     """Read a run file; of one that ends in `.part` the good lines.
 
     Args:
-        path: of the file.
         sha256: what its bytes must hash to; not checked where empty.
 
     Raises:
@@ -119,7 +117,6 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
     """Parse the bytes of a run file: bytes to lines, lines to numbers, numbers to a recording, each checked.
 
     Args:
-        data: whole file.
         file: as named in messages.
         sha256: of the data, passed on.
         partial: return the good lines and name the others in a warning, instead of refusing the file.

@@ -41,12 +41,9 @@ class Lines:
     Attributes:
         file: as named in messages.
         header: `# key: value` lines by key, as far as the file was read.
-        header_line: number of the line that names the columns.
         columns: their names in order.
         rows: the lines below, without line ends.
-        numbers: line number of each row.
         ended: the last row ends with a line end.
-        opening: this is the first piece.
     """
 
     file: str
@@ -71,7 +68,6 @@ class Lines:
         """Return one column as text.
 
         Args:
-            name: of the column.
             known: texts that came before, so that equal ones are kept once; more are added.
         """
         at = self.columns.index(name)

@@ -50,11 +50,7 @@ _MOST_COUNTED = 10_000
 
 
 class Numbers:
-    """The numeric columns of a run file, gathered piece by piece into 8 bytes a number.
-
-    Attributes:
-        faults: of its lines.
-    """
+    """The numeric columns of a run file, gathered piece by piece into 8 bytes a number."""
 
     def __init__(self) -> None:
         self.faults = Counted()

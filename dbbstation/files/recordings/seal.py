@@ -50,7 +50,6 @@ class Seal:
 
     Attributes:
         files: SHA-256 by path as the session file names it.
-        runs: number of sealed runs.
         chain_sha256: link of the last of them; empty where there is none.
         events: number of events in the event log; zero where the session has none.
         anchor: link of the last of them: who noted it elsewhere can tell whether anything was changed that stood there.
@@ -72,8 +71,6 @@ class Amendment:
         former_sha256: hash before; empty where there was none.
         sha256: hash now; empty where there is none.
         former: path in the session folder where the file is kept as it was; empty where it is not.
-        reason: why.
-        made: when.
     """
 
     what: str
@@ -108,7 +105,6 @@ def sealed_names(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
     """Return the files that a seal covers, by their paths: machine and plan as named, and the jig file that the plan names.
 
     Args:
-        folder: of the session.
         names: paths of machine and plan in it, in this order.
     """
     plan = load_yaml(folder / names[1], [])
@@ -134,7 +130,6 @@ def keep_copies(folder: Path, sealed: Mapping[str, str]) -> None:
     """Keep a copy of every sealed file in the session, so that nothing of it is lost when it changes; put a spoilt one right.
 
     Args:
-        folder: of the session.
         sealed: SHA-256 by path in the folder.
 
     Raises:
@@ -159,8 +154,6 @@ def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> It
     """Yield what is wrong with the copies that are kept: spoilt, gone, or under a name that is none of theirs.
 
     Args:
-        folder: of the session.
-        seal: of it.
         amendments: by which further copies are known.
     """
     if (folder / SEALED).is_symlink():  # it may lead to a whole disk
@@ -235,9 +228,6 @@ def seal_faults(folder: Path, file: Path, seal: Seal, names: Sequence[str], runs
     """Return what is not as it was sealed: which file and which of its keys, which run.
 
     Args:
-        folder: of the session.
-        file: the session file.
-        seal: as noted.
         names: paths of machine and plan in the folder, in this order.
         runs: as the session lists them.
     """

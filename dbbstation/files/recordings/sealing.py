@@ -47,11 +47,9 @@ class Sealing:
     """What sealing a session would do.
 
     Attributes:
-        path: of the session file.
         chained: its text with all hashes and the chain, its seal as it was.
         files: run files that got a hash, as the session file names them.
         linked: runs that came into the chain.
-        seal: what the session carries then.
         before: text of the session file as it is.
         logged: whether the session has an event log.
         copies: kept copies of what is sealed that are spoilt or gone.
@@ -79,9 +77,6 @@ class Sealing:
 
 def seal_session(folder: Path) -> Sealing:
     """Seal a session: the session file with all hashes, its event log, and copies of what is sealed.
-
-    Args:
-        folder: of the session, or its session file.
 
     Returns:
         What was done.
@@ -113,9 +108,6 @@ def sealing(folder: Path) -> Sealing:
 
     Comments, order and spelling of the file stay: each hash stands behind the run's `file`, each link behind the hash, the seal
     above the list of runs. Runs that are being recorded have none.
-
-    Args:
-        folder: of the session, or its session file.
 
     Raises:
         InputError: no session file, no list of runs in it, a file that is missing, or what was sealed before has changed.

@@ -70,14 +70,8 @@ class SessionFolder(SessionDetails):
     """A session with its machine and plan, and what it notes; runs are read when asked for.
 
     Attributes:
-        name: of the folder.
-        folder: where it is.
         machine: the nominal model that the controller had.
-        plan: the plan as run.
-        machine_path: of the machine's file.
-        plan_path: of the plan's file.
         runs: in the order they were started, of every state.
-        sha256: of the session file.
     """
 
     name: str
@@ -122,7 +116,6 @@ class SessionFolder(SessionDetails):
         """Return ball, mounting and bar of a run, named so that no other session has the same names.
 
         Args:
-            run: which.
             logged: temperatures of the run by sensor, shape (n,) each [degC].
         """
         ball = self.plan.tests[run.test].ball
@@ -180,7 +173,6 @@ class SessionFolder(SessionDetails):
         """Read several runs.
 
         Args:
-            runs: which.
             progress: told how many of how many are read.
 
         Raises:
@@ -296,7 +288,6 @@ def parse_session(
     Args:
         path: of the folder, or of the session file in it.
         faults: take what is wrong.
-        as_sealed: what is not as it was sealed is a fault.
         instead: files that are read as if they stood in the folder, by `machine` and `plan`.
     """
     wrong = _other_than_session(path)

@@ -17,10 +17,6 @@ class SessionDetails:
     """What a session notes beside its runs; everything optional.
 
     Attributes:
-        serial_number: of the machine.
-        operator: who measures.
-        ambient_temp_c: temperature of the shop [degC].
-        bar: the bar.
         bar_waiver: why it is measured without a fresh calibration of the bar; empty where there is one.
         set_up_errors: micrometer readings of balls that were put up under the spindle.
         seal: hashes of machine, plan and jig, and the end of the chain of runs.

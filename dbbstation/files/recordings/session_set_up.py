@@ -32,11 +32,9 @@ class SetUpReadings:
     """What a micrometer read at one mounting, in the file's unit, so that it is written again as it was.
 
     Attributes:
-        test: a test that was run on the mounting.
         mounting: number of the mounting; None: the one of that test's runs without a number.
         fixed_ball_um: fixed ball less tool tip while the machine stood at the ball's commanded place, machine frame [µm].
         moving_ball_um: moving ball less tool tip, platform frame [µm].
-        uncertainty_um: of each reading, one standard deviation [µm].
     """
 
     test: str

@@ -64,9 +64,7 @@ class Standing:
     """How a session file and its event log stand to one another.
 
     Attributes:
-        stands: in a word.
         differences: what is not as the log has it, in words, where they are unlike.
-        log_sound: whether the log itself can be relied on.
     """
 
     stands: Stands
@@ -78,7 +76,6 @@ def standing(data: Mapping[str, Any], log: EventLog | None, *, but_runs: bool = 
     """Hold a session file against its event log.
 
     Args:
-        data: of the file.
         log: as it was read; None where there is none.
         but_runs: leave the list of runs out, whose own chain has told already what is wrong with it.
     """

@@ -110,8 +110,6 @@ def log_faults(file: Path, data: Mapping[str, Any], log: EventLog | None, *, but
     """Return what a session file says otherwise than its event log.
 
     Args:
-        file: the session file.
-        data: what it says, as its format has it.
         log: as it was read; None where there is none.
         but_runs: leave the list of runs out, whose own chain has told already what is wrong with it.
     """
@@ -134,7 +132,6 @@ class SessionStore:
     behind the log is put forward.
 
     Args:
-        folder: of the session.
         clock: the time of day with its zone, for the log.
         anew: write the session file as the log has it, whatever it says.
 
@@ -142,7 +139,6 @@ class SessionStore:
         log: the event log, without events where the session has none yet.
         sha256: of the session file as it was read or written last.
         state: what it says, as the log goes on from it.
-        data: what the session file said when it was read.
         put_aside: where the file is kept that took the place of the session file; empty where it was gone, None where none did.
 
     Raises:

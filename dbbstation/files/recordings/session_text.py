@@ -25,7 +25,6 @@ def session_data(
     """Return what a session file says, without its format.
 
     Args:
-        folder: of the session.
         names: paths of machine and plan in it, in this order.
         details: what it notes beside its runs.
         runs: in the order of the list.

@@ -77,10 +77,6 @@ class SessionWriter:
         """Make a session folder with machine and plan in it and no runs.
 
         Args:
-            folder: of the session.
-            machine: nominal.
-            plan: as run.
-            details: what it notes beside its runs.
             clock: the time of day with its zone, for the event log.
 
         Raises:
@@ -109,7 +105,6 @@ class SessionWriter:
         A session file that was spoilt is written anew from the event log.
 
         Args:
-            folder: of the session.
             patience_s: how long another process may go on writing into it [s].
             clock: the time of day with its zone, for the event log.
 
@@ -210,7 +205,6 @@ class SessionWriter:
         """Seal a run and note it as `complete`.
 
         Args:
-            writer: of its file.
             counts: what came over the line and what did not, where that is known.
 
         Raises:
@@ -226,8 +220,6 @@ class SessionWriter:
         """Note a sealed run as `accepted` or `rejected`.
 
         Args:
-            run: which.
-            accepted: whether it counts.
             reason: why; empty where a usable run is accepted.
 
         Raises:

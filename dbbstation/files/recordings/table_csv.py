@@ -66,7 +66,6 @@ def read_table(path: Path, needed: Iterable[str] = (), numbers: NumberLanguage |
     """Read a table.
 
     Args:
-        path: of the file.
         needed: columns that must be there.
         numbers: how they are written; None: a dot in numbers, and the separator that the header has most of.
 

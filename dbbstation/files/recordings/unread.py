@@ -29,11 +29,7 @@ _LOOKED_AT = 4_000
 
 
 def kind_of(data: bytes) -> tuple[str, str] | None:
-    """Return what a file is that is no text with a table, and what to do; None where it may be one.
-
-    Args:
-        data: the whole file.
-    """
+    """Return what a file is that is no text with a table, and what to do; None where it may be one."""
     for beginning, what, remedy in _BEGINNINGS:
         if data.startswith(beginning):
             return what, remedy
@@ -63,9 +59,6 @@ def with_tabs(lines: list[str]) -> list[str] | None:
 
     Names may hold single spaces where two or more part them: a line that has as many parts by two spaces as rows have numbers is
     parted so, every other line with digits by single ones.
-
-    Args:
-        lines: of the file.
     """
     parts = [line.split() for line in lines]
     numbers = [one for one in parts if one and all(map(_digits, one))]

@@ -15,9 +15,8 @@ def changes(before: object, after: object, at: Location = ()) -> list[str]:
     """Return what has changed, one text per key such as `base_joints_mm[0][1] is 12.2, was 12.0`; empty where nothing has.
 
     Args:
-        before: mappings, sequences, texts, numbers, booleans and None. Entries of a list that all have a `name` are matched
-            by it, so that one that was taken out is named.
-        after: the same later.
+        before: mappings, sequences, texts, numbers, booleans and None. Entries of a list that all have a `name` are matched by
+            it, so that one that was taken out is named.
         at: where both stand in their documents.
     """
     if isinstance(before, Mapping) and isinstance(after, Mapping):

@@ -35,7 +35,6 @@ class Arc:
     Attributes:
         start: pose before it, shape (6,) [mm, deg].
         end: pose after it, shape (6,) [mm, deg].
-        centre_mm: X and Y of its centre [mm].
         clockwise: seen from +Z.
         turns: 1 for less than a full turn or one; each more adds a full turn.
     """

@@ -37,7 +37,6 @@ class ProgramBlock:
     """One line.
 
     Attributes:
-        place: file and line.
         words: those that are no code, by letter.
         codes: G and M codes by their group.
         comments: texts of its comments, of which nothing takes notice.
@@ -62,8 +61,6 @@ def blocks(text: str, file: str, faults: list[Problem]) -> Iterator[ProgramBlock
     """All lines up to the program's end, one by one, so that a long program is read in little memory.
 
     Args:
-        text: the program.
-        file: for messages.
         faults: those of the lines so far; complete once every block was taken. A program without an end is one.
     """
     lines = text.split("\n")

@@ -42,7 +42,6 @@ def read_program(text: str, file: str, *, start: NDArray[np.float64] | None = No
     """Return what a program commands.
 
     Args:
-        text: the program.
         file: for messages, and the name of the toolpath.
         start: pose before the program, shape (6,) [mm, deg]; None where unknown.
 

@@ -44,8 +44,6 @@ class Word(NamedTuple):
     """A letter, in capitals, with its number.
 
     Attributes:
-        letter: A to Z.
-        value: the number.
         column: of the letter, counted from 1.
     """
 

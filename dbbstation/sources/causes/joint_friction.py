@@ -162,7 +162,6 @@ class JointAngles:
     Attributes:
         angle_rad: about the outer axes of the six joints, then about their inner ones, shape (n, 12) [rad].
         by_first: derivative of the angle about the outer axis by the platform joint, shape (n, 6, 3) [rad/mm].
-        by_second: the same about the inner axis.
     """
 
     angle_rad: NDArray[np.float64]
@@ -215,7 +214,6 @@ def drags(joints: JointAngles, acting: NDArray[np.float64]) -> tuple[NDArray[np.
     """Forces on the platform's joints for 1 N m about the outer axes and about the inner ones, of which a share acts, (n, 6, 3) [N].
 
     Args:
-        joints: how they stand.
         acting: of the outer axes, then of the inner ones, shape (n, 12).
     """
     return (
@@ -231,8 +229,6 @@ def resistance(
 
     Args:
         angle_rad: in time order [rad].
-        state: before the first row.
-        wind_up_rad: angle over which it changes from one direction to the other [rad].
 
     Returns:
         The shares, and the state behind the last row.

@@ -143,7 +143,6 @@ def settled(
         tension: positive where the load pulls, shape (n, m).
         width: not negative, shape (m,).
         friction: tension up to which a column is held.
-        state: before the first row.
 
     Returns:
         Error y - x and its derivative by the width, shapes (n, m), and the state behind the last row.

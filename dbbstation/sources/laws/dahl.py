@@ -52,7 +52,6 @@ def wound_up(
     Args:
         travel: x, in time order, shape (n, m).
         length: l, over which a wind-up falls to 37 % of what it has still to go, positive, shape (m,).
-        state: before the first row.
 
     Returns:
         z and its derivative by l, shapes (n, m), and the state behind the last row.

@@ -34,10 +34,8 @@ class LoopState:
 
     Attributes:
         rows: steps so far: 0 before the first row, 2 once there is a speed.
-        time_s: of the last row [s].
-        step_s: last step [s].
-        memory: commanded and driven length [mm], their mean speeds over the last step [mm/s], and the derivatives of the
-            driven length and its speed by the time constant, each shape (6,): shape (6, 6).
+        memory: commanded and driven length [mm], their mean speeds over the last step [mm/s], and the derivatives of the driven
+            length and its speed by the time constant, each shape (6,): shape (6, 6).
     """
 
     rows: int
@@ -59,7 +57,6 @@ def driven(
         length_mm: commanded, in time order, shape (n, 6) [mm].
         time_s: of the rows, shape (n,); rows within `SHORTEST_S` are one, and have one error [s].
         constant_s: tau, shape (6,); a negative one is a strut ahead by -tau dx/dt [s].
-        state: before the first row.
 
     Returns:
         Errors [mm] and their derivatives by tau [mm/s], shapes (n, 6), and the state behind the last row.
@@ -85,7 +82,6 @@ def undone(
         reached_mm: y, shape (n, 6) [mm].
         time_s: of the rows, shape (n,) [s].
         constant_s: tau, shape (6,) [s].
-        state: before the first row.
     """
     error = np.empty_like(length_mm)
     clock = np.array([state.rows, state.time_s, state.step_s])

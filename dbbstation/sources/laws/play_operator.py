@@ -51,7 +51,6 @@ def followed(
     Args:
         travel: x, in time order, shape (n, m).
         width: w, not negative, shape (m,).
-        state: before the first row.
 
     Returns:
         Lag y - x and its derivative by the width, shapes (n, m), and the state behind the last row.

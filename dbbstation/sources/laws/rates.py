@@ -23,7 +23,6 @@ def driven_in_time(
 
     Args:
         motion: a path with times, in time order.
-        machine: nominal.
 
     Returns:
         Times, shape (m,) [s], lengths then, shape (m, 6) [mm], and for each row of the motion its place among them,

@@ -43,8 +43,6 @@ def warm_up_parameters(growth: Parameter, pause_loss: str, usual_s: float) -> tu
 
     Args:
         growth: what is still to grow at the first sample.
-        pause_loss: name of what a pause takes back; its unit is that of the growth.
-        usual_s: usual time constant [s].
     """
     meaning = "what a pause without end would take back; pauses count from ten minutes on"
     return (
@@ -60,7 +58,6 @@ def grown(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Growth at every sample, shape (n,), in the unit of its parameters.
 
     Args:
-        motion: with times.
         values: of `warm_up_parameters`, shape (3,).
     """
     growth, constant_s, loss = values
@@ -84,7 +81,6 @@ def warmed(time_s: NDArray[np.float64], constant_s: float) -> NDArray[np.float64
 
     Args:
         time_s: since the heat came, shape (n,) [s].
-        constant_s: tau [s].
     """
     since = np.maximum(time_s, 0.0)
     if constant_s <= 0.0:

@@ -58,8 +58,6 @@ def stated_tensions(source: str, machine: Machine, frames: Frames, struts: Strut
     Args:
         source: who asks, for the message.
         machine: with masses, and with strut masses where these count.
-        frames: of the platform.
-        struts: at these frames.
 
     Raises:
         ModelError: the machine file has no masses.
@@ -77,7 +75,6 @@ def stated_loads(source: str, machine: Machine, frames: Frames, hexapod: Hexapod
     Args:
         source: who asks, for the message.
         machine: with masses, and with strut masses where these count.
-        frames: of the platform.
         hexapod: joints, nominal or actual.
 
     Raises:

@@ -56,8 +56,6 @@ def samples_of(
     """Return the rows of a run that have a reading, and what is to be said of the others.
 
     Args:
-        table: the file.
-        rows: of the run.
         mapping: what columns mean.
         faults: grows by cells that are neither a number nor say that there is none, with line and column.
     """
@@ -95,9 +93,6 @@ def held_over_gaps(
     """Return the numbers of a slow column, such as a temperature, each gap with the reading before it; of a first gap, behind it.
 
     Args:
-        table: the file.
-        rows: of the run.
-        name: of the column.
         faults: grows, as of `samples_of`.
     """
     numbers = table.table.values[name][rows]

@@ -66,7 +66,6 @@ class Moment:
     """When something was taken.
 
     Attributes:
-        at: with its zone.
         assumed: what the text did not say and was taken for granted, in words; empty where it said all.
     """
 
@@ -139,7 +138,6 @@ def moment_above(comments: Mapping[str, str], zone: tzinfo | None) -> tuple[str,
 
     Args:
         comments: by key in small letters.
-        zone: as of `moment_in`.
 
     Raises:
         UnclearMomentError: there is such a line, and it cannot be understood.
@@ -162,7 +160,6 @@ def moment_in_name(stem: str, zone: tzinfo | None) -> Moment | None:
 
     Args:
         stem: name without its ending.
-        zone: as of `moment_in`.
     """
     found = _IN_A_NAME.search(stem)
     if found is None:

@@ -26,7 +26,6 @@ class RunName:
 
     Attributes:
         test: of the plan; empty where not said.
-        direction: None where not said.
         repeat: None: the next.
     """
 
@@ -55,7 +54,6 @@ def run_name(text: str, known: Sequence[str]) -> RunName | None:
     """Return which run `a`, `a-ccw` or `a-ccw-2` is; None where it is none.
 
     Args:
-        text: as typed.
         known: tests of the plan, whose names may have hyphens.
     """
     test = max((name for name in known if text == name or text.startswith(f"{name}-")), key=len, default=None)

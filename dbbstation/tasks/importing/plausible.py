@@ -41,7 +41,6 @@ class Implausible:
 
     Attributes:
         what: is wrong, in words.
-        means: column that it is about.
         others: meanings with units that would be plausible, such as `deviation:mm`.
     """
 
@@ -58,9 +57,7 @@ def unlike_a_bar(
     Args:
         numbers: as the file has them, shape (n,).
         means: `length` or `deviation`.
-        unit: that they are said to be in.
         zero_mm: length at which a deviation is 0 [mm].
-        circle: of the run.
         feed_in_mm: that the readings span too [mm]; None of a turn alone.
     """
     least_mm = LEAST_RANGE_MM if feed_in_mm is None else max(LEAST_RANGE_MM, 0.5 * feed_in_mm)
@@ -91,7 +88,6 @@ def unlike_a_turn(theta_deg: NDArray[np.float64], unit: str) -> Implausible | No
 
     Args:
         theta_deg: in degrees, as the unit says, in order of time, shape (n,).
-        unit: that they are said to be in.
     """
     span = float(np.ptp(theta_deg)) / UNITS[ANGLE][unit]
     turns = [
@@ -112,8 +108,6 @@ def unlike_the_feed(
     Args:
         t_s: in seconds, as the unit says, shape (n,).
         theta_deg: in order of time, shape (n,) [deg].
-        unit: that they are said to be in.
-        circle: of the run.
     """
     turned = float(np.sum(np.abs(np.diff(np.unwrap(theta_deg, period=FULL_TURN_DEG)))))
     took = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
@@ -145,10 +139,7 @@ def check_units(
 
     Args:
         mapping: what columns mean, with their units.
-        table: the file.
-        rows: of the run.
         values: numbers of the run by meaning, in units of run files, shape (n,).
-        circle: of the run.
 
     Raises:
         UnusableTravelError: with the units that would.

@@ -161,7 +161,6 @@ class Proposed:
     """What a column probably is.
 
     Attributes:
-        means: one of `MEANINGS`.
         unit: of its numbers; empty where the name does not tell it and where there is none.
     """
 
@@ -178,7 +177,6 @@ def proposed(names: Sequence[str], units: Mapping[str, str]) -> dict[str, Propos
     """Return what columns probably are, by name; no two are the same thing, and what cannot be told is ignored.
 
     Args:
-        names: of the columns.
         units: what stands below the names, by name.
     """
     found: dict[str, Proposed] = {}

@@ -60,9 +60,6 @@ class ImportedRun:
     """A run as it will be written.
 
     Attributes:
-        file: that it comes from.
-        run: what is written.
-        circle: as the plan has it.
         computed: what the file did not say and was computed, in words.
     """
 
@@ -83,10 +80,8 @@ class Reader:
 
     Args:
         mapping: what the columns mean.
-        plan: whose circles were run.
         started: when the first run of a file was taken, by the file, where somebody says so.
         trusted: what is taken although it does not look like what it is said to be: `unit`.
-        faults: grows.
         left_out: grows: runs that are not taken, and why.
     """
 
@@ -102,7 +97,6 @@ class Reader:
         """Return the runs of a table.
 
         Args:
-            table: one file.
             told: which runs it has where its rows do not say that, in order; one for all where it is a test alone.
         """
         file = table.table.file
@@ -413,7 +407,6 @@ def chance_of_runs(runs: Sequence[ImportedRun], plan: Plan) -> float | None:
 
     Args:
         runs: as they will be written; those without angles are not looked at.
-        plan: whose circles they are.
     """
     centres: dict[tuple[str, int | None], list[NDArray[np.float64]]] = {}
     for one in runs:

@@ -39,8 +39,6 @@ def originals(
 
     Args:
         tables: bytes of the files as they came.
-        mapping: that they were read by.
-        provenance: of the session.
         statements: what was computed and assumed.
     """
     names: dict[str, bytes] = {}
@@ -70,11 +68,7 @@ def staged(
     """Write a session beside its place, read it as every command does and cut every accepted run; give what puts it in its place.
 
     Args:
-        folder: of the session.
-        machine: nominal.
-        plan: as run.
         runs: in order.
-        details: what the session notes.
         more: further files by path in its folder.
         dry: it is never put in its place: it is written where the system keeps what is temporary.
 

@@ -35,7 +35,6 @@ def parts_by_gaps(t_s: NDArray[np.float64] | None, lines: NDArray[np.int64], pau
     Args:
         t_s: times, shape (n,) [s]; None where the file has none.
         lines: number of the line of each row, shape (n,).
-        pause_s: as `longest_pause_s` has it.
     """
     begins = np.diff(lines) > 1
     if t_s is not None:

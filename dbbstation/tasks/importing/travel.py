@@ -31,12 +31,7 @@ UNLIKE_SPAN_DEG = 2.0
 
 
 class UnusableTravelError(Exception):
-    """Times or angles that no run can have.
-
-    Args:
-        what: is wrong.
-        remedy: what to do.
-    """
+    """Times or angles that no run can have."""
 
     def __init__(self, what: str, remedy: str) -> None:
         self.what, self.remedy = what, remedy
@@ -71,7 +66,6 @@ def machine_angles(angle_deg: NDArray[np.float64], said: AngleSchema, circle: Ci
     Args:
         angle_deg: as the file has them, shape (n,) [deg].
         said: where their 0 lies and how they grow.
-        circle: of the run.
 
     Raises:
         UnusableTravelError: they turn against the direction of the run.
@@ -92,7 +86,6 @@ def unplanned_span_deg(theta_deg: NDArray[np.float64], circle: Circle) -> float 
 
     Args:
         theta_deg: angles in the machine, in order of time, shape (n,) [deg].
-        circle: of the run.
     """
     travelled = _unwrapped(theta_deg)
     spacing = float(np.median(np.abs(np.diff(travelled)))) if len(travelled) > 1 else 0.0
@@ -111,7 +104,6 @@ def check_span(theta_deg: NDArray[np.float64], stated_deg: float | None, circle:
     Args:
         theta_deg: angles in the machine, in order of time, shape (n,) [deg].
         stated_deg: span that somebody confirmed [deg]; None where nobody did.
-        circle: of the run.
 
     Raises:
         UnusableTravelError: a span that is not the plan's and that nobody confirmed.
@@ -136,7 +128,6 @@ def travel(
     Args:
         t_s: times of the file, shape (n,) [s]; None where it has none.
         theta_deg: angles in the machine, shape (n,) [deg]; None where it has none.
-        circle: of the run.
         trace: of a run without angles: `whole` or `turn`.
 
     Raises:

@@ -66,9 +66,7 @@ def plan_sensitivity(
     """Sensitivity of every circle's reading to the parameters of sources, at the nominal geometry.
 
     Args:
-        machine: nominal machine.
         plan: circles; one direction of each is looked at, since geometry does not know directions.
-        sources: whose parameters are the columns.
         centred: remove each circle's centre, as the standard circular test does.
 
     Raises:

@@ -87,7 +87,6 @@ def run(text: str, *, mm_s2: float = 1000.0, faster: int = 1, patience_s: float 
         text: the program; its first move names X, Y, Z, A, B and C.
         mm_s2: acceleration of X, Y and Z [mm/s²].
         faster: how many times as fast as usual the clock runs; halved as long as the interpreter falls behind.
-        patience_s: how long to wait for its end.
 
     Raises:
         RuntimeError: LinuxCNC refuses the program or does not end.

@@ -131,7 +131,6 @@ def _write_truth(path: Path, machine_file: Path, seed: int) -> None:
 
 
 def _write_plan(path: Path, whole: InlinePlan, names: Collection[str]) -> Path:
-    """Write a plan of some of the tests of another one."""
     tests = tuple(test for test in whole.plan.tests if test.name in names)
     write_text(path, plan_text(replace(whole, plan=whole.plan.model_copy(update={"tests": tests}))))
     return path
@@ -227,7 +226,6 @@ def _side_by_side(before: DemoEvaluation, after: DemoEvaluation) -> tuple[DemoCi
 
 
 def _measured(run: DemoRun) -> MeasuredBeforeAfter:
-    """Measured figures of a run."""
     of = run.measured
     return MeasuredBeforeAfter(
         of.centre_deviation_um, of.mean_radial_error_um, of.circularity_um, run.circularity_30_upr_um.measured

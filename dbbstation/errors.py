@@ -92,7 +92,6 @@ class StationError(Exception):
         return _as_it_was, (type(self), self.args, self.__dict__)
 
     def __str__(self) -> str:
-        """Return `where: what; remedy` on one line."""
         text = f"{self.where}: {self.what}" if self.where else self.what
         return f"{text}; {self.remedy}" if self.remedy else text
 

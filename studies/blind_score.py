@@ -284,7 +284,6 @@ def _hanging_together(declared: Mapping[str, Sequence[str]]) -> list[frozenset[s
 
 
 def _declared_closely(name: str, declared: Mapping[str, Sequence[str]], groups: Sequence[frozenset[str]]) -> bool:
-    """Whether a name is in an ambiguity of few."""
     own = name in declared and len(declared[name]) < MOST_DECLARED
     return own or any(name in group and len(group) <= MOST_DECLARED for group in groups)
 

@@ -215,7 +215,6 @@ def _setup(known: KnownBar, seed: int) -> tuple[Mechanism, ...]:
 
 
 def _state(session: Path, known: KnownBar) -> None:
-    """Write what is known of the bar into a session file."""
     if known is KnownBar.CALIBRATED:
         return
     yaml = YAML(pure=True)  # that keeps all else as it was written

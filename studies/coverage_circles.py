@@ -137,7 +137,6 @@ def coverage_of_circles(
 
 
 def _numbered(cells: Sequence[Cell], seed: int, number: int) -> list[tuple[str, bool]]:
-    """One draw by its number: noises take turns with each seed."""
     return _drawn(cells[number % len(cells)], seed + number // len(cells))
 
 

@@ -81,7 +81,6 @@ def _rows(kind: str, values: Sequence[Values]) -> list[Row]:
 
 
 def _numbered(kinds: Sequence[str], seed: int, number: int) -> dict[str, Any]:
-    """One draw by its number: noises take turns with each seed."""
     return drawn_values(kinds[number % len(kinds)], seed + number // len(kinds))
 
 

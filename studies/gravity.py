@@ -268,7 +268,6 @@ def _joint_compliance(
 
 
 def _both_directions(figures_um: Sequence[tuple[str, float]]) -> dict[str, float]:
-    """Mean over the runs of each test."""
     names = dict.fromkeys(name for name, _ in figures_um)
     return {name: float(np.mean([value for of, value in figures_um if of == name])) for name in names}
 

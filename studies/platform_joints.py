@@ -100,7 +100,6 @@ def platform_joints(
 
 
 def _within(head: str, progress: Callable[[str], None]) -> Callable[[str], None]:
-    """Tell stages with what they are stages of."""
     return lambda text: progress(f"{head}: {text}")
 
 
@@ -155,7 +154,6 @@ def _apart_um(model: MachineModel, truth: MachineModel) -> float:
 
 
 def _planned(plan: Plan, proposed: Sequence[NextTest], round_number: int) -> dict[str, PlannedTest]:
-    """Proposed circles as tests about the balls of the plan."""
     tests = {}
     for k, test in enumerate(proposed):
         place = tuple(test.circle[f"{axis}_mm"] for axis in "xyz")

@@ -38,17 +38,14 @@ class Assertion:
 
     @property
     def line(self) -> tuple[str, str]:
-        """What has to stay: the text, in its tier."""
         return self.tier, self.text
 
 
 def of_checkout() -> dict[str, str]:
-    """Test files of this checkout by their path."""
     return {str(path.relative_to(ROOT)): path.read_text() for path in sorted((ROOT / "tests").rglob("*.py"))}
 
 
 def of_commit(commit: str) -> dict[str, str]:
-    """Test files of a commit by their path."""
     packed = subprocess.run(["git", "archive", commit, "tests"], cwd=ROOT, capture_output=True, check=True).stdout  # noqa: S607
     with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
         return {
@@ -59,7 +56,6 @@ def of_commit(commit: str) -> dict[str, str]:
 
 
 def assertions(files: dict[str, str]) -> list[Assertion]:
-    """All assertions and cases of test files, in their order."""
     return [one for path, text in files.items() for one in _of_file(path, ast.parse(text))]
 
 
@@ -142,7 +138,6 @@ def lost(before: list[Assertion], now: list[Assertion]) -> list[dict[str, object
 
 
 def counted(every: list[Assertion]) -> dict[str, dict[str, int]]:
-    """How many there are of each kind in each tier."""
     counts: dict[str, dict[str, int]] = defaultdict(dict)
     for (tier, kind), count in sorted(Counter((one.tier, one.kind) for one in every).items()):
         counts[tier][kind] = count
@@ -150,7 +145,6 @@ def counted(every: list[Assertion]) -> dict[str, dict[str, int]]:
 
 
 def main() -> None:
-    """Compare and print, or write."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("commit")
     options.add_argument("--out", type=Path)

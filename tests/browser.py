@@ -23,7 +23,6 @@ DESKTOP, PHONE = (1280, 800), (390, 844)
 
 
 def chromium() -> str | None:
-    """The browser on the PATH, if there is one and this system can hand pipes to it."""
     return shutil.which("chromium") if hasattr(os, "posix_spawn") else None
 
 
@@ -92,7 +91,6 @@ class Browser:
         self._folder.cleanup()
 
     def do(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """Carry out a command of the protocol and return its answer."""
         self._number += 1
         message = {"id": self._number, "method": method, "params": parameters}
         if self._session:
@@ -107,7 +105,6 @@ class Browser:
                 return answer["result"]
 
     def open(self, page: Path, size: tuple[int, int] = DESKTOP, *, dark: bool = False, paper: bool = False) -> None:
-        """Load a page and wait until it stands."""
         width, height = size
         self.do(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=size == PHONE
@@ -121,13 +118,11 @@ class Browser:
             self._received()
 
     def run(self, script: str) -> Any:
-        """Return the value of an expression in the page, or of what it promises."""
         answer = self.do("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 
     def press(self, key: str) -> None:
-        """Press and release a key."""
         codes = {"Tab": 9, "Enter": 13, "ArrowRight": 39}
         text = {"text": "\r"} if key == "Enter" else {}
         for kind in ("keyDown", "keyUp"):

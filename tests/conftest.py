@@ -62,7 +62,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(scope="session")
 def recordings() -> Path:
-    """The folder of recordings that this project did not make."""
     folder = os.environ.get("DBBSTATION_RECORDINGS")
     if not folder:
         pytest.skip("DBBSTATION_RECORDINGS is not set: no recordings made elsewhere to test on")

@@ -143,7 +143,6 @@ def sampled(count: int, seed: int, *, core: bool) -> list[Mutant]:
 
 
 def changeable() -> list[Mutant]:
-    """Every mutant of the package, in the order of its files."""
     every = []
     for path in sorted((ROOT / PACKAGE).rglob("*.py")):
         tree = ast.parse(path.read_text())
@@ -157,7 +156,6 @@ def changeable() -> list[Mutant]:
 
 
 def tests_of(file: str) -> list[str]:
-    """Folders of tests that mirror the folder of a file; those of the commands for files without one."""
     folder = Path(file).parent
     while str(folder) != "." and not (ROOT / "tests" / folder).is_dir():
         folder = folder.parent
@@ -178,7 +176,6 @@ def near(mutant: Mutant) -> list[str]:
 
 
 def record(out: Path, workplace: Path) -> None:
-    """Record which tests of the default and the slow tier run each line."""
     settings = workplace / "coverage.ini"
     settings.write_text(f"[run]\nrelative_files = true\ndata_file = {out.resolve()}.part\n")
     options = [f"--cov={PACKAGE}", "--cov-context=test", "--cov-report=", f"--cov-config={settings}"]
@@ -214,7 +211,6 @@ def shown(mutants: list[Mutant], out: Path, workplace: Path) -> dict[Mutant, lis
 
 
 def killed_by(mutant: Mutant, tests: list[str], tiers: list[str], workplace: Path) -> str:
-    """First tier whose tests fail with a mutant, or `survived`."""
     path = workplace / PACKAGE / mutant.file
     original = path.read_text()
     tree = ast.parse(original)
@@ -232,7 +228,6 @@ def killed_by(mutant: Mutant, tests: list[str], tiers: list[str], workplace: Pat
 
 
 def _fails(tests: list[str], tier: str, workplace: Path) -> bool:
-    """Whether a test of the tier fails; no test there is no failure."""
     named = workplace / "tests.txt"
     named.write_text("\n".join(tests))
     return _run_tests(["-x", "-p", "no:cacheprovider", "-m", tier, f"@{named}"], workplace) not in {
@@ -263,7 +258,6 @@ def _run_tests(options: list[str], workplace: Path, longest_s: float = LONGEST_S
 
 
 def main() -> None:
-    """Run what the file has not, and print the table."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--count", type=int, default=300)
     options.add_argument("--seed", type=int, default=1)

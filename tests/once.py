@@ -25,7 +25,6 @@ TELLING = {"progress", "stop", "say"}
 
 
 def of_the_run(factory: pytest.TempPathFactory) -> Path:
-    """A folder that all workers of this run share."""
     base = factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "once"
     folder.mkdir(exist_ok=True)
@@ -34,14 +33,12 @@ def of_the_run(factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def alone(place: Path) -> Iterator[None]:
-    """Let one worker at a time make what stands at a place."""
     with place.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
 
 def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
-    """Return the folder of this name, made by the first who asks; nobody may write into it."""
     folder = of_the_run(factory) / name
     with alone(folder):
         if not folder.exists():

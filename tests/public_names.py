@@ -22,7 +22,6 @@ COUNT = "lines of the changelog that begin with `- Python:`: "
 
 
 def lines_told():
-    """How many lines of the changelog speak of the public names."""
     return sum(line.startswith(TOLD) for line in CHANGELOG.read_text(encoding="utf-8").splitlines())
 
 
@@ -54,13 +53,11 @@ def _parameter(one):
 
 
 def kept():
-    """Count of lines of the changelog, and the signatures, as they were kept."""
     first, _, rest = KEPT.read_text(encoding="utf-8").partition("\n")
     return int(first.removeprefix(COUNT)), rest
 
 
 def main():
-    """Keep the signatures, where the changelog tells of their change."""
     if KEPT.exists():
         count, before = kept()
         if before != signatures() and lines_told() <= count:

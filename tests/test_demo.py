@@ -89,7 +89,6 @@ def _from_python(folder, result):
 
 
 def same(one, other):
-    """Whether two JSON values are the same, numbers but for rounding."""
     if isinstance(one, dict):
         return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
     if isinstance(one, list):

@@ -31,7 +31,6 @@ MOST_SUBSCRIPTS = 8
 
 @pytest.fixture(scope="module")
 def trees():
-    """Every file of the package, parsed, by its path."""
     return {path.relative_to(PACKAGE): ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
 
 
@@ -96,7 +95,6 @@ def test_nobody_but_the_demonstration_starts_the_command_line(trees):
 
 
 def counts():
-    """Return every count by what it counts."""
     found = {path.relative_to(PACKAGE): ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
     return {
         "public classes with a name that another has": sum(len(one) > 1 for one in public_classes(found).values()),

@@ -137,7 +137,6 @@ def check(
 
 
 def _hold_against(results: Sequence[Checked], anchor: str | None) -> None:
-    """Say of every session what an anchor says of it."""
     from dbbstation.files.recordings.anchors import anchor_told
 
     for result in results:
@@ -162,7 +161,6 @@ def _result(
 
 
 def _file(result: Checked) -> CheckedFile:
-    """Return what was found in a file; of a session also the findings of its runs."""
     from dbbstation.results.checked import CheckedFile, CheckedRun
 
     runs = tuple(CheckedRun(one.run.label, tuple(one.findings)) for one in result.judgements)

@@ -178,7 +178,6 @@ def _print(result: CirclesResult, *, several: bool) -> None:
 
 
 def _figure(run: CircleFiguresResult | PairFigures, name: str, value: float) -> tuple[str, str]:
-    """Return a figure and its U as they are printed."""
     from dbbstation.cli.output import COVERAGE_FACTOR
     from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
 
@@ -186,7 +185,6 @@ def _figure(run: CircleFiguresResult | PairFigures, name: str, value: float) -> 
 
 
 def _print_why_not(runs: Sequence[CircleFiguresResult | PairFigures]) -> None:
-    """Say which figures have no U, and why."""
     of: dict[str, dict[str, None]] = {}
     for run in runs:
         for figure, budget in run.uncertainty.items():
@@ -197,7 +195,6 @@ def _print_why_not(runs: Sequence[CircleFiguresResult | PairFigures]) -> None:
 
 
 def _with_budgets(result: CirclesResult) -> list[CircleFiguresResult | PairFigures]:
-    """Return circles and pairs that have figures."""
     from dbbstation.results.circle_figures import RunWithoutCircle
 
     return [*(run for run in result.runs if not isinstance(run, RunWithoutCircle)), *result.pairs]

@@ -137,6 +137,5 @@ def _sizes(run: DemoCircle) -> tuple[tuple[float, float], ...]:
 
 
 def _means(runs: Sequence[DemoCircle]) -> list[float]:
-    """Mean size of each column."""
     columns = zip(*([abs(size) for sizes in _sizes(run) for size in sizes] for run in runs), strict=True)
     return [sum(column) / len(column) for column in columns]

@@ -155,7 +155,6 @@ def _print_rest(result: DriveResult) -> None:
 
 
 def _print_if_worse(held: HeldOutForce | None) -> None:
-    """Say first of all that the model does not predict, where it does not."""
     if held and held.worse:
         echo(
             f"Everything found predicts held-out parts worse than mass and friction alone: {held.corrected:.3g} N rms against "

@@ -160,7 +160,6 @@ def _truth(machine: Machine, file: Path | None, source_files: tuple[Path, ...], 
 
 
 def _programs(folder: Path) -> Callable[[str], CommandedPath]:
-    """Return what turns the name of a program in a folder into what it commands."""
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.gateway import content_of
     from dbbstation.station.programs import read_toolpath

@@ -159,7 +159,6 @@ def fleet(
 
 
 def _refuse_options_of_others(task: str) -> None:
-    """Refuse options that the task does not take, rather than pass over them."""
     context = click.get_current_context()
     for option in context.command.params:
         name = option.name or ""

@@ -150,7 +150,6 @@ def _row(one: QuantityHistory, k: float) -> list[object]:
 
 
 def _pair(value: float | None, u: float | None, k: float) -> tuple[str, str]:
-    """Return a value and its U."""
     from dbbstation.report.history_words import rounded
 
     return rounded(value, u, k), rounded(None if u is None else k * u, u, k)

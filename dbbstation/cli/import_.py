@@ -163,7 +163,6 @@ def _read(
     said: _Told,
     noted: SessionOptions,
 ) -> _Import:
-    """Read everything, and ask for what is missing."""
     from dataclasses import replace
     from datetime import UTC, datetime
 
@@ -230,7 +229,6 @@ def _result(found: _Import, out: Path, *, written: bool) -> ImportResult:
 
 
 def _with_conditions(asker: Asker, told: SessionOptions, not_known: Sequence[str]) -> SessionOptions:
-    """Ask for conditions that neither option nor settings state."""
     from dataclasses import replace
 
     if told.ambient_temp_c is None and "temperature" not in not_known:
@@ -262,7 +260,6 @@ def _or(option: str, condition: str) -> str:
 
 
 def _told(files: Sequence[Path], named: Sequence[str], plan: Plan) -> dict[Path, list[RunName]]:
-    """Which runs each file has, as `--run` says."""
     from dbbstation.tasks.importing.names import run_name
 
     found: dict[Path, list[RunName]] = {}
@@ -281,7 +278,6 @@ def _told(files: Sequence[Path], named: Sequence[str], plan: Plan) -> dict[Path,
 
 
 def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) -> RunName:
-    """Which run a file is; asked for where neither its rows nor its name say it."""
     from dbbstation.tasks.importing.names import RunName, run_name
 
     if not asker.terminal or reader.says_test(table):
@@ -297,7 +293,6 @@ def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) ->
 
 
 def _started(files: Sequence[Path], said: Sequence[str], zone: str | None) -> dict[str, datetime]:
-    """When the first run of each file was taken, as `--started` says."""
     from dbbstation.tasks.importing.moments import UnclearMomentError, moment_in, zone_named
 
     found: dict[str, datetime] = {}

@@ -182,7 +182,6 @@ def _undisturbing(kind: type[_Kind]) -> type[_Kind]:
 
 
 def _usual_place() -> Path:
-    """The user's folder for logs."""
     import platformdirs
 
     return platformdirs.user_log_path("dbbstation", appauthor=False) / FILE

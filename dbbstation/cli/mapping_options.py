@@ -224,7 +224,6 @@ def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, aske
 
 
 def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
-    """What columns are: as the options say, else as their names do."""
     from dbbstation.tasks.importing.proposal import Proposed, proposed, stated
 
     told: dict[str, Proposed] = {}

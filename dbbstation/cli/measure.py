@@ -126,7 +126,6 @@ class MeasureOptions:
 
 
 def _measured(asked: MeasureOptions) -> None:
-    """Measure the plan."""
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.recordings.entries import ReadBy

@@ -66,7 +66,6 @@ class Talk:
         self._centre = _OF_MACHINE
 
     def __call__(self, event: events.Event) -> None:
-        """Say what the event means."""
         if isinstance(event, events.RunAnnounced):
             self._centre = _OF_MACHINE if event.ball.place_known else _OF_SET_UP
         if isinstance(event, events.RunProgress):
@@ -92,7 +91,6 @@ class Log:
     """Logs what happens; an observer of the station."""
 
     def __call__(self, event: events.Event) -> None:
-        """Log what the event means, line by line."""
         for line in _lines(event, _OF_MACHINE):
             log_said(line.strip())
         if isinstance(event, events.Fault):
@@ -168,7 +166,6 @@ class Keyboard:
         self._thread.start()
 
     def __call__(self, event: events.Event) -> None:
-        """Remember the state."""
         if isinstance(event, events.StateChanged):
             self._state = event.state
         elif isinstance(event, events.RunCompleted):
@@ -197,7 +194,6 @@ class Keyboard:
 
 
 def _command_of(line: str) -> Command | None:
-    """Return what a line says; a test is named as the plan has it."""
     word, _, rest = line.partition(" ")
     if word.lower() == "g" and rest.strip():
         return GoTo(rest.strip())
@@ -217,7 +213,6 @@ def _temperature(text: str) -> AddNote | None:
 
 
 def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: PLR0911 - a line per event, nothing nested
-    """Return what there is to say of an event; `centre` is whose error the centre of a circle is."""
     match event:
         case events.RunAnnounced():
             head = f"{event.number} of {event.count}: test {event.run.test} {event.run.direction}"
@@ -251,7 +246,6 @@ def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: PLR0911 - a 
 
 
 def _word_of(completed: events.RunCompleted) -> str:
-    """The run in one word, with what comes first of what caused it."""
     found = completed.answer
     if found.unseen:
         return f"{found.word}: {', '.join(found.unseen)}"

@@ -147,7 +147,6 @@ def _print(result: SimulatorResult) -> None:
 
 
 def _print_whether(result: SimulatorResult) -> None:
-    """Is there a mismatch, how large, beside which noise."""
     from dbbstation.report.levels_text import level_sentences
 
     unit, rms, held_out = result.unit, result.rms, result.held_out_rms

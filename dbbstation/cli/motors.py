@@ -57,7 +57,6 @@ def print_currents(currents: CurrentsFigures | None) -> None:
 
 
 def _with_uncertainty(number: Value | None, digits: int) -> tuple[str, str]:
-    """Return value and uncertainty as text, the uncertainty with two digits."""
     if number is None:
         return NOT_TOLD, NOT_TOLD
     return f"{number.value:.{digits}f}", f"{number.uncertainty:.2g}"

@@ -101,7 +101,6 @@ class ProgressBar:
 
 
 def _rich(form: str, *, passing: bool) -> Progress:
-    """Return Rich's progress with the columns of a form."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
     from rich.table import Column
@@ -130,7 +129,6 @@ class Compiling:
         self._said = False
 
     def __call__(self, begun: bool) -> None:  # noqa: FBT001 - as the compiler tells it
-        """Take that a loop begins to be compiled, or that it is."""
         if not begun:
             self._bar.end()
             return

@@ -305,7 +305,6 @@ def _name(run: RunEntry) -> str:
 
 
 def _tell(name: str, run: RunEntry, *, as_json: bool) -> None:
-    """Say what has become of a run."""
     from dbbstation.cli.output import print_json
 
     if as_json:

@@ -74,7 +74,6 @@ def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[
 
 
 def _details(told: SourceDescription) -> list[str]:
-    """The same as lines."""
     titles = {
         "what": "What it is",
         "shows": "How it shows",
@@ -108,5 +107,4 @@ def _wrapped(text: str, hanging: str = "") -> list[str]:
 
 
 def _first(text: str) -> str:
-    """First sentence, or the part of it before a colon."""
     return text.split(": ", maxsplit=1)[0].split(". ", maxsplit=1)[0].rstrip(".")

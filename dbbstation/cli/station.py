@@ -263,7 +263,6 @@ def _operate(path: Path, model: IdentifiedModel | None) -> int:
 def _line(
     instrument: str | None, profile: str | None, port: str | None, baud: int | None, zero_mm: float | None
 ) -> Line:
-    """Return what options and settings say of instrument and port."""
     from dbbstation.service.memory import Line
 
     return Line(instrument=instrument or "", profile=profile or "", port=port or "", baud=baud, zero_mm=zero_mm)
@@ -300,7 +299,6 @@ def _given(line: Line, spy: Path | None, sequence: tuple[str, str], noted: Sessi
 
 
 def _limits(largest_loss_percent: float | None, largest_bar_age_h: float | None) -> Limits:
-    """Return what the shop allows."""
     from dbbstation.service.choice import Limits
     from dbbstation.station.bar_known import USUAL_AGE_H
 

@@ -106,7 +106,6 @@ class Kept:
         self._open(begin_anew=begin_anew)
 
     def __enter__(self) -> Self:
-        """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -61,7 +61,6 @@ def _dated(session: SessionFigures) -> float:
 
 
 def _out_of_order(values: Sequence[float]) -> list[int]:
-    """Return which values are not on the longest run of values that do not fall."""
     tails: list[float] = []
     ends: list[int] = []
     before: list[int | None] = []

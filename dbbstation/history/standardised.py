@@ -126,7 +126,6 @@ def standardised(
 def _normal(
     residual: NDArray[np.float64], scatter: NDArray[np.float64], freedom: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Return the normal numbers of the same probability as Student's t of residuals over their scatter."""
     # Values that are all alike have no scatter: the smallest departure is then beyond it, and none is none.
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(residual == 0.0, 0.0, residual / scatter)

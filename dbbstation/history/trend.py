@@ -233,7 +233,6 @@ def _labels(subjects: Sequence[Subject]) -> dict[Subject, str]:
 
 
 def _apart(subject: Subject) -> str:
-    """Return what tells a quantity from another of the same name."""
     if not subject.is_parameter:
         return subject.of
     return f"beside {', '.join(subject.beside)}" if subject.beside else "alone"

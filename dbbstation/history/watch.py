@@ -293,7 +293,6 @@ class _Stretch:
         return TrendEvent(verdict, int(self.at[since]), int(self.at[k]), difference, u_both, bool(self.of.by_stated[k]))
 
     def _stated(self, event: TrendEvent) -> float:
-        """Standard uncertainty of an event's difference by the stated ones alone."""
         since = int(np.searchsorted(self.at, event.since))
         return event.u_difference / self._spread(since)
 
@@ -302,6 +301,5 @@ class _Stretch:
 
 
 def _mean(values: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the weighted mean and its standard uncertainty by the stated ones."""
     weight = 1.0 / u**2
     return float(np.average(values, weights=weight)), float(1.0 / np.sqrt(weight.sum()))

@@ -197,7 +197,6 @@ class Decoder:
         return min((place for place in places if place >= 0), default=max(after, end))
 
     def _frame_at(self, start: int) -> Piece | NotUnderstood | None:
-        """Return the frame that begins there; what is wrong with it where only its checksum or a number is."""
         wrong: NotUnderstood | None = None
         for frame in self._protocol.frames:
             match = frame.pattern.match(self._pending, start)

@@ -37,7 +37,6 @@ def known_instruments() -> list[str]:
 
 
 def _files() -> dict[str, Path]:
-    """The file of each known instrument, by name."""
     faults: list[Problem] = []
     files = {path.stem: path for path in instruments_folder().glob("*.yaml")}
     whose = dict.fromkeys(files, "dbbstation itself")

@@ -162,7 +162,6 @@ class Poller:
             self._to.tally.reject(raw, "bytes")
 
     def _answer(self, protocol: Protocol) -> PolledReply:
-        """Wait for a reply in a protocol's frames."""
         decoder = Decoder(protocol, joining=False)
         deadline_s = time.monotonic() + self._to.timeout_s
         first_s, came = 0.0, b""

@@ -43,7 +43,6 @@ struts hold nothing; a pose just above the limit is useless as well, but it has 
 
 @inlined
 def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
-    """Cross product a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
@@ -233,7 +232,6 @@ def _newton(
     sound: NDArray[np.float64],
     state: NDArray[np.int64],
 ) -> None:
-    """Step that takes the residual away to first order, with the matrix given or what is left of the one before."""
     if not reuse:
         _orthogonalise(matrix, triangle, sound)
         for lane in range(LANES):

@@ -60,7 +60,6 @@ def _limited_quantities(
     machine: Machine,
     poses: NDArray[np.float64],
 ) -> list[tuple[str, str, NDArray[np.float64], float, float]]:
-    """Name, unit, value per pose and limits of everything that has limits."""
     travel = machine.travel
     radius = np.hypot(poses[:, 0], poses[:, 1])
     struts = inverse(machine.hexapod, Frames.from_poses(poses, machine.hexapod.rotation))

@@ -147,7 +147,6 @@ def shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
 
 
 def _with_history(own: MachineModel, motion: Motion) -> tuple[Fitted, ...]:
-    """Sources with a history, those first whose errors build up."""
     there = (f for f in own.acting(motion) if f.source.has_history)
     return tuple(sorted(there, key=lambda fitted: not fitted.source.builds_up))
 
@@ -257,7 +256,6 @@ class _Stretch:
         return driven
 
     def _go_on(self, states: tuple[State, ...], driven: NDArray[np.float64], row: int) -> None:
-        """Go on before a row."""
         self._states = states
         if row:
             self._held_back = driven[row - 1] - self._smooth[row - 1]
@@ -325,7 +323,6 @@ class _Stretch:
         return self._wanted.stretch(rows).commanded(forward(self._nominal, driven, near), self._own.machine)
 
     def _platform(self, effect: Effect, target: Frames) -> Frames:
-        """Where the platform has to be for the tool tip to be there."""
         if effect.tool_tip_mm is None:
             return target
         tip = np.broadcast_to(effect.tool_tip_mm, (len(target), 3))

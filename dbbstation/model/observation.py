@@ -105,7 +105,6 @@ class Motions:
     observations: Sequence[Observation]
 
     def __iter__(self) -> Iterator[Motion]:
-        """Yield the motion of each run."""
         return (observation.motion() for observation in self.observations)
 
 

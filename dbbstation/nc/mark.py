@@ -110,13 +110,11 @@ def _mark_many(numbers: NDArray[np.int64], free: NDArray[np.bool_], missing: NDA
 
 
 def _as_bits(axes: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Rows of six as one number each."""
     bits: NDArray[np.int64] = axes @ (1 << np.arange(6))
     return bits
 
 
 def _mark_few(numbers: NDArray[np.int64], free: NDArray[np.bool_], rows: NDArray[np.int64], bits: int) -> None:
-    """The same for a few rows, each with more bits, for which there are more steps."""
     steps = _steps(FARTHEST_ANGLE_OF_FEW, FARTHEST_ANGLE_OF_FEW)
     sums = _sums(steps)
     for row in rows:
@@ -127,7 +125,6 @@ def _mark_few(numbers: NDArray[np.int64], free: NDArray[np.bool_], rows: NDArray
 
 
 def _numbers(poses: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Poses in units of their last decimals."""
     numbers: NDArray[np.int64] = np.rint(poses * _SCALE).astype(np.int64)
     return numbers
 

@@ -84,7 +84,6 @@ def check_machine(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def _header(toolpath: Toolpath) -> Iterator[str]:
-    """Comments before the first move."""
     moves = np.flatnonzero(toolpath.is_move)
     first = int(moves[0]) if len(moves) else len(toolpath)
     return (text for row, text in toolpath.text.items() if row < first and toolpath.kind[row] == RowKind.COMMENT)

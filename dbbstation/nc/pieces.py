@@ -105,7 +105,6 @@ def _longest(
     may_end: NDArray[np.bool_],
     tolerance_mm: float,
 ) -> float:
-    """How long the shortest piece can be."""
     count = len(way)
     best = np.full(count, -1.0)
     best[0] = np.inf

@@ -63,7 +63,6 @@ def seconds(toolpath: Toolpath, planner: Planner, fastest_mm_min: float) -> floa
 
 
 def _rows(toolpath: Toolpath) -> NDArray[np.int64]:
-    """Rapids that move the tool tip."""
     return np.flatnonzero((toolpath.kind == RowKind.RAPID) & (toolpath.tip_mm > 0.0))
 
 

@@ -344,7 +344,6 @@ def _check_number(toolpath: Toolpath, cells: float) -> None:
 
 
 def _runs(number: NDArray[np.int64], chosen: NDArray[np.bool_]) -> Iterator[NDArray[np.int64]]:
-    """Numbers of the chosen cells of each move."""
     which = np.flatnonzero(chosen)
     if len(which):
         yield from np.split(which, np.flatnonzero(np.diff(number[which])) + 1)

@@ -169,7 +169,6 @@ def _read(dialect: Dialect, wrote: Toolpath) -> Toolpath:
 
 
 def _differences(wrote: Toolpath, read: Toolpath, tried: str) -> list[str]:
-    """The first row that was read otherwise."""
     one, other = list(_rows(wrote)), list(_rows(read))
     for row, (mine, yours) in enumerate(zip(one, other, strict=False)):
         if not mine.is_like(yours):

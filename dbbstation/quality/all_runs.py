@@ -154,7 +154,6 @@ def _other_direction(one: Seen, runs: Sequence[Seen]) -> Seen | None:
 
 
 def _run_as(one: Seen, other: Seen) -> Seen:
-    """A run as it would be judged if it were of the other direction."""
     return replace(one, run=replace(one.run, circle=other.run.circle, expected=other.run.expected))
 
 

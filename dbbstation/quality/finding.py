@@ -116,5 +116,4 @@ def stricter(one: Finding, other: Finding) -> Finding:
 
 
 def _share(finding: Finding) -> float:
-    """What a value has of its limit; nothing where one of both is missing."""
     return finding.value / finding.limit if finding.value is not None and finding.limit else 0.0

@@ -145,7 +145,6 @@ class SessionRuns:
         return self._without
 
     def _beside(self, one: Seen, analysis: CircleAnalysis) -> list[Finding]:
-        """What is found of a run by what is known of its circle and by the other runs."""
         others = self._others(one)
         both = together(one, others)
         by_others = expected_beside(both)
@@ -165,7 +164,6 @@ class SessionRuns:
 
     @cached_property
     def _of_all(self) -> tuple[Finding, Finding]:
-        """What all runs have in common."""
         by_model = any(one.run.usual is not None for one in self._runs)
         return programs_of_all(self._runs), bar_of_all(self._runs, by_model=by_model)
 
@@ -208,7 +206,6 @@ class SessionRuns:
         return max(found, key=nearness, default=None)
 
     def _earlier(self, one: Seen) -> Seen | None:
-        """Return the repeat before, in the same direction."""
         earlier = [
             other
             for other in self._of_test.get(one.run.test, ())

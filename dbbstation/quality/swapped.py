@@ -92,7 +92,6 @@ def _again_um2(other: Seen) -> NDArray[np.float64]:
 
 
 def _predicted(one: Seen) -> Iterator[_Explained]:
-    """Circles of the plan as a model has them."""
     own = one.run.expected
     if own is None:
         return

@@ -95,7 +95,6 @@ def _session(session: SessionFigures) -> HistorySession:
 
 
 def _changes(one: MachineHistory, sessions: Sequence[HistorySession]) -> Iterator[HistoryChange]:
-    """Yield what changed, by the session that showed it and the one from which it is so."""
     found: dict[tuple[int, int, TrendVerdict], list[tuple[Trend, TrendEvent]]] = {}
     for trend in one.trends:
         for event in () if trend.watched is None else trend.watched.events:
@@ -169,7 +168,6 @@ def _event(event: TrendEvent, trend: Trend, sessions: Sequence[HistorySession]) 
 
 
 def _values(trend: Trend, sessions: Sequence[HistorySession]) -> Iterator[HistoryValue]:
-    """Yield every value of a trend with what the chart made of it."""
     watched = trend.watched
     none: list[float | None] = [None] * len(trend.at)
     charted = (

@@ -94,7 +94,6 @@ def _to_repeat(circles: Iterable[MeasuredCircle]) -> list[str]:
 
 
 def _of_the_model(found: Circled, identified: IdentifiedModel | None) -> list[str]:
-    """What to do about a model that lacks physics, whatever the circles are."""
     if identified is None or not lacks_physics(identified.report):
         return []
     return [

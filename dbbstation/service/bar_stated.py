@@ -71,7 +71,6 @@ def _fault_of_day(text: str, today: date) -> str:
 
 
 def _quantity(schema: type[Schema], key: str) -> Quantity:
-    """The range that a format has for a key."""
     field = schema.model_fields[key]
     inside = [each for kind in get_args(field.annotation) for each in getattr(kind, "__metadata__", ())]
     return next(each for each in (*field.metadata, *inside) if isinstance(each, Quantity))

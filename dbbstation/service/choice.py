@@ -227,7 +227,6 @@ def _protocol(choice: Choice) -> Protocol:
 
 
 def _read(choice: Choice, limits: Limits) -> tuple[Machine, InlinePlan, Path, dict[tuple[str, Direction], RunProgram]]:
-    """Machine, plan, the plan's file and programs: those of the session where it exists."""
     folder = choice.folder
     if folder is not None and choice.goes_on:
         session = read_session(folder)

@@ -132,7 +132,6 @@ def _programs(job: SessionJob, settings: Settings) -> object:
 
 
 def _reported(job: SessionJob, settings: Settings) -> object:
-    """Write the report of a session, or of two."""
     from dbbstation.tasks.report import report  # noqa: PLC0415 - the same
 
     session = _needed(job.session, "session")

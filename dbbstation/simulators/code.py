@@ -101,7 +101,6 @@ OWN = "own"
 
 
 def _own_numbers(term: Term) -> dict[str, float]:
-    """Numbers of physics of the user's own, by name."""
     assert term.own is not None  # noqa: S101 - asked for by the caller
     return {p.name: float(number) for p, number in zip(term.own.parameters(), term.numbers, strict=True)}
 

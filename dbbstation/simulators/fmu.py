@@ -87,5 +87,4 @@ class FmuSimulator(ExchangedSimulator):
         return {name: np.interp(t, found["time"], found[variable]) for name, variable in wanted.items()}
 
     def _of(self, name: str) -> str:
-        """The FMU's name of something."""
         return self._variables.get(name, name)

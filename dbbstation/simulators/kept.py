@@ -149,6 +149,5 @@ def _of_all(content: str, model: Model) -> str:
 
 
 def _key(ask: SimulationRequest) -> bytes:
-    """Hash of one simulation."""
     acting = [(t.port, t.form.value, t.signals, t.numbers, t.fixed, t.own.name if t.own else "") for t in ask.terms]
     return hashlib.sha256(repr((ask.run, ask.parameters, acting)).encode()).digest()

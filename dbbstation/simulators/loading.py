@@ -197,7 +197,6 @@ def _parameter(name: str, key: str, one: ParameterSchema, run: int | None = None
 def _tables(
     file: SimulatorFile, recordings: Sequence[Path], numbers: NumberLanguage | None, faults: list[Problem]
 ) -> tuple[TableFile, ...]:
-    """Recordings that have every column as numbers, and times that rise."""
     needed = list(dict.fromkeys([file.time, *file.inputs.values(), *(one.column for one in file.outputs.values())]))
     found = []
     for path in recordings:

@@ -92,7 +92,6 @@ class ProgramSimulator(ExchangedSimulator):
 
 
 def _read(path: Path) -> dict[str, NDArray[np.float64]]:
-    """Columns of what the program wrote."""
     try:
         rows = list(csv.reader(io.StringIO(content_of(path).decode("utf-8"), newline="")))
     except (OSError, UnicodeDecodeError) as error:

@@ -68,7 +68,6 @@ class Runs:
         self._shapes = {k: (outputs, len(run)) for k, run in enumerate(self._model.runs)}
 
     def __enter__(self) -> Self:
-        """Start the processes."""
         if self._count:
             self._pool = self._stack.enter_context(processes(self._count))
         return self

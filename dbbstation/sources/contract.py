@@ -207,7 +207,6 @@ class Motion(WithLogged):
         return self._of_rows(lambda values, name: np.concatenate([before[name], values]))
 
     def _rows(self) -> dict[str, NDArray[np.float64]]:
-        """Everything that has a value for each row."""
         own = {name: getattr(self, name) for name in ("poses", "time_s", "load_n", "reading_mm")}
         return {name: values for name, values in own.items() if values is not None} | dict(self.logged)
 

@@ -228,7 +228,6 @@ def _of_parameters(parameters: Sequence[Parameter]) -> list[str]:
 
 
 def _as_in_names(unit: str) -> str:
-    """Return a unit as the end of a parameter's name has it."""
     return re.sub(r"[/ ]", "_", re.sub(r"[()]", "", unit.lower().replace("µ", "u")))
 
 
@@ -260,7 +259,6 @@ def _of_proportion(
 
 
 def _of_needs(source: ErrorSource, motion: Motion) -> list[str]:
-    """Whether a motion without what it needs is refused."""
     without = {
         Need.PATH: {"is_path": False},
         Need.TIME: {"time_s": None},

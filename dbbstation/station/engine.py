@@ -86,7 +86,6 @@ class Station:
         return self.state
 
     def _carry_command(self, *, wait: bool) -> bool:
-        """Carry one command, waiting a moment for it where nothing else is to do; return whether there was one."""
         try:
             command = self._commands.get(block=wait, timeout=_TICK_S)
         except queue.Empty:
@@ -95,7 +94,6 @@ class Station:
         return True
 
     def _carry_readings(self) -> bool:
-        """Carry what the instrument has; return whether there was anything."""
         readings = self._source.drain()
         self._publish(self._sequencer.readings(readings))
         return bool(readings)

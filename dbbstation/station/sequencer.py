@@ -217,7 +217,6 @@ class Sequencer:
         self._out.append(announced)
 
     def _offer(self, waiting: Waiting) -> None:
-        """Offer a run for its verdict that was recorded before."""
         run = waiting.completed.run
         self._announce(run, self.schedule.number_of(run), put_up=False)
         self._out += [events.RunRestored(run, waiting.samples), waiting.completed]
@@ -383,7 +382,6 @@ class Sequencer:
         self._out.append(events.FeedInMissed(self._announced(), problem))
 
     def _check_patience(self, reading: Reading) -> None:
-        """Give up on a machine that does not move, or does not stop."""
         if self.state not in {State.ARMED, State.DWELLING, State.TURNING} or self._waiting_since_s is None:
             return
         turning = self.state is State.TURNING
@@ -449,7 +447,6 @@ class Sequencer:
             self._out.append(events.ReadingsSeen(samples))
 
     def _untold(self, run: RunId) -> list[Sample]:
-        """Samples of a run that nobody has been told of yet."""
         batches = (event for event in self._out if isinstance(event, events.SamplesRecorded) and event.run == run)
         return [sample for batch in batches for sample in batch.samples]
 
@@ -467,7 +464,6 @@ def _length_gone(reading: Reading, phi_deg: float) -> str:
 
 
 def _found_wrong(completed: events.RunCompleted) -> str:
-    """What was found wrong with a run, as its reason in the session: every finding with its number and limit."""
     if completed.problem:
         return completed.problem
     return "; ".join(f"{one.name} wrong, {against_limit(one)}".removesuffix(", ") for one in completed.wrong)

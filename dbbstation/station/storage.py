@@ -153,7 +153,6 @@ class Storage:
             )
 
     def _entry(self, run: events.RunId) -> RunEntry:
-        """What the session says of a recorded run."""
         key = (run.test, run.direction, run.repeat)
         return next(entry for entry in self._writer.runs if (entry.test, entry.direction, entry.repeat) == key)
 

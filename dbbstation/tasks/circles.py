@@ -185,7 +185,6 @@ def _corrected(session: SessionFolder, recording: Recording) -> Recording:
 
 
 def _known(session: SessionFolder, run: RunEntry, recording: Recording) -> SetUpKnowledge:
-    """What the session states of bar and ball of a run."""
     bar, setup = session.bar, session.setup(run)
     measured_c = session.bar_temp_c(recording.temperature_degc)
     grown_mm = None if bar is None else bar.grown_uncertainty_mm(measured_c)

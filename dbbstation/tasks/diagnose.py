@@ -181,7 +181,6 @@ def _diagnosed(
     *,
     hold_out: bool = True,
 ) -> Diagnosed:
-    """Read and diagnose; `chosen` are tests to take and to leave out."""
     named = sources_named(default_candidates(known) if candidates is None else candidates, known)
     for source in named:
         if not source.candidate:

@@ -91,7 +91,6 @@ class WorkPool(Generic[Item, Result]):
     def _in_pool(
         self, work: Callable[[Item], Result], items: Sequence[Item], left: deque[int], count: int
     ) -> Generator[tuple[int, Result | Ended], None, bool]:
-        """Do what is left, and take what is done off it; return whether the pool broke."""
         with self.executor(count) as pool:
             with deaf():
                 futures = {pool.submit(work, items[place]): place for place in left}
@@ -146,7 +145,6 @@ def _of_dask(address: str) -> Iterator[Executor]:
 
 
 def _check_workers(client: Any, address: str) -> None:  # noqa: ANN401 - distributed ships no types
-    """Refuse workers that would work otherwise than this process."""
     try:
         client.wait_for_workers(1, timeout=REACHED_S)
     except TimeoutError as error:

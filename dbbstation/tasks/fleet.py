@@ -227,7 +227,6 @@ def _plain(options: FleetOptions) -> dict[str, object]:
 
 
 def _taken(one: _Named, kept: FleetFolder, key: str, result: Worked | Ended) -> _Outcome:
-    """Keep what came of a session."""
     if isinstance(result, Ended):
         return _failed(one, result.why)
     if result.problem:

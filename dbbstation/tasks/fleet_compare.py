@@ -137,7 +137,6 @@ def _unlike(one: Machine, other: Machine) -> tuple[Difference, ...]:
 
 
 def _alone(keys: Sequence[_Key]) -> list[str]:
-    """Say what too few machines have."""
     if not keys:
         return []
     names = list(dict.fromkeys(key[1] for key in keys))

@@ -123,7 +123,6 @@ def worked(piece: FleetPiece) -> Worked:
 
 
 def _refuse_other_inputs(inputs: Mapping[str, str]) -> None:
-    """Refuse files that are other ones here than where the work was asked for."""
     for path, digest in inputs.items():
         if digest_of(Path(path)) != digest:
             what = "this file is another one where the work is done, or was changed since"

@@ -105,7 +105,6 @@ def history(
 
 
 def _seal_note(kept: Kept, folder: Path, one: SessionFigures, moment: datetime) -> str:
-    """Note the anchor of a session, and say where it is not a continuation of the one that was noted before."""
     noted = kept.noted(one.name)
     if noted is None or noted.anchor == one.anchor or noted.anchor in links_of(folder):
         if one.anchor and (noted is None or noted.anchor != one.anchor):
@@ -262,7 +261,6 @@ def _why(error: StationError | OSError) -> str:
 
 
 def _called(name: str) -> str:
-    """Return the name of a file, of a session that of its folder."""
     return name.removesuffix(f"/{SESSION_FILE}")
 
 
@@ -285,7 +283,6 @@ MOST_NAMED = 3
 
 
 def _gathered(sessions: Sequence[SessionFigures]) -> list[str]:
-    """Return remarks on sessions, each once."""
     by_text: dict[str, list[str]] = {}
     for one in sessions:
         for note in one.notes:
@@ -298,7 +295,6 @@ def _gathered(sessions: Sequence[SessionFigures]) -> list[str]:
 
 
 def _once(sessions: Iterable[SessionFigures]) -> tuple[list[SessionFigures], list[str]]:
-    """Return each session once, and remarks on its copies."""
     first: dict[str, SessionFigures] = {}
     notes = []
     for one in sessions:
@@ -321,7 +317,6 @@ def _check_tests(folder: Path, sessions: Sequence[SessionFigures], asked: TrendO
 def _of_one_session(
     models: Sequence[ModelFigures], sessions: Sequence[SessionFigures]
 ) -> tuple[dict[str, ModelFigures], list[str]]:
-    """Return the model of each session by the session's hash, and remarks on these and on models of no session."""
     known = {one.sha256: one.name for one in sessions}
     taken: dict[str, ModelFigures] = {}
     notes = []

@@ -149,7 +149,6 @@ def _corrected(tabulated: Tabulated, found: Mismatch) -> dict[str, tuple[str | f
 
 
 def _unused(name: str, taken: Mapping[str, object]) -> str:
-    """Return a name, or the first of its names with a number that no column has."""
     return next(one for one in (name, *(f"{name}_{k}" for k in range(2, len(taken) + 3))) if one not in taken)
 
 

@@ -96,7 +96,6 @@ def predict(
 
 
 def _table(poses: ArrayLike | str | PathLike[str], numbers: NumberLanguage) -> tuple[PoseTable, str]:
-    """Return commanded poses, and where they stand."""
     if isinstance(poses, str | PathLike):
         return read_poses(Path(poses), numbers), str(poses)
     given = np.atleast_2d(np.asarray(poses, dtype=np.float64))

@@ -118,7 +118,6 @@ def _programs(runs: Iterable[RunEntry]) -> str:
 
 
 def _clock(runs: Sequence[RunEntry]) -> list[str]:
-    """Say where a run started before the one that is listed before it."""
     dated = [run for run in runs if run.started is not None]
     return [
         f"run {after.label} is dated {moment_words(after.started)}, before run {before.label} that was started earlier: was the "
@@ -129,7 +128,6 @@ def _clock(runs: Sequence[RunEntry]) -> list[str]:
 
 
 def _lacks(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[str]:
-    """Say what a session has not, where its figures mean less for it."""
     found = []
     directions = Counter(str(one.entry.direction) for one in circles)
     if len(directions) == 1:

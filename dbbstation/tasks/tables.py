@@ -324,7 +324,6 @@ class _Reader:
         return False
 
     def _is_numeric(self, name: str, column: NDArray[np.float64]) -> bool:
-        """Whether a column that nobody named can be used; says why not."""
         bad = sum(len(file.faults_of(name)) for file in self._files)
         if all(file.is_text(name) for file in self._files):
             self._notes.append(f"`{name}` has no numbers and is left out")
@@ -338,7 +337,6 @@ class _Reader:
         return True
 
     def _clock(self, chosen: Sequence[str]) -> str | None:
-        """Column that says when: the one that was named, or the first that is one."""
         asked = self._asked
         if asked.time is not None:
             return None if asked.time == ROWS else asked.time
@@ -376,7 +374,6 @@ class _Reader:
         return np.concatenate([np.zeros(0, dtype=np.int64), *order]), blocks, tuple(names)
 
     def _runs(self, file: TableFile) -> list[tuple[str, NDArray[np.int64]]]:
-        """Rows of each run of a file, with its name."""
         stem = re.sub(r"^.*[/\\]", "", file.file)
         if self._asked.run is None:
             return [(stem, np.arange(len(file)))]
@@ -403,7 +400,6 @@ class _Reader:
         return Variable(name, known.unit, known.kind, values, known.period, meaning.driven)
 
     def _once(self, variables: Sequence[Variable]) -> list[Variable]:
-        """Variables but for those that have the values of one before them: rows could not tell one from the other."""
         kept: list[Variable] = []
         for variable in variables:
             same = next((one.name for one in kept if np.array_equal(one.values, variable.values)), None)

@@ -146,5 +146,4 @@ def _is(name: str, kind: ColumnKind) -> bool:
 
 
 def _named(kind: ColumnKind) -> list[str]:
-    """Names of the columns of a kind, in the order of their declaration."""
     return [column.name for column in _DECLARED if column.kind is kind]

@@ -128,7 +128,6 @@ def _left_out(recording: Recording, t_s: NDArray[np.float64]) -> int:
 
 
 def _cut(recording: Recording, circle: Circle) -> RawCircle:
-    """Return the turn of a recording, worked out once."""
     found = _TURNS.setdefault(recording, {})
     if circle not in found:
         found[circle] = _turn(recording, circle)

@@ -154,7 +154,6 @@ class AcceptanceScreen(RowScreen):
 
     @staticmethod
     def _compared(result: Result) -> tuple[str, bool]:
-        """Return what is to be said of the comparison."""
         match result.progress:
             case WorkProgress.DONE:
                 kind = read_plain(ReportAnswer, result.answer).verdict.kind

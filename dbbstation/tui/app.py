@@ -247,7 +247,6 @@ class StationApp(App[None]):
         self.do(lambda: last_traces(folder, test), found, lambda _error: None)
 
     def _finish_works(self) -> None:
-        """Pass on what was done in the background."""
         done = [one for one in self._works if one[0].done]
         self._works = [one for one in self._works if not one[0].done]
         for work, then, failed in done:

@@ -276,7 +276,6 @@ class NewScreen(RowScreen):
         self.app.push_screen(PrepareScreen(self._reception, self._front, self.choice, prepared, self._changed))
 
     def _changed(self, choice: Choice) -> None:
-        """Take over what the checklist changed."""
         self.choice = choice
         self._show()
 

@@ -135,7 +135,6 @@ class PrepareScreen(RowScreen):
 
     @property
     def _list(self) -> Mapping[str, str]:
-        """What a person confirms, by name."""
         return texts.CONFIRMED_AGAIN if self._goes_on else texts.CONFIRMED
 
     def _show(self) -> None:
@@ -150,7 +149,6 @@ class PrepareScreen(RowScreen):
         self.say(texts.CHECK_OPEN.format(count=left, all=len(self._list)) if left else texts.CHECK_READY)
 
     def _tell(self) -> None:
-        """Show what the program knows."""
         told = tuple(self._checked())
         if told != self._told:
             self._told = told
@@ -195,7 +193,6 @@ class PrepareScreen(RowScreen):
         return _GOOD, texts.CHECK_READS.format(length=latest.length_mm, rate=rate, seat=seat_now)
 
     def _programs(self) -> str:
-        """What is known of the programs that command the runs."""
         programs = self._prepared.job.programs.values()
         models = {program.model_sha256[:12] for program in programs if program.model_sha256}
         by = texts.CHECK_COMPENSATED.format(models=", ".join(sorted(models))) if models else texts.CHECK_NOMINAL

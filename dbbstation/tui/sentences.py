@@ -122,5 +122,4 @@ def _fault(board: Board) -> str:
 
 
 def _ended(text: str) -> str:
-    """Return a sentence with its full stop, where it does not end with a mark of its own."""
     return text if text.endswith((".", "?", "!")) else f"{text}."

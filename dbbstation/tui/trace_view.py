@@ -117,7 +117,6 @@ class TraceView(Widget):
         self._compose_cells()
 
     def _begin(self, size: Size, scale_um: float) -> None:
-        """Draw everything anew: other traces, another scale or another size."""
         self._scale_um = scale_um
         self._dial = Dial(max(size.width, 1), max(size.height, 1), self._cell_aspect)
         self._background = self._dial.empty()
@@ -237,7 +236,6 @@ class TraceView(Widget):
 
     @property
     def _view(self) -> View:
-        """What the traces are."""
         return next((one.view for one in self._traces.values() if isinstance(one, Derived)), View.MEASURED)
 
     def _legend(self, wide: int) -> Strip:

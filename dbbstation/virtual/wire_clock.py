@@ -41,7 +41,6 @@ class ScaledClock:
         self._start_s = time.monotonic()
 
     def __call__(self) -> float:
-        """Return the virtual time in s; monotonic."""
         return (time.monotonic() - self._start_s) * self.scale
 
     def real_s(self, virtual_s: float) -> float:
@@ -74,7 +73,6 @@ class WaitingClock(ScaledClock):
         self._stands = threading.Condition()
 
     def __call__(self) -> float:
-        """Return the machine time in s."""
         return self._now_s
 
     def real_s(self, virtual_s: float) -> float:

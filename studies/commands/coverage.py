@@ -91,7 +91,6 @@ def coverage(
 
 
 def _file(keep: Path | None, part: str) -> Path | None:
-    """File of the draws of a part."""
     if keep is None:
         return None
     keep.mkdir(parents=True, exist_ok=True)

@@ -67,7 +67,6 @@ def fifteen(tmp_path_factory, errors) -> Path:
 
 @pytest.fixture(scope="session")
 def elsewhere(tmp_path_factory, errors) -> Path:
-    """Three circles of the same machine about balls that stand elsewhere."""
     folder = tmp_path_factory.mktemp("recorded") / "elsewhere"
     record(folder, seed=2, plan=subset(table_ii_plan(2, scatter_mm=3.0), "dhk"), mechanisms=[errors], rate_hz=10.0)
     return folder
@@ -75,8 +74,6 @@ def elsewhere(tmp_path_factory, errors) -> Path:
 
 @pytest.fixture(scope="session")
 def calibrated(tmp_path_factory, fifteen) -> tuple[Path, Outcome]:
-    """The model of the fifteen circles, and what the command printed."""
-
     def make(folder: Path) -> None:
         outcome = call("calibrate", fifteen, "--out", folder / "model.yaml", "--json")
         assert outcome.code == 0, outcome.err
@@ -128,15 +125,12 @@ class Spoilt:
         return path
 
     def line_of(self, name: str, what: str) -> int:
-        """Number of the first line with a text."""
         for number, line in enumerate((self.folder / name).read_text(encoding="utf-8").splitlines(), start=1):
             if what in line:
                 return number
         raise AssertionError(what)
 
     def column(self, name: str, column: int, change: Callable[[float], float]) -> Path:
-        """Change one column of every row."""
-
         def each(line: str) -> str:
             if not re.match(r"[-\d]", line):
                 return line

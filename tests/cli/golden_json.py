@@ -87,7 +87,6 @@ IMPORTED = [
 
 
 def keys_of(data):
-    """Every key as a path, `[]` for the places of a list, with the types of its values and the words it may have."""
     types, words = defaultdict(set), defaultdict(set)
     _gather(data, "", types, words)
     return "".join(
@@ -123,12 +122,10 @@ def _kind(value):
 
 
 def without_place(data):
-    """What a command printed, without what depends on where and with what it ran."""
     return {key: value for key, value in data.items() if key != "provenance"}
 
 
 def main():
-    """Write the golden files anew."""
     from tests.cli.conftest import call  # noqa: PLC0415 - it needs pytest, which tests of this file do anyhow
 
     GOLDEN.mkdir(exist_ok=True)

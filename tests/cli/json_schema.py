@@ -6,7 +6,6 @@ TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "integer
 
 
 def faults(value, schema, defs, path=""):  # noqa: PLR0911 - a word of JSON Schema each
-    """Where a value is not what a schema says; the words of JSON Schema that these schemas use."""
     if "$ref" in schema:
         return faults(value, defs[schema["$ref"].rpartition("/")[2]], defs, path)
     if "anyOf" in schema:

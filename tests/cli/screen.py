@@ -91,10 +91,8 @@ def _watch(end: int, seen: Seen) -> None:
 
 
 def bars(lines) -> list[re.Match[str]]:
-    """The whole bars among lines."""
     return [found for line in lines if (found := BAR.match(line))]
 
 
 def share(bar: re.Match[str]) -> float:
-    """How much of the work a bar says is done."""
     return int(bar[5]) / 100.0 if bar[5] else int(bar[3]) / int(bar[4])

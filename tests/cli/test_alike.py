@@ -169,7 +169,6 @@ def test_choosing_tests_without_a_dry_run_is_refused(run):
 
 
 def test_of_several_machines_none_is_dry_run(run, tmp_path):
-    """Nobody has said which of them the plan is for."""
     outcome = run("check", PLAN, MACHINE, low(tmp_path), "--json")
     assert outcome.code == DONE
     assert outcome.data["dry_runs"] == []

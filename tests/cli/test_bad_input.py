@@ -194,7 +194,6 @@ def test_a_session_and_its_copy(run, spoilt, tmp_path):
 
 
 def test_the_folder_of_the_model_is_missing(refused):
-    """Said at once, not after the fit."""
     told = refused("--out", "nowhere/model.yaml")
     assert told.startswith("nowhere/model.yaml: cannot be written: there is no folder nowhere")
 

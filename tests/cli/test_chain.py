@@ -17,7 +17,6 @@ WHEN = ("before", "after")
 
 
 def table_rows(text):
-    """Rows of circles as printed: test, direction, repeat, then before and after of each figure."""
     for line in text.splitlines():
         cells = line.split()
         if len(cells) == 9 and cells[1] in {"ccw", "cw"}:
@@ -25,7 +24,6 @@ def table_rows(text):
 
 
 def agree(printed, data):
-    """Whether a printed table of circles and the runs of the JSON are the same to the printed digit."""
     rows = dict(table_rows(printed))
     assert len(rows) == len(data["runs"])
     for run in data["runs"]:

@@ -20,7 +20,6 @@ NOISE_UM = 0.3
 
 
 def rows_after(text, heading):
-    """Cells of the rows under the titles that follow a heading, up to the first line that is no row."""
     lines = text.splitlines()
     start = next(k for k, line in enumerate(lines) if heading in line)
     rows = []

@@ -22,7 +22,6 @@ RUNS = [f"{test}-{direction}-1" for test in "agl" for direction in ("ccw", "cw")
 
 @pytest.fixture
 def three(_three):
-    """The session that `spoilt` is a copy of."""
     return _three
 
 
@@ -41,7 +40,6 @@ def longer(spoilt):
 
 @pytest.fixture(scope="module")
 def compared(run, _three, tmp_path_factory):
-    """The session, the longer one, what was drawn and printed of them, and what JSON says."""
     folder = tmp_path_factory.mktemp("compared")
     shutil.copytree(_three, folder / "spoilt")
     longer, drawn = lengthen(Spoilt(folder / "spoilt")), folder / "figure.svg"
@@ -52,7 +50,6 @@ def compared(run, _three, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def with_angles(tmp_path_factory, errors):
-    """Three circles, cut to the turn, angles in every row."""
     folder = tmp_path_factory.mktemp("recorded") / "angles"
     record(folder, seed=8, plan=subset(table_ii_plan(5), "agl"), mechanisms=[errors], rate_hz=5.0, angles=True)
     return folder

@@ -44,7 +44,6 @@ def test_the_nearest_command_is_named(run):
 
 @pytest.fixture
 def written(tmp_path, model, elsewhere):
-    """Every command that writes a file, with the file or folder."""
     plan, machine = elsewhere / "plan.yaml", elsewhere / "machine.yaml"
     (tmp_path / "in.csv").write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n")
     (tmp_path / "part.ngc").write_text("G21 G90 G94\nG1 X0 Y0 Z-1000 A0 B0 C0 F1000\nX50\nM2\n")

@@ -29,7 +29,6 @@ def rows_of(path):
 
 
 def same_samples(one, other):
-    """Whether two sessions have the same runs with the same bits."""
     whole = [run for run in one.runs if run.state != "recording"]
     assert [run.label for run in whole] == [run.label for run in other.runs]
     for own, there in zip(whole, other.runs, strict=True):

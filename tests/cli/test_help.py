@@ -35,7 +35,6 @@ def command(line):
 
 
 def found(words):
-    """Command that a line begins with, and the words that are left for it."""
     group, context = cli, click.Context(cli, info_name="dbbstation")
     while isinstance(group, click.Group):
         name, *words = words
@@ -45,7 +44,6 @@ def found(words):
 
 
 def examples(text):
-    """Command lines of a help text, continued lines joined."""
     joined = re.sub(r"\\\n\s*", "", text)
     return [line.strip() for line in joined.splitlines() if line.strip().startswith("dbbstation ")]
 

@@ -29,7 +29,6 @@ COUNT, STEP_AT, STEP_UM = 14, 12, 12.0
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path_factory, monkeypatch):
-    """An index of these tests alone."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "history-cache"))
 
 
@@ -52,7 +51,6 @@ def told(sessions, tmp_path_factory):
 
 @pytest.fixture
 def few(sessions, tmp_path):
-    """A copy of four of them, to be spoilt."""
     for name in ("w001", "w002", "w003", "w004"):
         shutil.copytree(sessions / name, tmp_path / "few" / name)
     return tmp_path / "few"

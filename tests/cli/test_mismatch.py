@@ -19,7 +19,6 @@ QUICK = (*COLUMNS, "--no-held-out")
 
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory):
-    """An axis that grows with the temperature of its oil."""
     return record(Truth(expansion_um_k=1.5)).write(tmp_path_factory.mktemp("table") / "warm.csv")
 
 

@@ -46,7 +46,6 @@ class Decay(Simulator):
 
 @pytest.fixture(autouse=True)
 def kept(tmp_path, monkeypatch):
-    """Simulations are kept in a folder of the test."""
     monkeypatch.setattr("dbbstation.simulators.kept.simulations_folder", lambda: tmp_path / "kept")
     return tmp_path / "kept"
 

@@ -9,7 +9,6 @@ from dbbstation.cli import DONE, FAILED
 
 @pytest.fixture
 def small(run, spoilt, tmp_path):
-    """A session and the model that was calibrated from it."""
     path = tmp_path / "model.yaml"
     assert run("calibrate", spoilt.folder, "--out", path).code == DONE
     return path
@@ -35,7 +34,6 @@ def test_a_joint_that_is_a_millimetre_off(run, spoilt, small):
 
 
 def test_other_masses(run, spoilt, small):
-    """Gravity in a model belongs to the masses it was calibrated with."""
     spoilt.replace("machine.yaml", "platform_kg: 400.0", "platform_kg: 450.0")
     outcome = run("evaluate", spoilt.folder, "--model", small)
     assert outcome.code == FAILED

@@ -18,7 +18,6 @@ SAID = "the residual exceeds noise and mountings by 3.25 µm rms (probability by
 
 
 def model_that(folder, said):
-    """The example's model, whose fit reports this too."""
     path = folder / "model.yaml"
     text = MODEL.read_text("utf-8").replace("report: {", f"report: {{{said}, ")
     path.write_text(text, "utf-8")

@@ -77,7 +77,6 @@ def test_times_of_a_byte_log_that_are_none(tmp_path, t_s):
 
 
 def scaled(tmp_path, column, power):
-    """The first rows of the table with a column scaled by a power of ten."""
     lines = (FIXTURES / "tables" / "axis.csv").read_text(encoding="utf-8").splitlines()
     rows = [line.split(",") for line in lines if not line.startswith("#")][:121]
     k = rows[0].index(column)

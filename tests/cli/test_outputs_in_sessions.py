@@ -149,7 +149,6 @@ def test_sealed_runs_and_copies_may_only_be_read(tmp_path: Path) -> None:
 
 @pytest.fixture
 def full(tmp_path: Path):
-    """A shop on a disk that is full."""
     disk = tmp_path / "disk"
     disk.mkdir()
     words = ["mount", "-t", "tmpfs", "-o", "size=600k", "none", str(disk)]

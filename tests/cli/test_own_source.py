@@ -40,7 +40,6 @@ class BowedScales(Mechanism):
 
 @pytest.fixture(scope="module")
 def bowed(tmp_path_factory):
-    """A session of a machine with two bowed scales."""
     folder = tmp_path_factory.mktemp("bowed") / "session"
     record(folder, seed=41, mechanisms=[BowedScales()], rate_hz=10.0)
     return folder
@@ -48,7 +47,6 @@ def bowed(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def truth(tmp_path_factory):
-    """A model that says so."""
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
     source = every_source([EXAMPLE])["scale-bow"]
     path = tmp_path_factory.mktemp("truth") / "truth.yaml"

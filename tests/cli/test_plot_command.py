@@ -19,7 +19,6 @@ EVIL = "<script>alert(1)</script> & $x_1$"
 
 
 def words_of(path):
-    """Texts of an SVG file that is sound XML."""
     root = ET.fromstring(path.read_bytes())  # noqa: S314 - our own file
     assert not [one for one in root.iter() if one.tag.endswith("}script")]
     return [one.text for one in root.iter("{http://www.w3.org/2000/svg}text") if one.text]

@@ -94,7 +94,6 @@ def recorded(monkeypatch):
 
 
 def again(calls):
-    """Show what a command has shown."""
     made = {}
     for bar, name, given, named in calls:
         if name == "__init__":

@@ -39,7 +39,6 @@ def session(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def better(tmp_path_factory):
-    """The same circles on a machine without errors."""
     folder = tmp_path_factory.mktemp("report") / "better"
     record(folder, seed=5, plan=subset(table_ii_plan(4), ["a", "f"]), rate_hz=10.0)
     return folder

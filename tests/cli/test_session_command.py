@@ -59,7 +59,6 @@ def test_a_rejected_run_is_kept_with_its_reason_and_can_be_taken_back(capsys, fo
 
 
 def test_a_circle_with_one_accepted_run_is_not_talked_of(capsys):
-    """One of both runs of `a cw` was rejected."""
     small = shipped_folder("fixtures") / "sessions" / "small"
     assert "accepted runs" not in run(capsys, "list", small)[1]
 
@@ -178,7 +177,6 @@ def test_no_session_there(capsys, tmp_path):
 
 @pytest.fixture
 def half_lost(folder):
-    """Name of a run that has every other stretch of ten samples only."""
     entry = read_session(folder).runs[1]
     lines = entry.path.read_text().splitlines(keepends=True)
     first = next(k for k, line in enumerate(lines) if line[:1].isdigit())

@@ -26,7 +26,6 @@ HEAD = "format: dbb-settings/1\n"
 
 @pytest.fixture
 def shop(tmp_path, monkeypatch):
-    """A working folder, and a user who has settings of his own where a test writes them."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     (tmp_path / "config" / "dbbstation").mkdir(parents=True)
     (tmp_path / "shop").mkdir()

@@ -17,7 +17,6 @@ SOURCES = "strut-reference-length,base-joints,thermal-frame"
 
 @pytest.fixture(scope="module")
 def sessions(tmp_path_factory):
-    """The same machine with a thermometer and without."""
     folder = tmp_path_factory.mktemp("shop")
     for name in ("logged", "bare"):
         frame = ThermalFrame(SHOP, logged=name == "logged")
@@ -27,7 +26,6 @@ def sessions(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def few(tmp_path_factory):
-    """Four tests of it, enough for what is said and drawn."""
     folder = tmp_path_factory.mktemp("few")
     for name in ("logged", "bare"):
         frame = ThermalFrame(SHOP, logged=name == "logged")

@@ -63,7 +63,6 @@ if __name__ == "__main__":
 
 @pytest.mark.skipif(sys.platform != "linux", reason="what a process does stands in /proc")
 def test_a_kill_of_the_one_that_started_them_ends_them(tmp_path):
-    """A kill leaves that one no moment to end them."""
     script = tmp_path / "sleeps.py"
     script.write_text(SLEEPS, encoding="utf-8")
     with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:

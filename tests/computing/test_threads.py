@@ -30,7 +30,6 @@ class Seen(Exception):  # noqa: N818 - no error: it ends work that has shown eno
 
 @pytest.fixture(autouse=True)
 def several_threads():
-    """As NumPy has them in a script, whatever the tests' own environment says."""
     with ThreadpoolController().limit(limits=THREADS, user_api="blas"):
         assert counts() == {THREADS}
         yield

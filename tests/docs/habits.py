@@ -42,7 +42,6 @@ HABITS = [*PATTERNS, LONG, MANY_MARKS]
 
 
 def habits_of(sentence: str) -> list[str]:
-    """Return the habits that a sentence seems to have."""
     found = [name for name, pattern in PATTERNS.items() if re.search(pattern, sentence, re.IGNORECASE)]
     if len(sentence.split()) > MOST_WORDS:
         found.append(LONG)
@@ -77,7 +76,6 @@ def in_documents(root: Path) -> Iterator[str]:
 
 
 def in_help(group: click.Group = cli) -> Iterator[str]:
-    """Yield sentences of what `--help` prints."""
     context = click.Context(group)
     for name in group.list_commands(context):
         command = group.get_command(context, name)
@@ -116,12 +114,10 @@ def _texts(node: ast.AST) -> Iterator[str]:
 
 
 def kinds(root: Path = HERE) -> dict[str, list[str]]:
-    """Return all sentences by kind."""
     return {"documents": list(in_documents(root)), "help": list(in_help()), "messages": list(in_messages(root))}
 
 
 def shares(sentences: list[str]) -> dict[str, float]:
-    """Return the share of sentences with each habit, in percent."""
     found = [habits_of(one) for one in sentences]
     return {habit: round(100 * sum(habit in one for one in found) / max(len(found), 1), 2) for habit in HABITS}
 

@@ -36,7 +36,6 @@ def executed(notebook: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def printed(cell: dict[str, Any]) -> str:
-    """What a cell printed."""
     return "".join("".join(output["text"]) for output in cell["outputs"] if output["output_type"] == "stream")
 
 
@@ -56,7 +55,6 @@ def _pictures() -> list[dict[str, Any]]:
 
 
 def main(path: Path) -> None:
-    """Run a notebook and write it back with its outputs."""
     notebook = json.loads(path.read_text(encoding="utf-8"))
     code = iter(executed(notebook))
     notebook["cells"] = [next(code) if cell["cell_type"] == "code" else cell for cell in notebook["cells"]]

@@ -77,7 +77,6 @@ class Command:
 
     @property
     def kind(self) -> tuple[str, str]:
-        """Key of a command that begins as this one does, in the tables above."""
         keys = (key for key in (*EXEMPT, *SLOW) if key[0] == self.document and self.text.startswith(key[1]))
         return next(keys, (self.document, self.text))
 
@@ -104,7 +103,6 @@ def commands_of(document: str) -> list[Command]:
 
 
 def lines_of(document: str) -> list[Command]:
-    """Command lines in blocks without output: those of a shell, or with no language."""
     found: list[Command] = []
     in_block, continued = False, False
     for number, line in enumerate((HERE / document).read_text(encoding="utf-8").splitlines(), start=1):
@@ -132,7 +130,6 @@ def words_of(command: Command) -> list[str]:
 
 
 def is_alike(shown: str, printed: str) -> bool:
-    """Whether words are the same, and numbers within one unit of their last digit or a hundredth."""
     if shown.endswith(ANYTHING):
         shown = shown.removesuffix(ANYTHING).rstrip()
         printed = " ".join(printed.split()[: len(shown.split())])
@@ -154,7 +151,6 @@ def _same(one: str, other: str) -> bool:
 
 
 def is_shown_by(shown: list[str], printed: list[str]) -> bool:
-    """Whether shown lines are what was printed, any lines standing where there is an ellipsis alone."""
     if not shown:
         return not printed
     if shown[0] == ANYTHING:
@@ -195,7 +191,6 @@ class Workshop:
         self._outcomes: dict[str, Outcome] = {}
 
     def outcome_of(self, command: Command) -> Outcome:
-        """Return what a command prints behind the commands above it on its page."""
         page = [one for one in COMPARED if one.document == command.document and one.number <= command.number]
         for one in page:
             if str(one) not in self._outcomes and (one is command or one.kind not in SLOW):

@@ -57,7 +57,6 @@ class Resources(html.parser.HTMLParser):
 
 
 def missing(site):
-    """Return what pages and styles of a site load from elsewhere, or that is not there."""
     wrong = []
     for file in [*site.rglob("*.html"), *site.rglob("*.css")]:
         text = file.read_text("utf-8")
@@ -72,7 +71,6 @@ def missing(site):
 
 
 def test_a_site_built_as_ours_needs_no_network(tmp_path):
-    """Its configuration, theme and extensions, over one page."""
     source, site = tmp_path / "source", tmp_path / "site"
     source.mkdir()
     (source / "index.md").write_text(PAGE, "utf-8")

@@ -94,7 +94,6 @@ def make_session(folder: Path) -> None:
 
 
 def make_virtual_session(folder: Path) -> None:
-    """One test on a virtual machine, which session and runs say."""
     with tempfile.TemporaryDirectory() as scratch:
         recorded = Path(scratch) / "recorded"
         record(recorded, seed=7, plan=subset(table_ii_plan(7), "a"), mechanisms=[RandomKinematics()], rate_hz=5.0)

@@ -41,7 +41,6 @@ ROUND_IT = {
 
 
 def opens_files(tree: ast.AST) -> list[int]:
-    """Lines that open or read a file: `open`, `os.open`, and methods of paths."""
     found = []
     for node in ast.walk(tree):
         if not isinstance(node, ast.Call):
@@ -116,7 +115,6 @@ def test_a_pipe_is_not_waited_for_and_a_device_not_read(pipe, read):
 
 
 def test_a_pipe_that_takes_the_place_of_a_file_is_not_waited_for(tmp_path, pipe, monkeypatch):
-    """Between asking what it is and opening it."""
     file = tmp_path / "file"
     file.write_bytes(b"x")
     monkeypatch.setattr(gateway, "_stat", lambda _path: file.stat())

@@ -28,7 +28,6 @@ def session(tmp_path: Path) -> Path:
 
 
 def change(path: Path) -> None:
-    """Add what changes no value."""
     path.write_text("# another\n" + path.read_text("utf-8"), encoding="utf-8")
 
 

@@ -29,7 +29,6 @@ def own(tmp_path, text, name="own.py"):
 
 
 def changed(tmp_path, *pairs):
-    """The example with texts replaced."""
     text = EXAMPLE.read_text(encoding="utf-8")
     for old, new in pairs:
         assert old in text
@@ -45,8 +44,6 @@ def told(*files):
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
-    """Install the example as a package whose entry point is given."""
-
     def install(entry, text=None):
         folder = tmp_path / "site"
         (folder / "bowed-1.0.dist-info").mkdir(parents=True)

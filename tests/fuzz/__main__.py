@@ -22,18 +22,15 @@ STUCK_S = 600.0
 
 
 def cases_of(folder: Path) -> dict[int, dict]:
-    """What came of each case so far; one that is under way is not among them."""
     lines = [line for book in sorted(folder.glob("worker-*/cases.jsonl")) for line in lines_of(book)]
     return {told["case"]: told for told in lines if "case" in told}
 
 
 def lines_of(book: Path) -> list[dict]:
-    """Lines of a worker's book but one that was cut off."""
     return [json.loads(line) for line in book.read_text(encoding="utf-8").split("\n")[:-1]]
 
 
 def note_death(book: Path) -> None:
-    """Note that the process died of the case that it had begun."""
     begun = [line["begun"] for line in lines_of(book) if "begun" in line]
     died = {"case": begun[-1] if begun else 0, "kind": "?", "line": "?", "fault": "the process died", "guided": False}
     with book.open("a", encoding="utf-8") as file:
@@ -41,7 +38,6 @@ def note_death(book: Path) -> None:
 
 
 def work(folder: Path, seed: int, cases: int, workers: int) -> None:
-    """Run what is not run yet."""
     running: dict[int, subprocess.Popen[bytes]] = {}
     over: set[int] = set()
     try:
@@ -71,7 +67,6 @@ def work(folder: Path, seed: int, cases: int, workers: int) -> None:
 
 
 def report(found: dict[int, dict]) -> bool:
-    """Print the counts; whether all went well."""
     guided = sum(told["guided"] for told in found.values())
     print(
         f"{len(found)} cases, {guided} of them guided; exit codes {dict(Counter(str(t['code']) for t in found.values()))}"
@@ -95,7 +90,6 @@ def report(found: dict[int, dict]) -> bool:
 
 
 def main() -> None:
-    """Run and count."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--cases", type=int, default=50_000)

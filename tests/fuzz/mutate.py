@@ -31,7 +31,6 @@ LARGEST = 200_000
 
 
 def spoil(data: bytes, rng: random.Random, others: Sequence[bytes]) -> bytes:
-    """Return a spoilt file: mostly one fault, sometimes up to eight."""
     for _ in range(1 if rng.random() < 0.5 else rng.randint(2, 8)):
         data = rng.choices(_WAYS, _SHARES)[0](data, rng, others)[:LARGEST]
     return data
@@ -49,7 +48,6 @@ def _swap(pattern: re.Pattern[bytes], instead: Sequence[bytes]) -> Callable[...,
 
 
 def _digits(data: bytes, rng: random.Random, _others: Sequence[bytes]) -> bytes:
-    """Another power of ten, another sign, a digit more or less of one number."""
     places = [match.span() for match in _NUMBER.finditer(data)]
     if not places:
         return data

@@ -32,7 +32,6 @@ class Seed:
 
     @property
     def targets(self) -> list[str]:
-        """Files that are spoilt."""
         return [name for name in self.files if not name.startswith(SOUND)]
 
 

@@ -42,7 +42,6 @@ class TooSlowError(BaseException):
 
 
 def guided_by(name: str) -> bool:
-    """Whether lines of a source file guide."""
     _, found, inside = name.rpartition(_PACKAGE)
     return bool(found) and inside.startswith(TRACED)
 
@@ -76,7 +75,6 @@ class Reached:
             sys.settrace(None)
 
     def keep(self, seed: Seed, target: str, data: bytes) -> bool:
-        """Keep a file that reached new lines."""
         new = self.now - self.lines
         self.lines |= new
         if new:
@@ -85,7 +83,6 @@ class Reached:
         return bool(new)
 
     def starting(self, seed: Seed, rng: random.Random) -> tuple[str, bytes]:
-        """Return a file to spoil further: a kept one of this seed, or one of the seed itself."""
         kept = sorted(self.folder.glob(f"{SEEDS.index(seed)}-*"))
         if kept and rng.random() < 0.8:
             target, _, data = rng.choice(kept).read_bytes().partition(b"\n")
@@ -144,7 +141,6 @@ def run(line: str, folder: Path) -> tuple[int | None, str]:
 
 
 def case(number: int, seed_number: int, folder: Path, reached: Reached) -> dict[str, object]:
-    """Run one case."""
     rng = random.Random(f"{seed_number}:{number}")  # noqa: S311 (no secret)
     seed = rng.choices(SEEDS, [one.share for one in SEEDS])[0]
     line = rng.choices(list(seed.commands), list(seed.commands.values()))[0]
@@ -186,7 +182,6 @@ def _too_slow(*_: object) -> None:
 
 
 def main(folder: Path, seed_number: int, first: int, step: int, last: int) -> None:
-    """Run the cases from `first` to before `last`, and write a line about each."""
     os.environ |= {
         "DBBSTATION_LOG": "off",
         "XDG_CACHE_HOME": str(folder),

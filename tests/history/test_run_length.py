@@ -31,7 +31,6 @@ def test_average_run_lengths_are_those_of_the_textbook(interval, shift, publishe
 
 
 def simulated(chart, mean, count, most, rng):
-    """First value at which each of `count` two-sided charts signals, by doing it."""
     high, low, first = np.zeros(count), np.zeros(count), np.full(count, most + 1)
     for k in range(1, most + 1):
         z = rng.normal(mean, 1.0, count)

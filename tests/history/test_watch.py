@@ -53,7 +53,6 @@ def first_alarm(values, step_at, chart=ONE):
 
 
 def delays_of(rows, step_at):
-    """Delays of the histories without a false alarm before, of which nearly all are."""
     delays = np.array([first_alarm(row, step_at) for row in rows])
     assert np.isnan(delays).mean() < 0.02
     return delays[~np.isnan(delays)]

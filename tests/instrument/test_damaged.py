@@ -76,7 +76,6 @@ def test_a_port_of_text_is_opened_with_wrong_parity_marked(terminal: tuple[int, 
 
 
 def test_a_pseudo_terminal_takes_no_parity(terminal: tuple[int, int]) -> None:
-    """Why the marks are tested as bytes."""
     settings = termios.tcgetattr(terminal[1])
     settings[2] |= termios.PARENB
     # Linux refuses, other systems take it and do nothing.

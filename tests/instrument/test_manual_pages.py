@@ -42,7 +42,6 @@ def usable(protocol: Protocol) -> Protocol:
 
 @contextmanager
 def reading_of(protocol: Protocol, length_mm: float | None) -> Iterator[Instrument]:
-    """Read a virtual instrument with a bar of this length, faster than real where it is asked for each value."""
     clock = ScaledClock(20.0 if protocol.ask.asked else 1.0)
     with (
         VirtualInstrument(protocol, lambda _: length_mm, clock=clock) as virtual,

@@ -11,7 +11,6 @@ from dbbstation.instrument.sequence import SampleOrder
 
 
 def placed(counters: list[int], modulus: int = 100_000) -> tuple[list[tuple[int, int]], list[int]]:
-    """Accepted counters with what was lost before them, and rejected ones."""
     sequence = SampleOrder[int](modulus, "COM3")
     out = [one for counter in counters for one in sequence.place(counter, counter)]
     accepted = [(one.sample, one.lost) for one in out if one.lost is not None]

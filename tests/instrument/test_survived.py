@@ -310,7 +310,6 @@ def test_damaged_lines_are_counted_by_reason() -> None:
 
 @contextlib.contextmanager
 def _served(serve) -> Iterator[int]:
-    """A server on a free port of this computer for one client."""
     server = socket.create_server(("127.0.0.1", 0))
     thread = threading.Thread(target=lambda: serve(server.accept()[0]), daemon=True)
     thread.start()

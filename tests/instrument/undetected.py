@@ -88,7 +88,6 @@ def off_wire(code: Code, protocol: Protocol, *, guarded: bool) -> bytes:
 
 
 def one_character(code: Code) -> Iterator[tuple[str, Code]]:
-    """Yield every frame with one character damaged, each once, with what happened to it."""
     seen = {code}
     cases: dict[str, Iterator[Code]] = {
         "lost": (code[:at] + code[at + 1 :] for at in range(len(code))),
@@ -104,7 +103,6 @@ def one_character(code: Code) -> Iterator[tuple[str, Code]]:
 
 
 def two_characters(code: Code, dice: random.Random, count: int) -> Iterator[Code]:
-    """Yield frames with two errors of any kind at any places."""
     for _ in range(count):
         damaged = _once(_once(code, dice), dice)
         if damaged != code:
@@ -151,7 +149,6 @@ class Passage:
             self._reachable.note((k - BEFORE) * self._period_s, self.true_mm[k], self._u_s)
 
     def read(self, code: Code) -> list[Reading]:
-        """Return the readings that come of the damaged frame and those behind it."""
         raw = off_wire(code, self._protocol, guarded=self._guarded)
         pieces = self._asked(raw) if self._protocol.ask.asked else self._streamed(raw)
         doubts, reachable = copy.copy(self._doubts), copy.copy(self._reachable)
@@ -251,7 +248,6 @@ def rows(names: Iterable[str], *, guarded: bool, pairs: int, seed: int) -> Itera
 
 
 def main() -> None:
-    """Print the table of the documentation."""
     asked = argparse.ArgumentParser(description="Shares [%] of damaged frames that come out as a good, wrong length.")
     asked.add_argument("names", nargs="*", help="instruments; all of them without a name")
     asked.add_argument("--pairs", type=int, default=PAIRS, help="frames with two errors, at each place")

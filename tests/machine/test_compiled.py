@@ -17,7 +17,6 @@ from dbbstation.machine.compiled import NotKeptWarning, compiled
 
 
 def of_no_file(name):
-    """A loop whose file does not exist: there is no folder beside it."""
     place = {}
     exec(compile(f"def {name}(a, b):\n    return a + b\n", "<nowhere>", "exec"), place)  # noqa: S102 - written here
     return place[name]

@@ -6,7 +6,6 @@ import random
 
 
 def program(seed: int) -> str:
-    """One program; the same seed gives the same text."""
     return _Author(random.Random(seed)).program()  # noqa: S311 - the same programs each time, nothing secret
 
 
@@ -57,7 +56,6 @@ class _Author:
         return self.dressed(text)
 
     def dressed(self, text: str) -> str:
-        """Write the same words as somebody else would."""
         draw = self.draw
         if draw.random() < 0.1:
             text = text.lower()

@@ -21,7 +21,6 @@ CLEAR_MM, ABOVE_MM = 20.0, 2.0
 
 
 def look_alike(seed: int) -> str:
-    """One program; its first move names all six axes."""
     drawn = np.random.default_rng(seed)
     style = STYLES[seed % len(STYLES)]
     control = str(drawn.choice(PATH_CONTROL))
@@ -40,7 +39,6 @@ def _down(depth_mm: float, feed: float) -> list[str]:
 
 
 def _pocket(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iterator[str]:
-    """Rectangles from the inside out."""
     step, wide, long = drawn.uniform(2.0, 6.0), *drawn.uniform(0.5, 1.5, 2)
     yield from _down(1.5, feed)
     for turn in range(1, 4):
@@ -51,7 +49,6 @@ def _pocket(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iter
 
 
 def _facing(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iterator[str]:
-    """To and fro, lifted between the lines or not."""
     wide, step, lifted = drawn.uniform(10.0, 40.0), drawn.uniform(1.0, 4.0), drawn.random() < 0.5
     yield from _down(0.5, feed)
     for line in range(5):
@@ -65,7 +62,6 @@ def _facing(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iter
 
 
 def _contour(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iterator[str]:
-    """A rectangle with round corners, led in and out by arcs."""
     wide, high, radius = drawn.uniform(20.0, 40.0), drawn.uniform(15.0, 30.0), drawn.uniform(0.5, 6.0)
     yield from _down(2.0, feed)
     yield f"G3 X{x + 3:.3f} Y{y - 3:.3f} I3 J0 F{feed:g}"
@@ -104,7 +100,6 @@ def _surface(drawn: np.random.Generator, x: float, y: float, feed: float) -> Ite
 
 
 def _five(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iterator[str]:
-    """Five axes at once along a curve."""
     tilt, step = drawn.uniform(1.0, 6.0), drawn.uniform(0.5, 4.0)
     yield from _down(1.0, feed)
     for place in np.arange(0.0, 40.0, step):
@@ -116,7 +111,6 @@ def _five(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iterat
 
 
 def _ramp(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iterator[str]:
-    """Down a helix, once around its floor."""
     radius, pitch = drawn.uniform(3.0, 12.0), drawn.uniform(0.3, 1.0)
     yield f"G0 Z{ABOVE_MM - 1000.0:.3f}"
     yield f"F{feed:g}"
@@ -126,7 +120,6 @@ def _ramp(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iterat
 
 
 def _letters(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iterator[str]:
-    """Engraved strokes of any direction, lifted between them."""
     for letter in range(4):
         at = np.array([x + 6.0 * letter, y])
         yield f"G0 X{at[0]:.3f} Y{at[1]:.3f}"

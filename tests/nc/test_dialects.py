@@ -174,13 +174,11 @@ def test_what_a_dialect_of_ones_own_lacks_is_told(tmp_path, old, new, why):
 
 
 def own(tmp_path, body: str) -> str:
-    """A file with LinuxCNC's language and something wrong in it."""
     (tmp_path / "own.py").write_text(f"import re\n{OWN}\n{textwrap.indent(textwrap.dedent(body), '    ')}\n")
     return str(tmp_path / "own.py")
 
 
 def editing(edit: str) -> str:
-    """The body of a dialect that edits LinuxCNC's text by a pattern."""
     return f"def write(self, path, header=()):\n    text = LinuxCNC.write(self, path, header)\n    return {edit}\n"
 
 

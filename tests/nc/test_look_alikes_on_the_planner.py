@@ -190,7 +190,6 @@ def test_short_moves_are_merged_as_reckoned(name, linuxcnc):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [8, pytest.param(19, marks=pytest.mark.nightly)])
 def test_they_keep_their_feed(seed, linuxcnc, crooked):
-    """A pocket, and drilled holes."""
     check(seed, linuxcnc, crooked)
 
 

@@ -98,7 +98,6 @@ def test_a_pattern_that_is_run_many_times_is_one_pattern():
 
 
 def test_the_chance_is_what_is_said():
-    """All of the fewest poses with all of their bits."""
     assert all(0.5 ** (bits * poses) < BY_CHANCE for poses, bits in BITS.items())
 
 

@@ -153,7 +153,6 @@ def test_a_piece_that_turns_reaches_what_the_look_ahead_says(linuxcnc, reference
 def circle_programs_of(
     linuxcnc, table2, crooked, bar_mm: float, feed: float, mm_s2: float | None, prefer=None
 ) -> tuple[str, Program]:
-    """Nominal text and compensated program of test a, with another bar and feed."""
     test = table2.tests["a"]
     circle = replace(test.circle, bar_mm=bar_mm, feed_mm_min=feed)
     plan = Plan("one circle", {"a": replace(test, circle=circle)})
@@ -254,7 +253,6 @@ def test_every_program_that_is_written_keeps_its_feed(linuxcnc, table2, crooked,
 
 @functools.cache
 def planned(nominal: str, mm_s2: float, faster: int) -> Ran:
-    """A nominal program on the planner, once for all that is compared with it."""
     return run(nominal, mm_s2=mm_s2, faster=faster)
 
 

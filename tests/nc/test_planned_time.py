@@ -70,7 +70,6 @@ def test_an_exact_path_stops_in_corners_alone(linuxcnc, way_deg, kink_deg, stops
 
 
 def test_an_exact_path_goes_on_from_a_line_into_its_circle(linuxcnc):
-    """And not where A moves in it."""
     straight, turning = (
         seconds(linuxcnc, f"G61\nG0 X0 Y0 Z-1000 A0 B0 C0\nF120\nG1 X10{word}\nG3 J5").sum() for word in ("", " A1")
     )

@@ -48,8 +48,6 @@ def bent(reference):
 
 @pytest.fixture
 def does_the_same(linuxcnc, bent, tmp_path):
-    """Check one generated program, without offsets and with."""
-
     def check(seed: int) -> None:
         text = part(seed)
         wanted = events(text, tmp_path)
@@ -140,7 +138,6 @@ FAULTS = {
 
 @pytest.fixture(scope="module")
 def wavy(bent):
-    """With errors large enough that a line takes pieces."""
     drawn = np.random.default_rng(28)
     return MachineModel(bent.machine, (Fitted(known_sources()["base-joints"], drawn.normal(0.0, 0.2, 18)),))
 

@@ -19,7 +19,6 @@ FIRST = "G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\n"
 
 
 def written(linuxcnc, text: str) -> list[str]:
-    """The lines of a program that was read and written, after its modes."""
     return linuxcnc.write(linuxcnc.read(text, "part.ngc")).splitlines()[1:]
 
 

@@ -98,7 +98,6 @@ def _said(event: Event) -> str:
 
 
 def _spoken(events: list[Event]) -> list[int]:
-    """How many other events come before each move."""
     others = accumulate(event.kind not in MOVES for event in events)
     return [count for count, event in zip(others, events, strict=True) if event.kind in MOVES]
 

@@ -41,13 +41,11 @@ def changes(values: list[str]) -> int:
 
 
 def remounts(plan: Plan, names: tuple[str, ...]) -> tuple[int, int]:
-    """How often another ball and another holder comes."""
     balls = [plan.tests[name].ball for name in names]
     return changes([ball.name for ball in balls]), changes([ball.holder for ball in balls])
 
 
 def leak(z_mm: np.ndarray, degree: int) -> float:
-    """Multiple correlation from the residual of a fit, not from a basis."""
     t = np.arange(len(z_mm), dtype=float)
     total = float(np.sum((z_mm - z_mm.mean()) ** 2))
     if total == 0.0:

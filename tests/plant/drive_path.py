@@ -53,12 +53,10 @@ class RunPath:
 
     @property
     def feed_mm_s(self) -> float:
-        """Speed of the tool tip along its path."""
         return self.path.feed_mm_min / 60.0
 
     @property
     def arc_s(self) -> tuple[float, float]:
-        """When the arc with its overshoots begins and ends."""
         return self._legs[3].start_s, self._legs[3].end_s
 
     def _timetable(self, timing: Timing) -> list[Leg]:

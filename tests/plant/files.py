@@ -27,7 +27,6 @@ _MISREAD = re.compile(r"true|false|null|yes|no|on|off|[0-9]+(e[0-9]+)?", re.IGNO
 
 
 def flow(value: object) -> str:
-    """A value in YAML's one-line style."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{flow(key)}: {flow(item)}" for key, item in value.items()) + "}"
     if isinstance(value, (list, tuple, np.ndarray)):
@@ -117,7 +116,6 @@ def session_text(head: Mapping[str, object], runs: Sequence[Mapping[str, object]
 
 
 def recording_text(slot: Slot, columns: Mapping[str, FloatArray], *, crc: bool) -> str:
-    """A run as recorded: what it is, the columns' names, one line per sample."""
     formats = [_column_format(name) for name in columns]
     template = ",".join(formats)
     rows = np.stack(list(columns.values()), axis=1)
@@ -135,7 +133,6 @@ def _column_format(name: str) -> str:
 
 
 def _path_entry(path: Path, usual: Path | None = None) -> dict[str, Any]:
-    """The path's keys; those of a test only where they differ from the plan's."""
     return {
         key.name: getattr(path, key.name)
         for key in fields(path)

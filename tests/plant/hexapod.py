@@ -105,7 +105,6 @@ def strut_lengths(machine: Machine, poses: FloatArray) -> FloatArray:
 
 
 def guess_at(machine: Machine, poses: FloatArray) -> Guess:
-    """The commanded pose as the place to start the search from."""
     platform = commanded_platform(machine, poses)
     return Guess(platform.position_mm, platform.rotation, np.linalg.inv(platform.jacobian))
 

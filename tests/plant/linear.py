@@ -42,7 +42,6 @@ class Course:
 
     @property
     def slot(self) -> Slot:
-        """The run."""
         return self.motion.of_run
 
 

@@ -56,7 +56,6 @@ def vibration(rng: np.random.Generator, count: int) -> FloatArray:
 
 
 def louder_half(rng: np.random.Generator, count: int) -> FloatArray:
-    """White noise that is three times as strong in one half of the turn."""
     strong = (np.arange(count) + int(rng.integers(count))) % count < count // 2
     return rng.standard_normal(count) * np.where(strong, 1.342, 0.447)
 

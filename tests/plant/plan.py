@@ -115,15 +115,12 @@ class Plan:
     repeat_at_end: tuple[str, ...] = ()
 
     def test(self, name: str) -> Test:
-        """The test of that name."""
         return next(test for test in self.tests if test.name == name)
 
     def ball(self, name: str) -> Ball:
-        """The ball of that name."""
         return next(ball for ball in self.balls if ball.name == name)
 
     def path_of(self, test: Test) -> Path:
-        """How the test is driven: its own path, or that of the plan."""
         return test.path or self.path
 
     def in_machine_mm(self, jig_mm: FloatArray) -> FloatArray:
@@ -168,14 +165,12 @@ def gravity_plan(
 
 
 def subset(plan: Plan, names: Sequence[str]) -> Plan:
-    """The plan with some of its tests only, in the order named, and the balls that they need."""
     tests = tuple(plan.test(name) for name in names)
     used = {test.ball for test in tests}
     return replace(plan, tests=tests, balls=tuple(ball for ball in plan.balls if ball.name in used))
 
 
 def elevated(plan: Plan, elevation_deg: float, names: Sequence[str]) -> Plan:
-    """The plan with the bar raised by an angle in the tests named."""
     return replace(
         plan,
         tests=tuple(replace(test, elevation_deg=elevation_deg) if test.name in names else test for test in plan.tests),
@@ -189,7 +184,6 @@ def free_ball(name: str, centre_mm: FloatArray | Sequence[float], uncertainty_um
 
 
 def with_test(plan: Plan, test: Test, ball: Ball | None = None) -> Plan:
-    """The plan with one more test, and the ball that it brings along."""
     return replace(plan, tests=(*plan.tests, test), balls=plan.balls if ball is None else (*plan.balls, ball))
 
 

@@ -30,12 +30,10 @@ class Slot:
 
     @property
     def end_s(self) -> float:
-        """When the run ends, in session time."""
         return self.start_s + self.path.duration_s
 
     @property
     def stem(self) -> str:
-        """Name of the run's file without its ending."""
         return f"{self.test.name}-{self.direction}-{self.repeat}"
 
 
@@ -50,7 +48,6 @@ class Scene:
 
     @property
     def end_s(self) -> float:
-        """When the last run ends."""
         return max((slot.end_s for slot in self.slots), default=0.0)
 
 
@@ -68,7 +65,6 @@ class Motion:
 
     @property
     def machine(self) -> Machine:
-        """The nominal machine."""
         return self.scene.machine
 
     @cached_property
@@ -78,7 +74,6 @@ class Motion:
 
     @property
     def of_run(self) -> Slot:
-        """The run, for effects of balls and bar, which exist in runs only."""
         if self.slot is None:
             raise ValueError("these poses belong to no run: no ball, no bar")
         return self.slot

@@ -47,7 +47,6 @@ def kinematic_matrix(plan: Plan, columns: int = LENGTHS_AND_BASE, machine: Machi
 
 
 def visible_directions(matrix: FloatArray, floor: float = 1e-6) -> int:
-    """Rank: singular values above `floor` times the largest."""
     values = np.linalg.svd(matrix, compute_uv=False)
     return int((values > floor * values[0]).sum())
 

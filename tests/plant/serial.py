@@ -65,7 +65,6 @@ class SerialMachine:
     def _goes(
         self, axis: Axis, theta: FloatArray, radius_mm: float, sense: int, speed_rad_s: float, quarter: float
     ) -> FloatArray:
-        """Where an axis is; `theta - quarter` counts from its positive end."""
         along = theta - quarter
         commanded = radius_mm * np.cos(along - sense * speed_rad_s * 1e-3 * axis.late_ms)
         forward = -sense * np.sin(along) > 0.0

@@ -37,14 +37,12 @@ class Outcome:
 
 
 def built_machine(nominal: Machine, mechanisms: Sequence[Mechanism]) -> Machine:
-    """The machine as it really is, where that does not depend on pose or time."""
     for mechanism in mechanisms:
         nominal = mechanism.built(nominal)
     return nominal
 
 
 def true_platform(motion: Motion, mechanisms: Sequence[Mechanism]) -> Platform:
-    """Where the platform really is at every instant of a commanded motion."""
     actual = built_machine(motion.machine, mechanisms)
     driven_mm = motion.commanded_mm
     for mechanism in mechanisms:
@@ -84,7 +82,6 @@ def ball_vector_mm(motion: Motion, platform: Platform, mechanisms: Sequence[Mech
 
 
 def simulate(motion: Motion, mechanisms: Sequence[Mechanism]) -> Outcome:
-    """One run without noise."""
     platform = true_platform(motion, mechanisms)
     distance_mm = np.linalg.norm(ball_vector_mm(motion, platform, mechanisms), axis=1)
     length_mm = _total(distance_mm, (mechanism.reading_mm(motion, platform, distance_mm) for mechanism in mechanisms))

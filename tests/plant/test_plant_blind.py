@@ -184,7 +184,6 @@ def test_faint_effects_are_three_to_seven_standard_deviations_out(name: str) -> 
 
 @pytest.mark.parametrize("name", DISTURBANCES)
 def test_a_disturbance_is_hidden_beside_an_effect_of_the_list(name: str) -> None:
-    """The answer says by which name of the list a disturbance may be called, or that it is on no list."""
     for seed in range(6):
         rng = np.random.default_rng(seed)
         listed, beside = Hider(rng, drawn(rng, seed)).disturbed(name)

@@ -32,7 +32,6 @@ def session() -> LinearSession:
 
 
 def simulated(session: LinearSession, mechanisms: list[Mechanism]) -> FloatArray:
-    """Readings at the instants of the linear session: the same rate, started with the first dwell."""
     parts = []
     for course in session.courses:
         rate_hz = 1.0 / float(np.diff(course.motion.session_s[:2])[0])

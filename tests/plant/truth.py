@@ -49,7 +49,6 @@ class Truth:
 
     @property
     def nominal(self) -> Machine:
-        """The machine that the controller believes in."""
         return self.scene.machine
 
     @property
@@ -87,7 +86,6 @@ class Truth:
 
     @property
     def bar_offset_um(self) -> float:
-        """What every reading has too much."""
         return sum(item.offset_um for item in self.mechanisms if isinstance(item, BarOffset))
 
     def actual_pose(self, poses: FloatArray, session_s: float | FloatArray = 0.0) -> FloatArray:
@@ -104,7 +102,6 @@ class Truth:
         return true_platform(self._motion(poses, 0.0), self.mechanisms).tension_n
 
     def run(self, test: str, direction: str, repeat: int = 1) -> TrueRun:
-        """The run of that name."""
         sought = f"{test}-{direction}-{repeat}"
         return next(run for run in self.runs if run.slot.stem == sought)
 
@@ -114,7 +111,6 @@ class Truth:
         return run.theta_deg[run.in_circle], run.length_mm[run.in_circle]
 
     def as_dict(self) -> dict[str, Any]:
-        """The answer to the session, ready for a file."""
         return {
             "seed": self.seed,
             "session": self.folder.name,
@@ -132,7 +128,6 @@ class Truth:
         }
 
     def write(self, file: FilePath) -> None:
-        """Writes the answer; never into the session, where whoever examines it would find it."""
         if file.resolve().is_relative_to(self.folder.resolve()):
             raise ValueError(f"{file} lies inside the session: the answer belongs elsewhere")
         file.write_text(json.dumps(self.as_dict(), indent=1, default=plain) + "\n", encoding="utf-8")
@@ -145,7 +140,6 @@ class Truth:
 
 
 def plain(value: object) -> object:
-    """An array or a number of numpy as JSON knows it."""
     if isinstance(value, (np.ndarray, np.floating, np.integer, np.bool_)):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} has no place in an answer")

@@ -72,7 +72,6 @@ ALIKE: dict[Fault, Callable[[str, str], bool]] = {
 
 
 def _partner(test: str) -> str:
-    """The test whose ball is exchanged with that of a test."""
     return TESTS[TESTS.index(test) ^ 1]
 
 
@@ -85,7 +84,6 @@ class When(StrEnum):
 
 
 def before(whole: Sound, spoilt: Seen, when: When) -> list[Seen]:
-    """Runs that count before a run is judged."""
     own = [one for one in whole.runs if one.run.test == spoilt.run.test and one.run.repeat == 1]
     own = [one for one in own if one.run.circle.direction is not spoilt.run.circle.direction]
     rest = [one for one in whole.runs if one.run.test != spoilt.run.test]
@@ -93,7 +91,6 @@ def before(whole: Sound, spoilt: Seen, when: When) -> list[Seen]:
 
 
 def faulty(whole: Sound, tilted: dict[float, Sound], run: int, fault: Fault, size: float, known: list[Seen]) -> Seen:
-    """One run with a fault of a size."""
     one = whole.runs[run].run
     if fault is Fault.OTHER_TEST:
         return seen(replace(one, recording=whole.runs[int(size)].run.recording))
@@ -180,7 +177,6 @@ def _count(counted: Row, whole: Sound, tilted: dict[float, Sound], run: int, whe
 
 
 def _alike(whole: Sound, tilted: dict[float, Sound], known: Seen, one: Seen, fault: Fault, size: float) -> Seen:
-    """A run that was there before, with the same fault where it has that too."""
     if not ALIKE[fault](one.run.test, known.run.test):
         return known
     return faulty(whole, tilted, whole.runs.index(known), fault, size, [])

@@ -51,7 +51,6 @@ class Sound:
         return [session.judge(one) for one in self.runs]
 
     def with_spoilt(self, run: int, recording: Recording) -> Judgement:
-        """Judge one run with another recording beside the others as they are."""
         one = seen(replace(self.runs[run].run, recording=recording))
         return SessionRuns([*self.runs[:run], one, *self.runs[run + 1 :]]).judge(one)
 
@@ -62,12 +61,10 @@ def run(whole: Sound, name: str) -> Seen:
 
 
 def spoilt(one: Seen, spoiler: Callable[..., Recording], *sizes: object) -> Seen:
-    """A run with its recording spoilt."""
     return seen(replace(one.run, recording=spoiler(one.run.recording, one.run.circle, *sizes)))
 
 
 def judged(before: Sequence[Seen], one: Seen) -> Judgement:
-    """What is found of a run behind others."""
     return SessionRuns([*before, one]).judge(one)
 
 
@@ -103,13 +100,11 @@ def read(folder: Path, model: IdentifiedModel | None = None) -> Sound:
 
 
 def calibrated(folder: Path, seed: int) -> Sound:
-    """A session whose circles are expected where its own calibration puts them."""
     sound(folder / "spoilt", seed, TESTS)
     return read(folder / "spoilt", calibration(folder / "spoilt", folder / "model.yaml"))
 
 
 def calibration(session: Path, model: Path) -> IdentifiedModel:
-    """The session's own calibration, written to a file."""
     outcome = call("calibrate", session, "--out", model)
     assert outcome.code == 0, outcome.err
     return read_model(model, every_source(()))

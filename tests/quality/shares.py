@@ -45,7 +45,6 @@ def spoil(whole: Sound, run: int, name: Name, shares: Sequence[float] = SHARES) 
 
 
 def _limit_of_fault(whole: Sound, run: int, name: Name, limit: float) -> float:
-    """The limit in the direction in which a fault moves the form, where that has a direction: that of a large one."""
     if name not in {Name.OTHER_DIRECTION, Name.REPEAT}:
         return limit
     found = finding_of(_spoilt(whole, run, name, 5.0 * limit), name)
@@ -85,7 +84,6 @@ def _put_across(one: Seen, um: float) -> Recording:
 
 
 def _size(whole: Sound, run: int, name: Name, wanted: float) -> float:
-    """Size of the fault at which the value comes to what is wanted: values grow about as their fault does."""
     if name in {Name.LOST, Name.FEED, Name.DIRECTION}:
         return wanted
     size = wanted

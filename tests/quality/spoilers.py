@@ -52,7 +52,6 @@ def bumpy(recording: Recording, circle: Circle, um: float, at_deg: float = 112.0
 
 
 def spiky(recording: Recording, circle: Circle, um: float, at_deg: float = 112.0) -> Recording:
-    """One reading that stands off its neighbours."""
     apart = np.abs(progress(recording, circle) - circle.phi_deg(np.array([at_deg]))[0])
     one = np.zeros(len(recording))
     one[int(np.argmin(apart))] = um
@@ -69,7 +68,6 @@ def quiet_deg(one: Run) -> float:
 
 
 def mirrored(recording: Recording, circle: Circle, share: float) -> Recording:
-    """So much of the circle's form turned round: all of it where share is one."""
     round_the_other_way = turned(recording, circle, np.negative).length_mm
     return replace(recording, length_mm=recording.length_mm + share * (round_the_other_way - recording.length_mm))
 
@@ -105,7 +103,6 @@ def scaled(recording: Recording, circle: Circle, percent: float) -> Recording:
 
 
 def coming_twice(recording: Recording, _circle: Circle, times: int = 2) -> Recording:
-    """Of so many readings in a row all are the first one."""
     return replace(recording, length_mm=recording.length_mm[np.arange(len(recording)) // times * times])
 
 
@@ -126,7 +123,6 @@ def larger(recording: Recording, _circle: Circle, um: float) -> Recording:
 
 
 def at_feed(recording: Recording, circle: Circle, mm_min: float) -> Recording:
-    """Run at another feed than programmed."""
     edges = edges_of(recording, circle)
     middle = 0.5 * (edges[0] + edges[1])
     t_s = middle + (recording.t_s - middle) * circle.feed_mm_min / (circle.feed_mm_min + mm_min)

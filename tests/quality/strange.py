@@ -88,13 +88,11 @@ def warm_from_the_hand(recording: Recording, _circle: Circle, um: float) -> Reco
 
 
 def begun_in_motion(recording: Recording, circle: Circle, share: float) -> Recording:
-    """The recording begins when so much of the feed-in is through."""
     first = edges_of(recording, circle)[0] + (share - 0.5) * circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     return _rows(recording, recording.t_s >= first)
 
 
 def ended_in_motion(recording: Recording, circle: Circle, share: float) -> Recording:
-    """The recording ends when so much of the feed-out is through."""
     last = edges_of(recording, circle)[1] + (share - 0.5) * circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     return _rows(recording, recording.t_s <= last)
 
@@ -120,7 +118,6 @@ def clock_fast(recording: Recording, _circle: Circle, percent: float) -> Recordi
 
 
 def in_blocks(recording: Recording, _circle: Circle, seconds: float) -> Recording:
-    """Readings are handed over in blocks: all of a block have nearly the time of its end."""
     step_s = float(np.median(np.diff(recording.t_s)))
     block = max(round(seconds / step_s), 1)
     number = np.arange(len(recording)) % block
@@ -128,7 +125,6 @@ def in_blocks(recording: Recording, _circle: Circle, seconds: float) -> Recordin
 
 
 def shaken(recording: Recording, circle: Circle, um: float) -> Recording:
-    """Something shakes the machine for three seconds."""
     since_s = (progress(recording, circle) - 90.0) / circle.turning_deg_s
     noise = np.random.default_rng(3).normal(0.0, um, len(recording))
     return longer(recording, np.where((since_s > 0.0) & (since_s < 3.0), noise, 0.0))
@@ -145,7 +141,6 @@ def longer_bar(recording: Recording, _circle: Circle, um: float) -> Recording:
 
 
 def stuck_with_noise(recording: Recording, circle: Circle, seconds: float) -> Recording:
-    """A plunger sticks for so long, and the electronics go on with their noise."""
     since_s = (progress(recording, circle) - 140.0) / circle.turning_deg_s
     inside = (since_s >= 0.0) & (since_s <= seconds)
     slow = _slow(recording)
@@ -161,7 +156,6 @@ def _slow(recording: Recording, seconds: float = 0.5) -> np.ndarray:
 
 
 def averaged(recording: Recording, _circle: Circle, seconds: float) -> Recording:
-    """A display that averages: a low-pass with this time constant."""
     share = 1.0 - np.exp(-float(np.median(np.diff(recording.t_s))) / seconds)
     length = recording.length_mm.copy()
     for k in range(1, len(length)):
@@ -174,7 +168,6 @@ def coarse(recording: Recording, _circle: Circle, um: float) -> Recording:
 
 
 def shorter_overlap(recording: Recording, circle: Circle, degrees: float) -> Recording:
-    """The program's overshoot arcs are shorter by so much, each."""
     phi = progress(recording, circle)
     cut_deg = circle.overshoot_deg
     begin = (phi > -cut_deg + 3.0) & (phi < -cut_deg + 3.0 + degrees)
@@ -214,19 +207,16 @@ def with_hysteresis(recording: Recording, _circle: Circle, um: float) -> Recordi
 
 
 def lobed(recording: Recording, circle: Circle, um: float) -> Recording:
-    """A ball with three lobes, where it sits the same in every run."""
     theta = np.radians(circle.theta_deg(progress(recording, circle)))
     return longer(recording, um * np.cos(3.0 * theta + 0.7))
 
 
 def beside_its_axis(recording: Recording, circle: Circle, um: float) -> Recording:
-    """The ball of the tool stands so far beside the axis of the spindle."""
     theta = np.radians(circle.theta_deg(progress(recording, circle)))
     return longer(recording, um * np.cos(theta - 1.0))
 
 
 def exchanged_times(recording: Recording, _circle: Circle, share: float) -> Recording:
-    """Of so many readings the next one came first."""
     at = np.flatnonzero(np.random.default_rng(6).random(len(recording) - 1) < share)
     length = recording.length_mm.copy()
     for k in at:

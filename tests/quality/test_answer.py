@@ -20,7 +20,6 @@ def whole(tmp_path_factory):
 
 
 def answered(whole, label, spoiler=None, *sizes):
-    """The word on a run beside those before it, spoilt or as it is."""
     at = next(k for k, one in enumerate(whole.runs) if one.run.label == label)
     one = whole.runs[at]
     if spoiler is not None:

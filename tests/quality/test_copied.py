@@ -16,12 +16,10 @@ from tests.quality.spoilers import longer
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """Two tests, the first of them repeated."""
     return sound(tmp_path_factory.mktemp("copied") / "session", 6, "af")
 
 
 def copy(one, *, of, rows=slice(None)):
-    """A run that has readings of another one."""
     recording = replace(of.run.recording, t_s=of.run.recording.t_s[rows], length_mm=of.run.recording.length_mm[rows])
     return seen(replace(one.run, recording=replace(recording, t_s=recording.t_s - recording.t_s[0])))
 

@@ -102,7 +102,6 @@ def test_the_circle_of_another_test_is_recognised_once_that_was_measured(whole):
 
 @pytest.fixture(scope="module")
 def modelled(tmp_path_factory):
-    """Eight tests of a machine with its own calibration as a model."""
     return calibrated(tmp_path_factory.mktemp("modelled"), 1001)
 
 

@@ -23,7 +23,6 @@ CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0.0, 45, 1.5, 0, Dir
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """Six tests of a machine without a model."""
     return sound(tmp_path_factory.mktemp("gauge") / "session", 5, "abdfhk")
 
 
@@ -74,7 +73,6 @@ def test_a_recording_without_its_feed_in_says_nothing_of_the_scale(whole):
 
 
 def white(sigma_um: float, step_um: float, seed: int) -> RawCircle:
-    """A round circle with white noise, in steps."""
     noise = np.random.default_rng(seed).normal(0.0, sigma_um, 2000)
     length = 150.0 + 1e-3 * step_um * np.round(noise / step_um)
     phi = np.linspace(0.0, 359.9, 2000)

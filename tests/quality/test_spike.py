@@ -24,7 +24,6 @@ PHI_DEG = np.arange(3600) / 10.0
 
 
 def circle(residual_um, resolution_um=0.0, phi_deg=PHI_DEG):
-    """As much of a circle's analysis as the finding reads."""
     raw = SimpleNamespace(phi_deg=phi_deg, theta_deg=phi_deg % 360.0)
     return SimpleNamespace(residual_um=residual_um, raw=raw, noise=SimpleNamespace(resolution_um=resolution_um))
 

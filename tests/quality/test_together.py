@@ -28,7 +28,6 @@ def run(test: str, circle: Circle) -> SimpleNamespace:
 
 
 def beside(runs, off, effects) -> Together:
-    """Forms with a noise of one micrometre, as they are."""
     tests = tuple(each.run.test for each in runs for _ in range(N))
     first, others = (
         Forms(
@@ -93,7 +92,6 @@ def whole(tmp_path_factory):
 
 
 def both_spoilt(whole, test, spoiler, *sizes):
-    """Both directions of a test with one fault, and those of all other tests as they are."""
     return [
         seen(replace(one.run, recording=spoiler(one.run.recording, one.run.circle, *sizes)))
         if one.run.test == test

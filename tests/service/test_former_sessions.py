@@ -69,7 +69,6 @@ def test_another_machine_ball_or_serial_number_is_not_the_same(shop: Path) -> No
 
 
 def _moved(machine: str) -> str:
-    """A machine's file with one joint elsewhere."""
     lines = machine.splitlines(keepends=True)
     at = next(k for k, line in enumerate(lines) if line.startswith("platform_joints_mm"))
     row = next(k for k in range(at, len(lines)) if any(sign.isdigit() for sign in lines[k]) and "." in lines[k])

@@ -41,7 +41,6 @@ def protocol() -> Protocol:
 
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Ports in the order in which they are opened."""
     ports: list[str] = []
     open_link = driver.open_link
 

@@ -27,7 +27,6 @@ def ask(rate, terms=()):
 
 
 def ran(folder, *asks, keeps=True):
-    """How many simulations are run, and what comes of them."""
     loaded = load_simulator(folder / "model.yaml", [folder / "run.csv"])
     with Runs(loaded, 0, keeps=keeps) as runs:
         found = [one.outputs for one in runs(asks)]

@@ -62,7 +62,6 @@ def drawn(rng, root, u, size):
 
 
 def counted(draws, size, seed, false_alarms=FALSE_ALARMS):
-    """Draw, and count which machines were marked."""
     rng = np.random.default_rng([seed, int(10 * size)])
     covariance = covariance_um()
     values, vectors = np.linalg.eigh(covariance)

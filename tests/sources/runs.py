@@ -64,7 +64,6 @@ DEG_PER_S = np.degrees(1000.0 / 60.0 / 150.0)
 
 
 def circle(centre_mm, tilt_deg, theta_deg, radius_mm=150.0, **given) -> Motion:
-    """Poses at angles about a ball in the circle's centre."""
     theta = np.radians(theta_deg)
     ball = np.array(centre_mm, dtype=float)
     poses = np.zeros((len(theta), 6))
@@ -75,7 +74,6 @@ def circle(centre_mm, tilt_deg, theta_deg, radius_mm=150.0, **given) -> Motion:
 
 
 def run(centre_mm, tilt_deg, *, clockwise=False, started_s=0.0, step_deg=2.0, lead_in_deg=45.0) -> Motion:
-    """One run in time, with the arc that leads to it."""
     phi = np.arange(-lead_in_deg, 360.0, step_deg)
     before = int(np.count_nonzero(phi < 0))
     return circle(

@@ -64,7 +64,6 @@ class Bench:
     url: str
 
     def command(self, out: Path, *more: str, auto: bool = True) -> list[str]:
-        """The command line of `measure` against this bench."""
         words = [sys.executable, "-m", "dbbstation", "measure", "--plan", str(self.plan_file)]
         words += ["--machine", str(MACHINE_FILE), "--instrument", self.instrument, "--port", self.wire.port]
         words += ["--out", str(out), "--time-scale", str(self.scale)]
@@ -73,7 +72,6 @@ class Bench:
         return [*words, *(["--auto", self.url] if auto else []), *more]
 
     def measure(self, out: Path, *more: str, auto: bool = True, typed: str = "") -> subprocess.CompletedProcess[str]:
-        """Run `measure` to its end."""
         return subprocess.run(
             self.command(out, *more, auto=auto),
             input=typed,
@@ -95,7 +93,6 @@ def bench(
     sizes: Sizes | None = None,
     programs: Programs | None = None,
 ) -> Iterator[Bench]:
-    """Switch the virtual machine on."""
     machine, plan = read_machine(MACHINE_FILE), read_plan(plan_file)
     virtual = VirtualMachine(MachineModel(machine, random_kinematics(machine, seed)), plan, seed=seed, sizes=sizes)
     virtual.check()
@@ -119,5 +116,4 @@ def wait_for(what: Callable[[], bool], process: subprocess.Popen[str] | None = N
 
 
 def lines_of(part: Path) -> int:
-    """Whole sample lines that a run file holds."""
     return max(part.read_bytes().count(b"\n") - 4, 0) if part.exists() else 0

@@ -15,7 +15,6 @@ __all__ = ["nothing_left_open"]
 
 @pytest.fixture
 def plan_file(tmp_path: Path) -> Path:
-    """Two tests, the first repeated at the end."""
     path = tmp_path / "short.yaml"
     path.write_text(SHORT_PLAN, encoding="utf-8")
     return path

@@ -41,7 +41,6 @@ WAYS = {
 
 
 def scenario(folder: Path, tell) -> None:
-    """Go on with a session: a run with its verdict, a verdict on another, a note."""
     with SessionWriter.open(folder) as writer:
         tell("opened")
         with writer.start_run("a", Direction.CCW, COLUMNS, started=BEGUN, mounting=4) as journal:
@@ -61,7 +60,6 @@ def scenario(folder: Path, tell) -> None:
 
 
 def trial(calls: ctypes.CDLL, folder: Path, place: int, how: int, error: int) -> tuple[list[str], int]:
-    """What a process said until it ended, and how many calls there were."""
     out, told = os.pipe()
     child = os.fork()
     if child == 0:
@@ -87,7 +85,6 @@ def trial(calls: ctypes.CDLL, folder: Path, place: int, how: int, error: int) ->
 
 
 def faults_of(folder: Path, said: list[str], former: int) -> list[str]:
-    """What is not as it was said to be."""
     found = [line for line in said if line.startswith("fault")]
     sentences = [line for line in said if line.startswith("sentence")]
     found += [f"more than a sentence: {line}" for line in sentences if "\\n" in line or "; " not in line]

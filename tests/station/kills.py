@@ -33,7 +33,6 @@ def length_mm(run: str, sample: int) -> float:
 
 
 def missing(session: SessionFolder, said: Iterable[str]) -> list[str]:
-    """Which verdicts and notes that were told are not in a session, or not as they were told."""
     runs = {f"{run.test}-{run.direction}-{run.repeat}": run for run in session.runs}
     notes = {note.text for note in session.notes}
     last: dict[str, str] = {}

@@ -23,7 +23,6 @@ RATE_HZ = 20.0
 
 
 def run_readings(circle: Circle, begin_s: float = 0.0, rate_hz: float = RATE_HZ) -> list[Reading]:
-    """The whole run of a perfect machine."""
     path = circle_path(circle)
     t_s = np.arange(0.0, path.duration_s, 1.0 / rate_hz)
     place = np.column_stack([np.interp(t_s, path.t_s, path.poses[:, axis]) for axis in range(3)])
@@ -32,8 +31,6 @@ def run_readings(circle: Circle, begin_s: float = 0.0, rate_hz: float = RATE_HZ)
 
 
 def told_and_untold(told: Sequence[Event]) -> RunRecall:
-    """The recording of a run of which a list of events has the first samples."""
-
     def recorded(run: RunId, behind: Sequence[Sample]) -> Recording:
         batches = [event.samples for event in told if isinstance(event, SamplesRecorded) and event.run == run]
         return recording_of(run, [*(sample for batch in batches for sample in batch), *behind])
@@ -49,6 +46,5 @@ def still(length_mm: float | None, seconds: float, begin_s: float = 0.0) -> list
 
 
 def kinds(events: Iterable[Event]) -> list[str]:
-    """Names of events, without those that only carry samples or states."""
     quiet = {"StateChanged", "ReadingsSeen", "SamplesRecorded", "RunProgress"}
     return [name for event in events if (name := type(event).__name__) not in quiet]

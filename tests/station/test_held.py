@@ -39,7 +39,6 @@ def stuck(readings: list[Reading], from_s: float) -> list[Reading]:
 
 
 def ended(plan: Plan, readings: list[Reading]) -> tuple[events.RunCompleted, float]:  # noqa: F811
-    """What the run comes to, and when."""
     told: list[events.Event] = []
     sequencer = Sequencer(plan, Schedule(plan, lambda _test, _direction: 1), told_and_untold(told))
     sequencer.begin()
@@ -74,7 +73,6 @@ def test_a_coarse_length_that_sticks_ends_the_run_when_the_feed_out_must_have_mo
 
 
 def stuck_behind(readings: list[Reading]) -> list[Reading]:
-    """The same length for a minute more."""
     last = next(one for one in readings if one.t_s >= 30.0)
     return [replace(last, t_s=readings[-1].t_s + k / RATE_HZ) for k in range(1, 3000)]
 

@@ -44,7 +44,6 @@ def truth() -> IdentifiedModel:
 
 
 def wrong_of(folder: Path, run: str, made_of: str, model: IdentifiedModel | None, truth: IdentifiedModel) -> set[str]:
-    """Names of what is found wrong with a run whose circle was that of another test, or its own."""
     machine, plan = read_machine(MACHINE_FILE), read_inline_plan(PLAN)
     virtual = VirtualMachine(truth.model, plan.to_domain(), seed=SEED)
     made = virtual.run(made_of, Direction.CCW)

@@ -32,7 +32,6 @@ LONGEST_S = 0.25
 
 
 def killed(folder: Path, after_s: float) -> list[str]:
-    """What a process that records said until it was killed."""
     out, told = os.pipe()
     child = multiprocessing.get_context("fork").Process(target=record, args=(folder, told))
     child.start()

@@ -74,7 +74,6 @@ def test_a_whole_short_plan_agrees_with_the_truth(plan_file: Path, tmp_path: Pat
 
 
 def finished_and_another_plan(place: Bench, out: Path) -> None:
-    """A finished session has nothing left, and does not go on with another plan."""
     before = (out / "session.yaml").read_bytes()
     again = call(*place.command(out)[3:])
     assert (again.code, (out / "session.yaml").read_bytes()) == (0, before)

@@ -31,7 +31,6 @@ GAUGE = load_instrument("sylvac-opto-rs")
 
 
 def heard(protocol: Protocol, told: Reading, raw: bytes | None = None) -> Reading:
-    """A reading as the wire brings it, with the time of another."""
     return replace(decode(protocol, raw or encode(protocol, told.length_mm)), t_s=told.t_s)
 
 

@@ -88,7 +88,6 @@ def made(image: Path, kind: FileSystem) -> Path:
 
 @contextlib.contextmanager
 def recording(folder: Path, told: int) -> Iterator[BaseProcess]:
-    """A process that records into a session until the end of the block."""
     child = multiprocessing.get_context("fork").Process(target=record, args=(folder, told, PACE_S))
     child.start()
     os.close(told)

@@ -101,7 +101,6 @@ def test_two_tests_at_one_ball_share_its_mounting(plan: Plan) -> None:
 
 
 def ran(schedule: Schedule) -> RunId:
-    """Measure and accept what is next."""
     found = schedule.next()
     assert found is not None
     run = schedule.mounted(found.run, remounted=False)

@@ -84,7 +84,6 @@ class Watched:
         return readings
 
     def synced(self) -> None:
-        """Everything up to somewhere in this batch is on the disk now."""
         if self._waiting_s is not None:
             self.behind_s = max(self.behind_s, time.monotonic() - self._waiting_s)
         self._waiting_s = self._batch_s
@@ -115,7 +114,6 @@ class Captured:
 
 
 def capture(job: Job, port: str, line: int, seconds: float, monkeypatch: pytest.MonkeyPatch) -> Captured:
-    """Record one run from a line at its full rate."""
     lost, memory = [0], list[int]()
     with Instrument(load_instrument("streaming-encoder", "no-checksum"), port, baud=BAUD, timeout_s=5.0) as instrument:
         source = Watched(instrument)

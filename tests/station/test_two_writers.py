@@ -24,7 +24,6 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes that 
 
 
 def judge(folder: Path, name: str, reason: str, begin: int, told: int) -> None:
-    """What `dbbstation session reject` does, at the moment when the other does it."""
     os.read(begin, 1)
     try:
         with SessionWriter.open(folder, PATIENCE_S) as writer:

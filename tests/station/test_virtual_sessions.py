@@ -50,7 +50,6 @@ def begun(plan_file: Path, folder: Path, by: ReadBy | None) -> Workplace:
 
 
 def measured(plan_file: Path, folder: Path, by: ReadBy | None) -> Path:
-    """One run of the first test, accepted."""
     circle = read_inline_plan(plan_file).to_domain().tests["a"].run(Direction.CCW)
     script = Script(run_readings(circle))
     workplace = assemble(job(plan_file, folder, by), script)

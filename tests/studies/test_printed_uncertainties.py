@@ -81,7 +81,6 @@ NO_FIGURE = {
 
 
 def printed():
-    """Fields of the results that say how well something is known."""
     folder = Path(dbbstation.__file__).parent
     return {
         f"{module.rpartition('/')[2]}.{kind.name}.{field.target.id}"

@@ -20,7 +20,6 @@ USAGE = 2
 
 @pytest.fixture
 def answers(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float]]:
-    """What the program had as this share, where it is declared, where it is imported, and another constant."""
     seen: list[tuple[float, float, float]] = []
 
     def answer(_: Variation) -> Answer:

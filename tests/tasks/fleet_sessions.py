@@ -29,7 +29,6 @@ def machines(folder, count, tests="abd", seed=36):
 
 
 def squared(item):
-    """Return the square of a number and the process that worked it out."""
     number, _ = item
     return number**2, os.getpid()
 
@@ -45,7 +44,6 @@ def ends_once(item):
 
 
 def ends_always(item):
-    """As `squared`; a number below zero kills every process that gets it."""
     if item[0] < 0:
         os.kill(os.getpid(), signal.SIGKILL)
     return squared(item)

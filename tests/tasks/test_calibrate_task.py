@@ -97,7 +97,6 @@ def test_nothing_to_calibrate_is_said():
 
 
 def test_an_evaluation_of_the_same_runs_has_the_figures_of_the_fit(recorded, result):
-    """Both look at one model and one set of runs."""
     found = evaluate(recorded, result)
     assert found.residual_rms_um == pytest.approx(result.residual_rms_um, rel=1e-12)
     assert [run.after for run in found.runs] == [run.after for run in result.runs]

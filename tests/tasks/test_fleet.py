@@ -35,7 +35,6 @@ def sessions(recorded, tmp_path):
 
 @pytest.fixture(scope="module")
 def calibrated(recorded, tmp_path_factory):
-    """All sessions, calibrated by the command in two processes; one of them is spoilt."""
     folder = tmp_path_factory.mktemp("calibrated")
     sessions = shutil.copytree(recorded, folder / "sessions")
     spoilt = sessions / "m01" / "runs" / "a-ccw-1.csv"

@@ -34,7 +34,6 @@ def shape(theta_deg):
 
 
 def trace(circle=CIRCLE, dwell_s=0.3, feed=None, noise_mm=0.0, seed=0):
-    """A trace as a control makes it: it dwells at the corners, which the angles must not feel."""
     feed = feed or circle.feed_mm_min
     turning = np.degrees(feed / 60 / circle.radius_mm)
     feeding_s, arc_s = circle.feed_in_mm / (feed / 60), circle.swept_deg / turning

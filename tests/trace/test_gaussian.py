@@ -11,7 +11,6 @@ THETA = np.arange(0.0, 360.0, 0.1)
 
 
 def passed(undulations, cut_off, theta=THETA):
-    """Amplitude that is left of a wave of one."""
     wave = np.exp(1j * undulations * np.radians(theta))
     smooth = gaussian(theta, wave.real, cut_off) + 1j * gaussian(theta, wave.imag, cut_off)
     return np.mean(smooth * wave.conj()).real

@@ -26,7 +26,6 @@ def test_fine_thermometers_are_followed_as_they_are():
 
 
 def bending(time_s, degc):
-    """Mean square of the second derivative."""
     return np.mean(np.gradient(np.gradient(degc, time_s), time_s) ** 2)
 
 

@@ -93,7 +93,6 @@ class Happening:
         return 1 + sum((run.test, run.direction) == (test, direction) for run in started)
 
     def states(self) -> list[State]:
-        """The board's state after each event."""
         board = Board()
         states = []
         for event in self.events:

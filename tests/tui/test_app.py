@@ -75,12 +75,10 @@ class EndsWhileItsMailIsTaken:
         """Do nothing."""
 
     def send(self, command: Command) -> bool:
-        """Take the command to quit."""
         self._quits = self._quits or isinstance(command, Quit)
         return True
 
     def mail(self) -> list[Event | SequenceOpened]:
-        """Return what there is; the end comes right after it."""
         came, self._mail = self._mail, []
         if self._quits and self.alive:
             self._mail, self.alive = self._last, False
@@ -128,16 +126,13 @@ class Waits:
         """Do nothing."""
 
     def send(self, command: Command) -> bool:
-        """Note the command."""
         self.sent.append(command)
         return True
 
     def post(self, events: list[Event | SequenceOpened]) -> None:
-        """Say what happened next."""
         self._mail += events
 
     def mail(self) -> list[Event | SequenceOpened]:
-        """Return what has not been taken."""
         came, self._mail = self._mail, []
         return came
 
@@ -169,7 +164,6 @@ def played(
     play: Callable[[Pilot[None], StationApp], Awaitable[None]],
     size: tuple[int, int] = (80, 24),
 ) -> Waits:
-    """Play on a screen that shows what happened, and return what was sent."""
     runner = Waits(happening.events)
     app = StationApp(happening.shown(), runner, clock=lambda: 0.0)
 
@@ -299,7 +293,6 @@ def test_a_key_that_comes_while_the_screens_close_is_harmless() -> None:
 
 
 def twice() -> Happening:
-    """The same run rejected, measured again and accepted."""
     happening = Happening().circle("t0", Direction.CCW).command(Repeat("the bar slipped"))
     return happening.circle("t0", Direction.CCW).command(Accept())
 

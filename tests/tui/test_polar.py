@@ -11,7 +11,6 @@ from dbbstation.tui.polar import BAND_SHARE, NOMINAL_SHARE, Dial, draw_scale, dr
 
 
 def dot_of(dial: Dial, theta_deg: float, deviation_um: float, scale_um: float) -> tuple[int, int]:
-    """Row and column of a sample's dot, by the definition of the drawing."""
     radius = dial.radius * (NOMINAL_SHARE + BAND_SHARE * deviation_um / scale_um)
     x = dial.columns + radius * math.cos(math.radians(theta_deg))
     y = dial.rows * 2 - radius * math.sin(math.radians(theta_deg)) / dial.dot_aspect

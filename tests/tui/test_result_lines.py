@@ -21,7 +21,6 @@ SMALL = shipped_folder("fixtures") / "sessions" / "small"
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
-    """The answer of `calibrate`."""
     model: Path = tmp_path_factory.mktemp("model") / "model.yaml"
     done = call("calibrate", SMALL, "--out", model, "--json")
     assert done.code == 0, done.err

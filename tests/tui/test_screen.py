@@ -51,7 +51,6 @@ ENCODER = _SHIPPED.model_copy(update={"timing": _SHIPPED.timing.model_copy(updat
 
 @pytest.fixture
 def short_plan(tmp_path: Path) -> InlinePlan:
-    """One test, both directions, as fast as the machine allows."""
     return one_circle(tmp_path, feed_mm_min=6000)
 
 
@@ -90,7 +89,6 @@ class Bench:
         size: tuple[int, int] = (80, 24),
         helper: Observer | None = None,
     ) -> None:
-        """Open a screen and play on it; the screen is closed whatever happens."""
         line = HeldLine(ENCODER, self.place.port, clock=self.place.clock)
         runner = Runner(opener(self.job, line, observers=[helper or self.place.helper]), line)
         app = StationApp(

@@ -51,7 +51,6 @@ PATIENCE_S = 60.0
 
 
 def now(app: StationApp) -> str:
-    """The sentence at the top of the screen on top."""
     return " ".join(str(app.screen.query_one("#row-now", Static).visual).split())
 
 
@@ -61,13 +60,11 @@ def rows(app: StationApp) -> list[str]:
 
 
 def offered(app: StationApp) -> list[str]:
-    """What a question offers."""
     options = app.screen.query_one(OptionList)
     return [str(options.get_option_at_index(place).prompt) for place in range(options.option_count)]
 
 
 def below(app: StationApp) -> str:
-    """The text below the rows."""
     return " ".join(str(app.screen.query_one("#row-text", Static).visual).split())
 
 
@@ -83,7 +80,6 @@ def on(app: StationApp, kind: type) -> Callable[[], bool]:
 
 
 def play(front: Front, keys: Play, size: tuple[int, int] = (80, 24)) -> StationApp:
-    """Open the start screen and press keys on it."""
     app = StationApp(None, None, front=front)
 
     async def run() -> None:
@@ -100,7 +96,6 @@ async def until_start(pilot: Pilot[None], app: StationApp) -> None:
 
 
 async def choose(pilot: Pilot[None], app: StationApp, part: SetUpPart, wanted: str) -> None:
-    """Choose for a row of the new session, with arrow keys and Enter."""
     options = app.screen.query_one("#rows", OptionList)
     while options.highlighted != ROWS.index(part):
         await press(app, "down" if (options.highlighted or 0) < ROWS.index(part) else "up")
@@ -118,7 +113,6 @@ async def choose(pilot: Pilot[None], app: StationApp, part: SetUpPart, wanted: s
 
 
 async def choose_all(pilot: Pilot[None], app: StationApp) -> None:
-    """Choose what a virtual session needs, where nothing is remembered."""
     await choose(pilot, app, SetUpPart.MACHINE, "reference.yaml")
     await choose(pilot, app, SetUpPart.PLAN, "three.yaml")
     await choose(pilot, app, SetUpPart.INSTRUMENT, "streaming-encoder ")
@@ -127,7 +121,6 @@ async def choose_all(pilot: Pilot[None], app: StationApp) -> None:
 
 
 async def confirm_all(pilot: Pilot[None], app: StationApp) -> None:
-    """Confirm the checklist and begin."""
     await until(pilot, on(app, PrepareScreen))
     await press(app, "y", "b")
     await until(pilot, on(app, MeasureScreen))
@@ -141,7 +134,6 @@ async def answer_temperature(pilot: Pilot[None], app: StationApp, text: str) -> 
 
 
 async def measured(pilot: Pilot[None], app: StationApp, runs: int) -> None:
-    """Run and accept circles until so many count."""
     while app.board.accepted < runs:
         await until(pilot, lambda: app.board.state is State.ANNOUNCED)
         await press(app, "enter")

@@ -200,7 +200,6 @@ def acceptance(_app: StationApp) -> RowScreen:
 
 
 def formers(_app: StationApp) -> RowScreen:
-    """Nothing chosen yet."""
     offered = (
         Former(SHOP / "tuesday", MEASURED, InForce(6, 4, SHOP / "tuesday" / "programs")),
         Former(SHOP / "monday", MEASURED, InForce(6, 0, None)),

@@ -32,7 +32,6 @@ HOG = "while True: pass"
 
 @contextmanager
 def busy(processes):
-    """Keep the computer busy."""
     with ExitStack() as stack:
         for _ in range(processes):
             hog = stack.enter_context(subprocess.Popen([sys.executable, "-c", HOG]))
@@ -41,7 +40,6 @@ def busy(processes):
 
 
 def measured(plan, folder):
-    """Measure a plan twice in a row on one virtual machine; return the text of every run."""
     command = [*PROGRAM, "emulate", "--plan", plan, *WHAT, "--seed", "4", "--wait", "--json"]
     with subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True) as machine:
         try:

@@ -124,7 +124,6 @@ def test_a_program_that_reads_late_gets_every_sample(pty: bool) -> None:  # noqa
 
 
 def next_line(port: serial.SerialBase, clock: HandClock) -> bytes:
-    """The first whole line of a stream, its clock moved until it has come."""
     port.timeout = 0.05
     give_up_s = time.monotonic() + 10.0
     raw = b""

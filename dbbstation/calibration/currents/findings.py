@@ -112,7 +112,6 @@ def _drives(layout: Layout) -> set[str]:
 def _centre_of_gravity(
     layout: Layout, alone: Mapping[str, tuple[NDArray[np.int64], Solution]]
 ) -> dict[str, dict[str, tuple[float, float] | None]]:
-    """Each channel's own centre of gravity."""
     term = next((term for term in layout.terms if term.source.name == "cog-shift"), None)
     if term is None:
         return {}
@@ -131,7 +130,6 @@ def _centre_of_gravity(
 
 
 def _doubts(layout: Layout, x: NDArray[np.float64], solution: Solution, held: frozenset[str]) -> list[str]:
-    """Gains that cannot be right."""
     doubts = []
     sigma = np.sqrt(solution.variance)
     for column, (source, _, name) in enumerate(layout.names):

@@ -58,7 +58,6 @@ def one_way(growing: Sequence[NDArray[np.bool_]], usable: Sequence[NDArray[np.bo
 
 
 def _of_motor(name: str, labels: Sequence[str], current: Sequence[NDArray[np.float64]]) -> list[str]:
-    """Blot out, in place, what one motor's readings cannot say, and say so."""
     logged = [k for k, values in enumerate(current) if np.isfinite(values).any()]
     if not logged:
         return [f"{name}: its current was not logged; nothing is said of its drive, the other motors count"]
@@ -87,7 +86,6 @@ def _of_motor(name: str, labels: Sequence[str], current: Sequence[NDArray[np.flo
 
 
 def _limits(values: NDArray[np.float64]) -> list[float]:
-    """Values at which readings pile up as they do at the limits of an amplifier or a converter."""
     levels, count = np.unique(values, return_counts=True)
     few = 3
     if len(levels) < few:

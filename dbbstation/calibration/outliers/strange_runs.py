@@ -121,7 +121,6 @@ def leave_out(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> 
 def _looks_like(
     calibration: Calibration, others: Sequence[Observation], run: Observation, residual: NDArray[np.float64]
 ) -> tuple[OutlierKind, str]:
-    """What an outlying run most resembles."""
     noise = _strange_from_um(np.array([rms_um(left) for _, left in left_of(calibration)]))
     best, where = np.inf, run
     for other in others:

@@ -187,7 +187,6 @@ def _ball(calibration: Calibration, kind: OutlierKind, freed: tuple[str, ...], w
 
 
 def _bar(calibration: Calibration, session: str, why: str) -> Outlier:
-    """A bar that may have any length, as a fit finds it."""
     terms = {(term.source.name, term.shared): term for term in calibration.layout.terms}
     column = terms["bar-offset", session].columns.start
     offset = 1e3 * float(calibration.x[column])

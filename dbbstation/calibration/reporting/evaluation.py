@@ -134,7 +134,6 @@ def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evalua
 
 
 def _deviations(of: CircleFigures, first: CircleFigures | None = None) -> CircleDeviations:
-    """Figures of a circle, and of its centre beside that of the first one in its direction."""
     apart = None if first is None else apart_um(of, first)
     return CircleDeviations(of.centre_deviation_um, of.mean_radial_error_um, of.circularity_um, apart)
 
@@ -221,7 +220,6 @@ def _figures_of(observation: Observation, residual_mm: NDArray[np.float64]) -> C
 
 
 def _first_in_direction(observations: Sequence[Observation], k: int) -> int:
-    """Index of the first run of k's session in its direction."""
     wanted = observations[k]
     return next(
         i

@@ -84,7 +84,6 @@ def motor_currents(calibration: Calibration) -> CurrentsFigures | None:
 
 
 def _fitted(calibration: Calibration, source: str) -> dict[str, tuple[float, float]]:
-    """Values and standard deviations of a source's parameters."""
     sigma = np.sqrt(np.maximum(calibration.solution.variance, 0.0))
     numbers = zip(calibration.layout.names, calibration.x, sigma, strict=True)
     return {name: (float(value), float(u)) for (of, _, name), value, u in numbers if of == source}

@@ -98,7 +98,6 @@ def parse_job(path: Path, faults: list[Problem]) -> JobFile | None:
 
 
 def _check_tests(document: YamlDocument, job: JobFile, tests: set[str], faults: list[Problem]) -> None:
-    """Every test that a tolerance names is one of the plan."""
     for place, tolerance in enumerate(job.tolerances):
         for unknown in sorted(set(tolerance.tests) - tests):
             known = ", ".join(sorted(tests))

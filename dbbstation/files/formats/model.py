@@ -203,7 +203,6 @@ def _check_rows(document: YamlDocument, file: ModelFile, faults: list[Problem]) 
 
 
 def _check_lengths(document: YamlDocument, file: ModelFile, faults: list[Problem]) -> None:
-    """Add a fault for each list that has not one number for every row of the covariance."""
     lists: list[tuple[Location, tuple[float, ...] | None]] = [
         (("covariance", "formula_variance"), file.covariance.formula_variance),
         *((("null_space", k), row) for k, row in enumerate(file.null_space or ())),

@@ -254,7 +254,6 @@ def parse_plan(path: Path, faults: list[Problem]) -> InlinePlan | None:
 
 
 def _merged(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) -> tuple[set[str], set[str]]:
-    """Names of holders and balls of the plan and its jig file; one in both is a fault."""
     merged = []
     for kind in ("holders", "balls"):
         there = document.data.get(kind)

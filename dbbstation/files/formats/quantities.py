@@ -76,11 +76,9 @@ class Quantity:
         return f"{zero}{sizes} {self.unit}".strip()
 
     def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check after the number itself was checked."""
         return core_schema.no_info_after_validator_function(self.check, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Print unit and range in the JSON Schema."""
         low = -self.most if self.signed else (min(0.0, self.least) if self.or_zero else self.least)
         return {**handler(schema), "unit": self.unit, "minimum": low, "maximum": self.most}
 

@@ -128,7 +128,6 @@ def _flat(file: SettingsFile, path: Path) -> Iterable[tuple[str, Any]]:
 
 
 def _line(document: YamlDocument, key: str) -> int:
-    """Line of a key; of its block where it is a default of that."""
     place = tuple(key.split("."))
     places = document.key_places
     return places.get(place, places.get(place[:1], (1, 1)))[0]

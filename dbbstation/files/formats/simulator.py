@@ -155,7 +155,6 @@ def read_simulator(path: Path) -> SimulatorFile:
 
 
 def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, python: str, faults: list[Problem]) -> None:
-    """Whether the Python file has one simulator, and calls the ports that there are."""
     source = path.parent / python
     own: list[Problem] = []
     data = read_bytes(source, own, LARGEST_PROGRAM)
@@ -223,7 +222,6 @@ def _computed(tree: ast.AST, ports: str) -> bool:
 
 
 def _last(node: ast.expr) -> str:
-    """Last part of a name such as `contract.Simulator`."""
     if isinstance(node, ast.Attribute):
         return node.attr
     return node.id if isinstance(node, ast.Name) else ""

@@ -115,7 +115,6 @@ def _logged_otherwise(
 
 
 def _copied(folder: Path, name: str, sha256: str) -> str:
-    """Keep a copy of a file as it stands, and return where."""
     keep_copies(folder, {name: sha256})
     return copy_name(name, sha256)
 

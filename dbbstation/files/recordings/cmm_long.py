@@ -121,7 +121,6 @@ def _axis(cell: str) -> str | None:
 
 
 def _axis_column(table: TableFile, columns: Mapping[str, str]) -> str | None:
-    """Column in which all three axes come."""
     if "axis" in columns:
         return columns["axis"]
     found = [name for name in table.names if {_axis(cell) for cell in table.cells[name]} >= set(AXES)]

@@ -71,7 +71,6 @@ def read_dmis(path: Path) -> list[DmisPoint]:
 
 
 def _of_the_whole(found: list[DmisPoint], factor: float, file: str, faults: list[Problem]) -> Iterator[Problem]:
-    """Yield what the file lacks as a whole."""
     if found and not factor:
         yield Problem(file, 0, 0, "no unit is stated", "the file needs a statement such as UNITS/MM,ANGDEC")
     if not found and not faults:

@@ -130,7 +130,6 @@ class RunWriter:
         self._synced_at = clock()
 
     def __enter__(self) -> Self:
-        """Return the writer."""
         return self
 
     def __exit__(self, *_: object) -> None:

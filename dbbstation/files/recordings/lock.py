@@ -60,11 +60,9 @@ class SessionLock:
                 os.pwrite(self._file, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
 
     def __enter__(self) -> Self:
-        """Return the lock."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let others write."""
         self.close()
 
     def __del__(self) -> None:
@@ -86,7 +84,6 @@ class SessionLock:
             raise OutputError(f"cannot be written: {why}", where=str(path), remedy=remedy) from error
 
     def _in_place(self, folder: Path) -> bool:
-        """Whether the file that is locked is the one that others would lock."""
         if self._file is None:
             return False
         try:

@@ -116,7 +116,6 @@ def _faults_of_lines(lines: Lines) -> Iterator[Problem]:
 
 
 def _faults_of_time(file: str, t_s: NDArray[np.float64], numbers: Sequence[int]) -> Iterator[Problem]:
-    """Places where time does not rise."""
     for index in (np.flatnonzero(t_s[1:] <= t_s[:-1]) + 1).tolist():
         what = "runs backwards" if t_s[index] < t_s[index - 1] else "stands still"
         what = f"time {what} here: t_s {t_s[index]:g} after {t_s[index - 1]:g}"
@@ -125,7 +124,6 @@ def _faults_of_time(file: str, t_s: NDArray[np.float64], numbers: Sequence[int])
 
 
 def _faults_of_size(file: str, found: dict[str, NDArray[np.float64]], numbers: Sequence[int]) -> Iterator[Problem]:
-    """First value of each column that is larger than is plausible."""
     for name, values in found.items():
         column = columns.COLUMNS[name]
         for index in np.flatnonzero((values > column.size) | (values < -column.size))[:1].tolist():

@@ -254,7 +254,6 @@ def _file_faults(folder: Path, file: Path, seal: Seal, names: Sequence[str]) -> 
 
 
 def _from(folder: Path, name: str, stored: str) -> str:
-    """Where a file can be restored from, in words."""
     copy = copy_name(name, stored)
     return f" from {copy}" if hashes(folder, (copy,)).get(copy) == stored else ""
 

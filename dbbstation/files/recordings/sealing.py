@@ -153,7 +153,6 @@ def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog | None]:
-    """Runs of the text with all links, the seal over them, and the event log."""
     faults: list[Problem] = []
     document = parse_yaml(text, str(path), faults)
     session = None if document is None else validate(document, SessionFile, faults)
@@ -187,7 +186,6 @@ def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog 
 
 
 def _with_links(text: str, path: Path, runs: Sequence[RunEntry]) -> tuple[str, tuple[str, ...]]:
-    """The text with all links of the chain, and the runs that got one."""
     additions = []
     named = []
     for node, run in zip(_runs(text, path), runs, strict=True):
@@ -225,7 +223,6 @@ def _runs(text: str, path: Path) -> Sequence[MappingNode]:
 
 
 def _behind(run: MappingNode, key: str, addition: str, text: str) -> tuple[int, str]:
-    """Where an addition to a run's entry goes, behind one of its keys, and its text."""
     name, value = next((name, value) for name, value in run.value if name.value == key)
     end = value.end_mark.index
     if run.flow_style:

@@ -396,7 +396,6 @@ def part_entry(path: Path) -> RunEntry | None:
 
 
 def _header_faults(run: RunEntry, header: Mapping[str, str]) -> list[Problem]:
-    """Compare what the run file says of itself with its entry."""
     faults = []
     for key, expected in (("test", run.test), ("direction", str(run.direction)), ("repeat", str(run.repeat))):
         if header.get(key, expected) != expected:

@@ -60,7 +60,6 @@ def _check_file(
     folder: Path,
     faults: list[Problem],
 ) -> None:
-    """Check that a file is there and is the one whose hash was noted."""
     file, expected = entry.get("file"), entry.get("sha256")
     if not isinstance(file, str):
         return

@@ -92,7 +92,6 @@ def standing(data: Mapping[str, Any], log: EventLog | None, *, but_runs: bool = 
 
 
 def _log_fault(count: int, log: EventLog | None) -> str:
-    """What is wrong with a log that the seal does not know."""
     if log is None:
         return f"{EVENTS_FILE}, which the seal covers, is not there"
     if count > len(log.events):

@@ -290,7 +290,6 @@ class SessionStore:
         return found, document.data
 
     def _rebuild(self, found: bytes | None) -> None:
-        """Write the session file from the log."""
         self.state = self.log.state()
         self.data = marked(self.state, self.log)
         self.put_aside = self._kept(found)

@@ -49,11 +49,9 @@ class SessionWriter:
         self._session = self._kept = replace(read_session(folder), sha256=self._store.sha256)
 
     def __enter__(self) -> Self:
-        """Return the writer."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let others write into the session."""
         self.close()
 
     def close(self) -> None:

@@ -71,7 +71,6 @@ def with_tabs(lines: list[str]) -> list[str] | None:
 
 
 def _digits(word: str) -> bool:
-    """Whether a word is a number, whatever its decimal sign."""
     return is_number(word.replace(",", "."))
 
 

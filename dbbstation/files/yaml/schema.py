@@ -144,7 +144,6 @@ def format_for(schema: type[Schema], data: Mapping[str, Any]) -> str:
 
 
 def _keys(data: object) -> Iterator[str]:
-    """Keys of all mappings in plain data."""
     if isinstance(data, Mapping):
         for key, value in data.items():
             yield str(key)
@@ -212,7 +211,6 @@ def _problem(document: YamlDocument, schema: type[Schema], detail: ErrorDetails)
 
 
 def _in_words(kind: str, given: object, context: dict[str, Any], message: str) -> tuple[str, str]:  # noqa: PLR0911
-    """What is wrong with a value and what to do, for the kinds of fault that files have."""
     if kind in {"float_type", "int_type", "int_from_float", "finite_number"}:
         number = "a whole number" if kind.startswith("int") else "a number"
         return f"{number} was expected, not {_shown(given)}", "write digits with a dot as decimal sign"

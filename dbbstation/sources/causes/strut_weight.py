@@ -90,7 +90,6 @@ class StrutWeight(LinearSource):
 
 
 def _parts(machine: Machine) -> tuple[str, ...]:
-    """Parts of a strut of which it is known where they act."""
     stated = machine.strut_masses or USUAL
     motor = ("motor",) if stated.motor_length_mm else ()
     screw = ("screw",) if stated.screw_length_mm else ()

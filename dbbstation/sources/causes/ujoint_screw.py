@@ -98,7 +98,6 @@ def _second_axes(axes: JointAxes, struts: Struts, frames: Frames) -> NDArray[np.
 
 
 def _length(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lengths of vectors, the last axis kept."""
     return np.asarray(np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 

@@ -47,7 +47,6 @@ class FollowsTemperature(LinearSource):
     """Columns without their unit, the best choice first: one for all of the part, or one for each strut."""
 
     def __init_subclass__(cls, cause: type[ErrorSource]) -> None:
-        """Take name, owner and texts from the cause."""
         super().__init_subclass__()
         cls.name, cls.belongs_to, cls.texts = cause.name, cause.belongs_to, cause.texts
         cls.detail_mm = cause.detail_mm

@@ -137,7 +137,6 @@ class Reader:
             raise InputError(self.faults[:MOST_FAULTS])
 
     def _groups(self, table: ForeignTable) -> list[tuple[NDArray[np.int64], dict[str, str]]]:
-        """Rows of each run, with what its columns say of it."""
         of_runs = {m: name for m in OF_RUNS if (name := self.mapping.column(m)) is not None}
         clock = of_runs.pop(STARTED, None)  # may be another one in each row: the first of a run counts
         cells = [table.table.cells[name] for name in of_runs.values()]
@@ -163,8 +162,6 @@ class Reader:
         ]
 
     def _split(self, table: ForeignTable) -> list[NDArray[np.int64]]:
-        """Rows of each run of a table whose columns do not say it."""
-
         def numbers(means: str) -> NDArray[np.float64] | None:
             name = self.mapping.column(means)
             if name is None or name not in table.table.values:
@@ -360,7 +357,6 @@ class Reader:
         return repeat
 
     def _state(self, text: str, file: str, line: int) -> RunState:
-        """State of a run: accepted where nothing is said."""
         if text and text not in set(RunState):
             self._fault(file, line, f"`{text}` is no state of a run", f"use one of {', '.join(_STATES)}")
         return RunState(text) if text in _STATES else RunState.ACCEPTED

@@ -157,7 +157,6 @@ def _from_angles(theta_deg: NDArray[np.float64], circle: Circle) -> TravelledPat
 
 
 def _from_zero(t_s: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Times of a clock from their first sample on; others as they are."""
     back = np.flatnonzero(np.diff(t_s) <= 0.0)
     if len(back):
         k = int(back[0]) + 1

@@ -49,13 +49,11 @@ class PlanSensitivity:
 
     @property
     def rank(self) -> int:
-        """Directions that the circles see."""
         singular = self.singular
         return int(np.count_nonzero(singular > RANK_TOLERANCE * singular[0]))
 
     @property
     def condition(self) -> float:
-        """Greatest over least singular value among those seen."""
         singular = self.singular
         return float(singular[0] / singular[self.rank - 1])
 
@@ -92,7 +90,6 @@ def _circle_rows(
 
 
 def _without_centre(rows: NDArray[np.float64], theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows with everything a shift of the centre could make taken out."""
     theta = np.radians(theta_deg)
     centre, _ = np.linalg.qr(np.column_stack([np.cos(theta), np.sin(theta)]))
     return rows - centre @ (centre.T @ rows)

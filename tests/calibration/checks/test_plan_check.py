@@ -19,7 +19,6 @@ from tests.plant.session import record
 
 
 def recorded_under(folder, letters, tilts_written=1.0):
-    """A session recorded at the tilts of its plan, whose plan then says so many times as much."""
     plan = subset(table_ii_plan(3), letters)
     record(folder, seed=3, plan=plan, mechanisms=[RandomKinematics(0.05, 0.05)], rate_hz=10.0)
     path = folder / "plan.yaml"

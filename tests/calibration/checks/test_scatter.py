@@ -25,7 +25,6 @@ def machine():
 
 
 def sessions(machine, stated):
-    """Calibrations of sessions whose plan states `stated` times the size that balls scatter by."""
     plan = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
     truth = MachineModel(machine, random_kinematics(machine, 5))
     for seed in range(SESSIONS):

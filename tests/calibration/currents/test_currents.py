@@ -48,7 +48,6 @@ def session(folder, seed, *, drives=DRIVES, weights=(), tests="", rate_hz=20.0):
 
 
 def true_values(drives=DRIVES):
-    """By parameter, as the simulation was told."""
     found = {f"{axis}_mm": value for axis, value in zip("xyz", SHIFT_MM, strict=True)}
     for motor in range(6):
         kinds = {
@@ -63,7 +62,6 @@ def true_values(drives=DRIVES):
 
 
 def numbers(calibration, of=("cog-shift", "drive-friction")):
-    """Names, values and covariance of the parameters of some sources."""
     columns = [k for k, name in enumerate(calibration.layout.names) if name[0] in of]
     names = [calibration.layout.names[k][2] for k in columns]
     return names, calibration.x[columns], calibration.solution.covariance[np.ix_(columns, columns)]
@@ -76,7 +74,6 @@ def value(calibration, name):
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
-    """Five circles, quick to fit."""
     folder = tmp_path_factory.mktemp("plant") / "small"
     return folder, session(folder, 21, tests="abcde", rate_hz=5.0)
 
@@ -172,7 +169,6 @@ def test_long_runs_say_as_much_as_their_means(tmp_path, fitted):
 
 
 def spoilt(recorded, change):
-    """Runs with their currents changed by a function of the run's number and array."""
     return tuple(
         replace(o, raw=replace(o.raw, logged=currents(change(k, o.raw.motor_current_a.copy()))))
         for k, o in enumerate(recorded.observations)

@@ -24,7 +24,6 @@ USUAL = ("strut-reference-length", "base-joints", "mounting", "ball-coordinate",
 
 @pytest.fixture(scope="module")
 def long_runs(tmp_path_factory):
-    """Thirty runs of eleven thousand samples."""
     folder = tmp_path_factory.mktemp("plant") / "long"
     record(folder, seed=7, plan=elevated(table_ii_plan(7), 5.0, "abcde"), mechanisms=[ERRORS], rate_hz=200.0)
     return load_sessions([folder])

@@ -26,7 +26,6 @@ def clean(tmp_path_factory):
 
 
 def fitted_with(clean, source, values):
-    """The same session as that source would have changed it, fitted with the source."""
     recorded, calibration = clean
     runs = []
     for run in recorded.observations:

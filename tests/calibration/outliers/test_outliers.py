@@ -41,7 +41,6 @@ def robust(recorded, runs):
 
 
 def pull(calibration, sound):
-    """Greatest change of a parameter in units of its uncertainty."""
     sigma = np.sqrt(np.diag(sound.solution.covariance)[:24])
     return float(np.abs((calibration.x[:24] - sound.x[:24]) / sigma).max())
 
@@ -62,7 +61,6 @@ def moved(run, x_mm, y_mm):
 
 
 def filed(run, readings):
-    """The readings of another run, filed under this one."""
     count = min(len(run.raw), len(readings.raw))
     raw = replace(
         run.raw, t_s=run.raw.t_s[:count], phi_deg=run.raw.phi_deg[:count], length_mm=readings.raw.length_mm[:count]

@@ -39,7 +39,6 @@ RATE_HZ = 5.0
 
 
 def hidden(seed, *, rubs=True):
-    """What is wrong with the machine of a seed."""
     rng = np.random.default_rng([seed, 77])
     compliance = rng.uniform(7.0e-6, 13.0e-6)
     kinematics = RandomKinematics(0.1, 0.1).drawn(np.random.default_rng([seed, 5]), None)
@@ -58,8 +57,6 @@ def recorded_machine(folder, seed, *, rubs=True, drives=(), rate_hz=RATE_HZ):
 
 @pytest.fixture(scope="module")
 def machines(tmp_path_factory):
-    """Folder of the machine of a seed, recorded once."""
-
     @cache
     def folder_of(seed, *, rubs=True):
         return recorded_machine(tmp_path_factory.mktemp("machine"), seed, rubs=rubs)
@@ -100,7 +97,6 @@ def test_held_out_conditions_are_predicted_on_many_machines(tmp_path, seed):
 
 @pytest.mark.slow
 def test_without_friction_among_the_sources_the_mean_of_both_directions_is_predicted(machines):
-    """What friction does has the other sign in the other direction."""
     folder = machines(7)
     calibration = joint(folder, GRAVITY)
     held_out = load_sessions([folder / "conditions"], ["A", "B"]).observations
@@ -112,7 +108,6 @@ def test_without_friction_among_the_sources_the_mean_of_both_directions_is_predi
 
 @pytest.mark.slow
 def test_a_weight_that_is_a_fifth_too_large_predicts_the_same(machines):
-    """The compliance takes it up; without any weight the error says so."""
     folder = machines(3, rubs=False)
     seen = load_sessions([folder / "jig", folder / "conditions"], HELD_OUT)
     held_out = load_sessions([folder / "conditions"], ["A", "B"]).observations

@@ -107,7 +107,6 @@ def test_a_model_survives_to_the_last_bit(tmp_path_factory, reference, seed) -> 
 
 @pytest.mark.parametrize("source", known_sources().values(), ids=lambda source: source.name)
 def test_every_source_survives_in_a_model(tmp_path: Path, source) -> None:
-    """On a machine whose file has every key."""
     machine = read_machine(shipped_folder("fixtures") / "machines" / "every-key.yaml")
     parameters = source.parameters(machine)
     values = np.random.default_rng(5).normal(size=len(parameters))

@@ -33,7 +33,6 @@ def samples(count: int) -> list[tuple[float, float, str]]:
 
 
 def written(folder: Path, count: int = 200) -> tuple[bytes, int]:
-    """A journal's bytes, of `count` samples, and how many of them were synced when the power went."""
     with writer_in(folder) as writer:
         for index, sample in enumerate(samples(count)):
             writer.append(sample)
@@ -54,7 +53,6 @@ def rows_of(data: bytes) -> list[tuple[float, float, bool]]:
 
 
 def rows_in(data: bytes) -> list[tuple[float, float, bool]]:
-    """What was written, read by a hand of the test's own."""
     rows = []
     for line in data.split(b"\n")[4:-1]:
         t_s, length_mm, status, _ = line.decode().split(",")

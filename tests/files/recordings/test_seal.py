@@ -33,7 +33,6 @@ PLAN = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Path:
-    """Six runs of three tests, as the station seals them."""
     folder = tmp_path_factory.mktemp("sealed") / "session"
     machine, plan = read_machine(MACHINE), read_inline_plan(PLAN)
     virtual = VirtualMachine(MachineModel(machine, random_kinematics(machine, 7)), plan.to_domain(), seed=7)
@@ -65,7 +64,6 @@ def change(path: Path, old: str, new: str, count: int = 1) -> None:
 
 
 def run_lines(folder: Path) -> tuple[list[str], list[str]]:
-    """The session file's lines before its runs, and its runs."""
     lines = (folder / "session.yaml").read_text(encoding="utf-8").splitlines(keepends=True)
     at = lines.index("runs:\n") + 1
     return lines[:at], lines[at:]

@@ -27,7 +27,6 @@ def session(tmp_path: Path) -> Path:
 
 
 def edit(folder: Path, old: str, new: str, name: str = "session.yaml") -> tuple[int, int]:
-    """Change a file; return line and column of the change."""
     path = folder / name
     text = path.read_text()
     at = text.index(old)
@@ -36,7 +35,6 @@ def edit(folder: Path, old: str, new: str, name: str = "session.yaml") -> tuple[
 
 
 def rewrite_run(folder: Path, name: str, change) -> None:
-    """Change a run and note its new hash, as one who means it would."""
     path = folder / "runs" / name
     old = path.read_bytes()
     new = change(old.decode()).encode()
@@ -203,7 +201,6 @@ def test_a_file_that_holds_another_run(session: Path, change, said: str) -> None
 
 
 def plain(text: str, t_factor: float = 1.0, factor: float = 1.0, offset: float = 0.0) -> str:
-    """The run without checksums, in other units."""
     lines = text.splitlines()
     rows = [line.split(",") for line in lines[4:]]
     body = [f"{float(row[0]) * t_factor:.7f},{(float(row[1]) - offset) * factor:.9f}" for row in rows]

@@ -30,7 +30,6 @@ def session(tmp_path: Path) -> Path:
 
 
 def edit(folder: Path, old: str, new: str, name: str = "session.yaml", count: int = 1) -> int:
-    """Change a file; return the line of the change."""
     path = folder / name
     text = path.read_text()
     assert old in text

@@ -37,7 +37,6 @@ def place_of(text: str, needle: str) -> str:
 
 
 def changed(text: str, old: str, new: str) -> tuple[str, str]:
-    """The text with one thing changed, and the place of that change."""
     assert text.count(old) >= 1
     return text.replace(old, new, 1), place_of(text, old)
 

@@ -32,7 +32,6 @@ VALUE = st.recursive(
 
 
 def tuples(value: object) -> object:
-    """As reading has it: sequences are tuples."""
     if isinstance(value, dict):
         return {key: tuples(item) for key, item in value.items()}
     return tuple(map(tuples, value)) if isinstance(value, list) else value

@@ -31,7 +31,6 @@ command, status, errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_ch
 
 
 def until(reached, what):
-    """Wait for a condition of the status."""
     end_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < end_s:
         status.poll()
@@ -46,7 +45,6 @@ def idle():
 
 
 def refused():
-    """What LinuxCNC complains about, apart from messages of the program."""
     told = errors.poll()
     return "" if told is None or told[0] in {linuxcnc.OPERATOR_TEXT, linuxcnc.OPERATOR_DISPLAY} else str(told[1])
 

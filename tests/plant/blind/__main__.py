@@ -10,7 +10,6 @@ from tests.plant.blind.sessions import make_study
 
 
 def main() -> None:
-    """Read the command line and make the study."""
     parser = argparse.ArgumentParser(prog="python -m tests.plant.blind", description=__doc__)
     parser.add_argument("out", type=Path, help="folder for the sessions and answers.json; must not exist or be empty")
     parser.add_argument("--clean", type=int, default=20, help="sessions with nothing hidden")

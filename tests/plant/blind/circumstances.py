@@ -45,11 +45,9 @@ class Circumstances:
     breaks_s: dict[str, float]
 
     def scene(self) -> Scene:
-        """The runs in time."""
         return scene_of(self.plan, self.machine, self.timing, self.breaks_s)
 
     def told(self) -> dict[str, Any]:
-        """For the answer."""
         return {
             "machine": self.machine.name,
             "rotation": self.machine.rotation,
@@ -66,7 +64,6 @@ class Circumstances:
 
 
 def drawn(rng: np.random.Generator, seed: int) -> Circumstances:
-    """A session as a shop might measure it."""
     plan, kind = _plan(rng, seed)
     rate_hz = float(rng.choice(RATES_HZ, p=RATE_SHARES))
     rotation = CONVENTIONS[int(rng.integers(2))]
@@ -118,7 +115,6 @@ def _plan(rng: np.random.Generator, seed: int) -> tuple[Plan, str]:
 
 
 def _noise(rng: np.random.Generator, rate_hz: float) -> Noise:
-    """White, or with one or two memories of up to a seventh of a second."""
     white_um = float(rng.uniform(0.2, 0.7))
     if rng.random() < 0.4:
         return Noise(white_um)
@@ -131,5 +127,4 @@ def _noise(rng: np.random.Generator, rate_hz: float) -> Noise:
 
 
 def recorded_currents() -> tuple[Mechanism, ...]:
-    """Motor currents in the recording, which are no error of any circle."""
     return (DriveCurrents(),)

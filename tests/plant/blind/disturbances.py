@@ -46,7 +46,6 @@ def _bent_scale(rng: np.random.Generator, scene: Scene) -> Effect:
 
 
 def _bumped_jig(rng: np.random.Generator, scene: Scene) -> Effect:
-    """Along the plate for the most part."""
     from_run = int(rng.integers(LEAST_RUNS, len(scene.slots) - LEAST_RUNS))
     direction = rng.standard_normal(3) * np.array([1.0, 1.0, 0.2])
     x, y, z = (direction / np.linalg.norm(direction)).tolist()

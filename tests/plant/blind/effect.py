@@ -37,11 +37,9 @@ class Effect:
     carrier_amplitude: float = 0.0
 
     def at(self, scale: float) -> Mechanism:
-        """The mechanism with its largest amplitude at `scale`."""
         return self.make(scale * self.direction)
 
     def carried_by(self) -> list[Mechanism]:
-        """Mechanisms that it needs beside itself."""
         return [carrier.at(carrier.carrier_amplitude) for carrier in self.carriers]
 
     def signs(self) -> FloatArray:

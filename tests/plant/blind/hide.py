@@ -45,7 +45,6 @@ class Hidden:
 
     @property
     def mechanism(self) -> Mechanism:
-        """As it acts."""
         law = self.effect.at(self.scale)
         return law if self.perturbation is None else self.perturbation.apply(law)
 
@@ -63,14 +62,12 @@ class Hider:
         )
 
     def at(self, effects: Sequence[Effect], scales: Sequence[float]) -> list[Hidden]:
-        """Effects at sizes that are given, in their own units; the answers say what shows with the others fitted too."""
         return [
             self._hidden(effect, scale, self._columns([other for other in effects if other is not effect]))
             for effect, scale in zip(effects, scales, strict=True)
         ]
 
     def single(self, name: str) -> list[Hidden]:
-        """One effect of the list; another one where this one cannot be large enough on this plan."""
         for draw in range(DRAWS):
             effect = self._drawn(name if draw < DRAWS // 4 else str(self._rng.choice(SINGLE)))
             scale = self._size() * TESTABLE_SIGMA / self._limits.sigmas(self._unit(effect))
@@ -79,7 +76,6 @@ class Hider:
         raise ArithmeticError("nothing of the list shows on this plan")
 
     def several(self, count: int) -> list[Hidden]:
-        """So many effects of the list, each of which shows with all the others fitted too."""
         for _ in range(DRAWS):
             names = [str(name) for name in self._rng.choice([*SINGLE, "cog-shift"], count, replace=False)]
             effects = [self._drawn(name) for name in names]

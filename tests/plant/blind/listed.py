@@ -183,7 +183,6 @@ def _screw_lead(rng: np.random.Generator, scene: Scene) -> Effect:
 
 
 def _common_lead(rng: np.random.Generator, scene: Scene) -> Effect:
-    """All six screws from one batch, with one error."""
     alone = _screw_lead(rng, scene)
     return replace(alone, direction=rng.choice([-1.0, 1.0]) * np.ones(6), struts=())
 

@@ -77,7 +77,6 @@ def _by_direction(rng: np.random.Generator, size: float) -> Callable[[Mechanism]
 
 
 def _elastic(rng: np.random.Generator, size: float) -> _Drawn:
-    """From strut to strut, and contacts that stiffen."""
     by_strut, load = _strut_by_strut(rng, size), size * float(rng.uniform(0.0, 1.0))
     return ("strut", "load"), lambda law: ByLoad(by_strut(law), load)
 
@@ -102,7 +101,6 @@ def _worn(rng: np.random.Generator, size: float) -> _Drawn:
 
 
 def _turning(rng: np.random.Generator, size: float) -> _Drawn:
-    """What happens to drives on reversal: not the same one way as the other, nor at all lengths."""
     along, direction = _along(rng, size), _by_direction(rng, size)
     return ("length", "direction"), lambda law: direction(along(law))
 

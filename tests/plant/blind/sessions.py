@@ -44,7 +44,6 @@ class Task:
 
     @property
     def folder(self) -> str:
-        """Name of the session's folder."""
         return f"{self.number:04d}"
 
 
@@ -70,7 +69,6 @@ def tasks(counts: dict[str, int], seed: int, perturbed_share: float = 0.0) -> li
 
 
 def make_session(out: FilePath, seed: int, task: Task) -> dict[str, Any]:
-    """Write one session; return the answer to it. The same seed and task make the same bytes."""
     session_seed = int(np.random.default_rng([seed, task.number]).integers(2**31))
     rng = np.random.default_rng([session_seed, 2])
     circumstances = drawn(rng, session_seed)

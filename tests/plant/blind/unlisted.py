@@ -31,7 +31,6 @@ ONE = np.ones(1)
 
 
 def strut_and_length(rng: np.random.Generator, scene: Scene) -> tuple[int, float]:
-    """A strut and a length that it passes in several of the tests."""
     from tests.plant.hexapod import strut_lengths  # noqa: PLC0415 - only here
 
     strut = int(rng.integers(6))

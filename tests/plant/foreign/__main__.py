@@ -20,7 +20,6 @@ from tests.plant.foreign.sessions import make
 
 
 def main() -> None:
-    """Read the command line and do what it says."""
     parser = argparse.ArgumentParser(prog="python -m tests.plant.foreign", description=__doc__.splitlines()[0])
     parser.add_argument("task", choices=("make", "run", "score"))
     parser.add_argument("folder", type=Path)

@@ -18,13 +18,11 @@ INTERRUPTED = "interrupted"
 
 
 def commit_of(checkout: Path) -> str:
-    """The commit that is checked out, in eight digits."""
     asked = ["git", "-C", str(checkout), "rev-parse", "--short=8", "HEAD"]
     return subprocess.run(asked, check=True, capture_output=True, text=True).stdout.strip()
 
 
 def judge(folder: Path, checkout: Path, commit: str, session: str) -> dict[str, Any]:
-    """What a checkout says of a session; kept in `folder/verdicts/COMMIT`, and read from there the next time."""
     kept = folder / "verdicts" / commit / f"{session}.json"
     if kept.exists():
         return dict(json.loads(kept.read_text(encoding="utf-8")))

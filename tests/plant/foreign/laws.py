@@ -50,7 +50,6 @@ def _play(rng: np.random.Generator) -> Perturbation:
 
 
 def _cyclic(rng: np.random.Generator) -> Perturbation:
-    """A fifth to a half of it comes twice per turn."""
     share = float(rng.uniform(0.2, 0.5))
     harmonic, phase_deg = _six(share * rng.uniform(0.7, 1.0, 6)), _six(rng.uniform(0, 360, 6))
 
@@ -67,7 +66,6 @@ def _gravity(rng: np.random.Generator) -> Perturbation:
 
 
 def _two_stages(rng: np.random.Generator) -> Perturbation:
-    """Heated through another body."""
     first_s, idle = float(np.exp(rng.uniform(np.log(900.0), np.log(4000.0)))), float(rng.uniform(0.3, 1.0))
     share = float(rng.uniform(0.3, 0.9))
 

@@ -20,7 +20,6 @@ SILENT = ("clean", "walk", "stick-slip")
 
 
 def scored(folder: Path, commits: Sequence[str], sessions: Sequence[str], seed: int) -> dict[str, Any]:
-    """Figures of every commit over those of the sessions that it has diagnosed, and over those that all have."""
     verdicts = {commit: _verdicts(folder / "verdicts" / commit, sessions) for commit in commits}
     answers = {name: _read(folder / "answers" / f"{name}.json") for of in verdicts.values() for name in of}
     shared = [name for name in sessions if all(name in of for of in verdicts.values())]
@@ -35,7 +34,6 @@ def scored(folder: Path, commits: Sequence[str], sessions: Sequence[str], seed: 
 
 
 def as_table(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """The figures as the validation page takes them: a column a commit."""
     of = figures["commits"].values()
     rows = {
         "sessions": [one["sessions"] for one in of],

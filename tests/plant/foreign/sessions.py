@@ -221,5 +221,4 @@ DISTURBING: dict[str, Any] = {
 
 
 def _even(rng: np.random.Generator, bounds: tuple[float, float]) -> float:
-    """Evenly in the logarithm."""
     return float(np.exp(rng.uniform(*np.log(bounds))))

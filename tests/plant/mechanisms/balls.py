@@ -27,7 +27,6 @@ class MountingShifts(Mechanism):
     shift_um: Mapping[int, FloatArray] = field(default_factory=dict)
 
     def fixed_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """The shift of the mounting on which the run was measured."""
         del platform
         shift_um = self.shift_um.get(motion.of_run.mounting)
         return None if shift_um is None else motion.scene.plan.jig_rotation @ shift_um / 1000.0
@@ -42,7 +41,6 @@ class MountingScatter(Mechanism):
     factor: float = 1.0
 
     def drawn(self, rng: np.random.Generator, scene: Scene) -> Mechanism:
-        """One independent shift per mounting."""
         holders = {slot.mounting: scene.plan.ball(slot.test.ball).holder for slot in scene.slots}
         return MountingShifts(
             {
@@ -68,7 +66,6 @@ class BallCoordinates(Mechanism):
     error_um: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def fixed_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """The error of the entry that the run's test names."""
         del platform
         error_um = self.error_um.get(motion.of_run.test.ball)
         return None if error_um is None else motion.scene.plan.jig_rotation @ np.asarray(error_um) / 1000.0
@@ -83,7 +80,6 @@ class CmmScatter(Mechanism):
     factor: float = 1.0
 
     def drawn(self, rng: np.random.Generator, scene: Scene) -> Mechanism:
-        """One independent error per entry."""
         return BallCoordinates(
             {ball.name: self.factor * ball.uncertainty_um * rng.standard_normal(3) for ball in scene.plan.balls}
         )

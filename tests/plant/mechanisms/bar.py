@@ -27,7 +27,6 @@ class BarOffset(Mechanism):
     offset_um: float = 0.0
 
     def reading_mm(self, motion: Motion, platform: Platform, length_mm: FloatArray) -> FloatArray:
-        """The constant, `()`."""
         del motion, platform, length_mm
         return np.array(self.offset_um / 1000.0)
 
@@ -41,7 +40,6 @@ class RandomBarOffset(Mechanism):
     sd_um: float = 0.5
 
     def drawn(self, rng: np.random.Generator, scene: Scene) -> Mechanism:
-        """One error for the session."""
         del scene
         return BarOffset(self.sd_um * float(rng.standard_normal()))
 

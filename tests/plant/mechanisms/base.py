@@ -27,12 +27,10 @@ class Mechanism:
     """False for an outsider: an effect that no catalogue of hexapod errors has."""
 
     def drawn(self, rng: np.random.Generator, scene: Scene) -> Mechanism:
-        """The mechanism with everything random in it decided for one session."""
         del rng, scene
         return self
 
     def built(self, machine: Machine) -> Machine:
-        """The machine as it really is, given the machine as it was without this."""
         return machine
 
     def sampled_s(self, motion: Motion) -> FloatArray | None:
@@ -68,5 +66,4 @@ class Mechanism:
         return {}
 
     def parameters(self) -> dict[str, Any]:
-        """What was decided, for the truth."""
         return asdict(self) if is_dataclass(self) else {}

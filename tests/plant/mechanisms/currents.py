@@ -39,7 +39,6 @@ class DriveCurrents(Mechanism):
     stream: int = 0
 
     def drawn(self, rng: np.random.Generator, scene: Scene) -> Mechanism:
-        """Decides the stream of the noise."""
         del scene
         return replace(self, stream=int(rng.integers(2**31)))
 

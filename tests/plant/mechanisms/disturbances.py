@@ -46,7 +46,6 @@ class WanderingBar(Mechanism):
         return np.interp(motion.session_s, WALK_STEP_S * np.arange(len(walk_um)), walk_um) / 1000.0
 
     def parameters(self) -> dict[str, float]:
-        """How fast it wanders."""
         return {"step_um_root_s": self.step_um_root_s}
 
 

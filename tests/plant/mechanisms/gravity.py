@@ -46,7 +46,6 @@ class CentreOfGravityShift(Mechanism):
     shift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def built(self, machine: Machine) -> Machine:
-        """The machine with its true centre of gravity."""
         x_mm, y_mm, z_mm = (
             at_mm + by_mm for at_mm, by_mm in zip(machine.centre_of_gravity_mm, self.shift_mm, strict=True)
         )

@@ -35,7 +35,6 @@ class Kinematics(Mechanism):
     platform_mm: FloatArray = field(default_factory=_zeros_63)
 
     def built(self, machine: Machine) -> Machine:
-        """Joints where they really are."""
         return replace(
             machine,
             base_joints_mm=machine.base_joints_mm + self.base_mm,
@@ -59,7 +58,6 @@ class RandomKinematics(Mechanism):
     platform_sd_mm: float = 0.0
 
     def drawn(self, rng: np.random.Generator, scene: Scene) -> Mechanism:
-        """Independent normal errors."""
         del scene
         return Kinematics(
             self.length_sd_mm * rng.standard_normal(6),

@@ -33,66 +33,51 @@ class Perturbed(Mechanism):
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        """That of the law: it is the same cause."""
         return self.law.name
 
     @property
     def listed(self) -> bool:  # type: ignore[override]
-        """As the law is."""
         return self.law.listed
 
     def drawn(self, rng: np.random.Generator, scene: Scene) -> Mechanism:
-        """Everything random must have been decided before a law is perturbed."""
         if self.law.drawn(rng, scene) is not self.law:
             raise ValueError(f"{self.name} is random still: draw it, then perturb it")
         return self
 
     def built(self, machine: Machine) -> Machine:
-        """As the law has it; so are all hooks below."""
         return self.law.built(machine)
 
     def sampled_s(self, motion: Motion) -> FloatArray | None:
-        """Of the law."""
         return self.law.sampled_s(motion)
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray | None:
-        """Of the law."""
         return self.law.driven_mm(motion, driven_mm)
 
     def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """Of the law."""
         return self.law.lengthening_mm(motion, platform)
 
     def base_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """Of the law."""
         return self.law.base_shift_mm(motion, platform)
 
     def joint_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """Of the law."""
         return self.law.joint_shift_mm(motion, platform)
 
     def load(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """Of the law."""
         return self.law.load(motion, platform)
 
     def fixed_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """Of the law."""
         return self.law.fixed_ball_mm(motion, platform)
 
     def tool_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """Of the law."""
         return self.law.tool_ball_mm(motion, platform)
 
     def reading_mm(self, motion: Motion, platform: Platform, length_mm: FloatArray) -> FloatArray | None:
-        """Of the law."""
         return self.law.reading_mm(motion, platform, length_mm)
 
     def columns(self, motion: Motion, platform: Platform) -> dict[str, FloatArray]:
-        """Of the law."""
         return self.law.columns(motion, platform)
 
     def parameters(self) -> dict[str, Any]:
-        """Those of the law, and what was done to it."""
         own = {key: value for key, value in vars(self).items() if key != "law"}
         before = self.law.parameters()
         return {**before, "perturbed": [*before.get("perturbed", ()), {"form": type(self).__name__, **own}]}

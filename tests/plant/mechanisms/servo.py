@@ -95,6 +95,5 @@ class TimeSkew(Mechanism):
     late_ms: float = 5.0
 
     def sampled_s(self, motion: Motion) -> FloatArray:
-        """The same for all samples, `()`."""
         del motion
         return np.array(self.late_ms / 1000.0)

@@ -111,7 +111,6 @@ def test_a_motion_without_readings_is_refused(reference, rng):
 
 
 def test_noise_of_the_readings_is_not_taken_for_a_wave(rng):
-    """Readings with noise in them, which dwell about one phase of the wave; a wave at these would resemble the noise."""
     count, noise_mm = 2000, 1e-3
     true_mm = 150.0 + 0.002 * np.sin(np.linspace(0.0, 2.0 * np.pi, count))
     alike = []

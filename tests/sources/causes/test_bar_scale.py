@@ -35,7 +35,6 @@ def test_bars_of_any_length_count_from_their_own_millimetre(reference):
 
 
 def test_noise_of_the_readings_is_not_followed(rng):
-    """A parabola at noisy readings has twice the reading times its noise in it."""
     true_mm = 150.0 + 0.1 * np.sin(np.linspace(0.0, 2.0 * np.pi, 2000))
     alike = []
     for _ in range(30):

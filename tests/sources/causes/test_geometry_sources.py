@@ -31,7 +31,6 @@ def lengths(machine, motion):
 
 
 def swallowed(source, machine, motion):
-    """Share of each signature that kinematic parameters swallow."""
     nothing = np.zeros(len(source.parameters(machine)))
     return concealed_share(machine, motion, lambda m: source.derivative(m, machine, nothing))
 

@@ -48,7 +48,6 @@ def strut_um(machine, motion, compliance=COMPLIANCE_UM_KN):
 
 
 def circularity_um(length_mm):
-    """Of a reading, with what else a machine shows."""
     return np.hypot(1e3 * np.ptp(best_circle(THETA_DEG, length_mm)[2]), 4.0)
 
 

@@ -23,7 +23,6 @@ WARM, BENT = JigThermal(), JigDistortion()
 
 
 def at(x, y, z, plate=PLATE) -> Motion:
-    """One pose with the ball at a place of the jig's frame."""
     origin = (0.0, 0.0, 0.0) if plate is None else plate.origin_mm
     setup = Setup("s", "m", "b", "bar", np.array([x, y, z]) + origin, 0.0, 0.0, 0.0, plate=plate)
     return Motion(np.array([[0.0, 0.0, -1008.0, 0.0, 0.0, 0.0]]), setup=setup)

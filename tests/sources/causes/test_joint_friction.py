@@ -186,7 +186,6 @@ def test_what_is_left_open_holds_the_joints_of_the_independent_plant(reference):
 
 
 def _unexplained(target, columns):
-    """Share of a target that no combination of columns is."""
     return np.linalg.norm(target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]) / np.linalg.norm(target)
 
 

@@ -40,7 +40,6 @@ def struts_at(machine, frames):
 
 
 def across_the_strut(machine, rng):
-    """First axes of all joints, across their struts in the middle of the travel."""
     rest = inverse(machine.hexapod, middle(machine)).unit[0]
     return (unit(np.cross(rest, rng.normal(size=(6, 3)))) for _ in range(2))
 

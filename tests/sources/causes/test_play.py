@@ -33,7 +33,6 @@ def jig_run(test, **given):
 
 
 def changes_sign(machine, motion):
-    """Struts whose force changes sign, by gravity's own tensions."""
     stretch = Gravity().effect(motion, machine, np.ones(1)).strut_mm[motion.kept]
     return (stretch.min(axis=0) < 0) & (stretch.max(axis=0) > 0)
 

@@ -32,7 +32,6 @@ RUNS_S = ((0.0, 1500.0), (1700.0, 2600.0), (5000.0, 6000.0), (6900.0, 14000.0))
 
 
 def in_session(time_s, moving_s=RUNS_S) -> Motion:
-    """Poses at some times of a session."""
     setup = Setup("session", "mounting", "ball", "bar", np.zeros(3), 1e-3, 1e-3, 5e-4, moving_s=moving_s)
     return Motion(np.zeros((len(time_s), 6)), time_s=time_s, setup=setup)
 

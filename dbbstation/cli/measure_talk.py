@@ -66,6 +66,7 @@ class Talk:
         self._centre = _OF_MACHINE
 
     def __call__(self, event: events.Event) -> None:
+        """Show an event."""
         if isinstance(event, events.RunAnnounced):
             self._centre = _OF_MACHINE if event.ball.place_known else _OF_SET_UP
         if isinstance(event, events.RunProgress):
@@ -91,6 +92,7 @@ class Log:
     """Logs what happens; an observer of the station."""
 
     def __call__(self, event: events.Event) -> None:
+        """Log an event."""
         for line in _lines(event, _OF_MACHINE):
             log_said(line.strip())
         if isinstance(event, events.Fault):
@@ -166,6 +168,7 @@ class Keyboard:
         self._thread.start()
 
     def __call__(self, event: events.Event) -> None:
+        """Take over the station's state."""
         if isinstance(event, events.StateChanged):
             self._state = event.state
         elif isinstance(event, events.RunCompleted):

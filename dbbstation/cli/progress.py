@@ -129,6 +129,7 @@ class Compiling:
         self._said = False
 
     def __call__(self, begun: bool) -> None:  # noqa: FBT001 - as the compiler tells it
+        """Show that a loop begins to be compiled, or that it is."""
         if not begun:
             self._bar.end()
             return

@@ -41,6 +41,7 @@ class ScaledClock:
         self._start_s = time.monotonic()
 
     def __call__(self) -> float:
+        """Return the scaled time since the start [s]."""
         return (time.monotonic() - self._start_s) * self.scale
 
     def real_s(self, virtual_s: float) -> float:
@@ -73,6 +74,7 @@ class WaitingClock(ScaledClock):
         self._stands = threading.Condition()
 
     def __call__(self) -> float:
+        """Return the time at which the clock stands [s]."""
         return self._now_s
 
     def real_s(self, virtual_s: float) -> float:

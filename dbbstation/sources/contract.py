@@ -12,6 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
@@ -215,7 +216,7 @@ class Motion(WithLogged):
         logged = {name: changed.pop(name) for name in self.logged}
         return replace(self, kept=slice(None), logged=logged, put_up=None, **changed)  # type: ignore[arg-type]
 
-    @property
+    @cached_property
     def provides(self) -> frozenset[Need]:
         """What sources may ask of this motion."""
         given = {Need.POSE: True, Need.PATH: self.is_path, Need.TIME: self.time_s is not None}

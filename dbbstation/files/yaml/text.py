@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import re
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from ruamel.yaml import YAML
@@ -83,6 +83,9 @@ MOST_VALUES = MOST_NODES
 DEEPEST = 50
 """Lists and mappings that may stand in one another: the formats have eight."""
 
+SHORT = 10_000
+"""Characters of a text that is kept when it was parsed, with 63 others: 5 MB of plans, machines and instruments, 60 MB at most."""
+
 LONGEST_TAG = 1000
 """Characters of a tag. None is allowed, but each is read to its end first."""
 
@@ -99,16 +102,19 @@ def load_yaml(path: Path, faults: list[Problem]) -> YamlDocument | None:
 
 def parse_yaml(text: str, file: str, faults: list[Problem]) -> YamlDocument | None:
     """Parse YAML text; None with the reasons added to `faults` where that is impossible."""
-    document, found = _parsed(text, file)
-    faults += found
-    return document
+    document, found = (_of_many if len(text) <= SHORT else _of_the_last)(text)
+    faults += [replace(fault, file=file) for fault in found]
+    return None if document is None else replace(document, file=file)
 
 
-# Whoever looks which format a file has reads it again at once.
-@functools.lru_cache(maxsize=1)
-def _parsed(text: str, file: str) -> tuple[YamlDocument | None, tuple[Problem, ...]]:
+def _parsed(text: str) -> tuple[YamlDocument | None, tuple[Problem, ...]]:
     faults: list[Problem] = []
-    return _composed(text, file, faults), tuple(faults)
+    return _composed(text, "", faults), tuple(faults)
+
+
+# Whoever looks which format a file has reads it again at once; plans, machines and instruments are read for every run and program.
+_of_the_last = functools.lru_cache(maxsize=1)(_parsed)
+_of_many = functools.lru_cache(maxsize=64)(_parsed)
 
 
 def _composed(text: str, file: str, faults: list[Problem]) -> YamlDocument | None:

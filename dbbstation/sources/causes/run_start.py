@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
 
+    _Travelled = tuple[NDArray[np.float64], CubicSpline, NDArray[np.float64]]
+
 USUAL_DEG = 0.05
 """A fifth of a sample at ten readings a second."""
 
@@ -61,27 +63,33 @@ class RunStart(ErrorSource):
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """How far the struts had gone on."""
-        along, spline = self._along(motion, machine)
-        gone: NDArray[np.float64] = spline(along + float(values[0])) - spline(along)
+        along, spline, there = self._along(motion, machine)
+        gone: NDArray[np.float64] = spline(along + float(values[0])) - there
         return Effect(strut_mm=gone)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Strut lengths per degree of travel where the machine stood."""
-        along, spline = self._along(motion, machine)
+        along, spline, _ = self._along(motion, machine)
         slope: NDArray[np.float64] = spline(along + float(values[0]), 1)
         return Effect(strut_mm=slope[:, :, None])
 
-    def _along(self, motion: Motion, machine: Machine) -> tuple[NDArray[np.float64], CubicSpline]:
-        """Angle travelled at each row, shape (n,) [deg], and commanded strut lengths over it [mm]."""
+    def _along(self, motion: Motion, machine: Machine) -> _Travelled:
+        """Angle travelled at each row, shape (n,) [deg], commanded strut lengths over it [mm] and those at the rows, shape (n, 6)."""
         self.require(motion)
-        length = motion.struts(machine).length_mm
-        from scipy.interpolate import CubicSpline  # noqa: PLC0415 - takes a third of a second; every command knows all sources
+        return motion.once("travelled", machine, lambda: _along(motion, motion.struts(machine).length_mm))
 
-        travelled = _travelled_deg(motion)
-        rising = np.append(True, np.diff(np.maximum.accumulate(travelled)) > SAME_DEG)
-        if np.count_nonzero(rising) < FEWEST:
-            return np.zeros(len(motion)), CubicSpline([0.0, 1.0], np.tile(length[:1], (2, 1)))
-        return travelled, CubicSpline(travelled[rising], length[rising])
+
+def _along(motion: Motion, length: NDArray[np.float64]) -> _Travelled:
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - takes a third of a second; every command knows all sources
+
+    travelled = _travelled_deg(motion)
+    rising = np.append(True, np.diff(np.maximum.accumulate(travelled)) > SAME_DEG)
+    if np.count_nonzero(rising) < FEWEST:
+        travelled = np.zeros(len(motion))
+        spline = CubicSpline([0.0, 1.0], np.tile(length[:1], (2, 1)))
+    else:
+        spline = CubicSpline(travelled[rising], length[rising])
+    return travelled, spline, spline(travelled)
 
 
 def _travelled_deg(motion: Motion) -> NDArray[np.float64]:

@@ -381,3 +381,15 @@ def test_a_file_beyond_the_limit_is_not_read(tmp_path):
         file.truncate(30_000_000)
     assert load_yaml(path, faults) is None
     assert "30,000,000 bytes" in faults[0].what
+
+
+def test_the_same_text_in_two_files_has_the_faults_of_each(tmp_path):
+    found = []
+    for name in ("a.yaml", "b.yaml", "a.yaml"):
+        (tmp_path / name).write_text("format: dbb-plan/1\nname: x\nname: y\n")
+        load_yaml(tmp_path / name, found)
+    assert [Path(fault.file).name for fault in found] == ["a.yaml", "b.yaml", "a.yaml"]
+    (tmp_path / "c.yaml").write_text("name: x\n")
+    (tmp_path / "d.yaml").write_text("name: x\n")
+    read = [load_yaml(tmp_path / name, found) for name in ("c.yaml", "d.yaml")]
+    assert [Path(one.file).name for one in read] == ["c.yaml", "d.yaml"]

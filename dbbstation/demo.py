@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 import subprocess
-import sys
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -36,6 +35,7 @@ from dbbstation.results.demo import (
 )
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
+from dbbstation.system.children import python_module
 from dbbstation.virtual.truth import random_kinematics
 
 if TYPE_CHECKING:
@@ -207,7 +207,7 @@ class _Job:
             process.communicate(timeout=PATIENCE_S)
 
 
-_PROGRAM = [sys.executable, "-m", "dbbstation"]
+_PROGRAM = python_module("dbbstation")
 
 
 def _short(argument: str) -> str:

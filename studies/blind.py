@@ -13,10 +13,11 @@ from concurrent.futures import as_completed
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.computing.memory import forget_largest_memory, largest_memory_mb
-from dbbstation.computing.processes import deaf, processes
+from dbbstation.computing.processes import processes
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.atomic import write_text
+from dbbstation.system.memory import forget_largest_memory, largest_memory_mb
+from dbbstation.system.signals import deaf
 from dbbstation.tasks.diagnose import diagnose_sessions
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.computing.processes import deaf, processes
+from dbbstation.computing.processes import processes
+from dbbstation.system.signals import deaf
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation import __version__
-from dbbstation.cli.interrupted import politely_ended
 from dbbstation.cli.lazy import LazyGroup
 from dbbstation.cli.output import echo, say
 from dbbstation.cli.progress import Compiling
@@ -20,6 +19,7 @@ from dbbstation.computing.compiling import tell_of_compiling
 from dbbstation.errors import StationError
 from dbbstation.files.inputs import input_book
 from dbbstation.files.refused import in_a_sentence
+from dbbstation.system.signals import politely_ended
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from dbbstation.cli.instrument_options import chosen_protocol, protocol_options
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo, json_text
 from dbbstation.cli.source_files import source_file_option
+from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, interrupt_on
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -128,8 +128,7 @@ def emulate(
         else:
             echo(f"port: {wire.port}\ncontrol: {control.url}")
         # Also where a shell started it in the background, which makes programs deaf to Ctrl-C.
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.default_int_handler)
+        interrupt_on(CTRL_C, KILLED_POLITELY)
         try:
             while not commands.quit.wait(_LOOK_S):
                 pass

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import signal
 import threading
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,14 +21,15 @@ from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import SessionOptions, require_bar, session_options
 from dbbstation.service.patience import RECONNECT_S, driver_patience
+from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, answered, interrupt_on
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from types import FrameType
 
     from dbbstation.plan.circle import Direction
     from dbbstation.station.assembly import Workplace
     from dbbstation.station.engine import Station
+    from dbbstation.system.signals import Signals
 
 _WAITING_SCALE = 100.0
 """About so much faster than real time passes the time of a machine that waits."""
@@ -233,17 +233,13 @@ def _interruptible(station: Station) -> Iterator[threading.Event]:
 
     interrupted = threading.Event()
 
-    def stop(number: int, _frame: FrameType | None) -> None:
+    def stop(number: Signals) -> None:
         interrupted.set()
-        signal.signal(number, signal.default_int_handler)
+        interrupt_on(number)
         station.send(Quit())
 
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
+    with answered((CTRL_C, KILLED_POLITELY), stop):
         yield interrupted
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 class VirtualHands:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import tempfile
 import threading
@@ -13,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.hang_up import ended_when_hung_up
 from dbbstation.cli.instrument_options import chosen_protocol, instrument_options, spy_option, spying
 from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
@@ -25,10 +23,11 @@ from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import SessionOptions, require_bar, session_options
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
 from dbbstation.files.formats.virtual_port import FASTEST, SLOWEST, virtual_port
+from dbbstation.system.hang_up import ended_when_hung_up
+from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from types import FrameType
 
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.service.choice import Choice, Limits
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
     from dbbstation.service.runner import Opener
     from dbbstation.station.assembly import Job
     from dbbstation.station.events import Observer
+    from dbbstation.system.signals import Signals
     from dbbstation.tui.app import StationApp
 
 _DEMO = {"plan": "protocols/plans/ten-minute-check.yaml", "machine": "fixtures/machines/reference.yaml"}
@@ -335,14 +335,9 @@ def _stopped_politely(app: StationApp) -> Iterator[threading.Event]:
     """
     stopped = threading.Event()
 
-    def stop(_number: int, _frame: FrameType | None) -> None:
+    def stop(_number: Signals) -> None:
         stopped.set()
         app.close_down()
 
-    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {number: signal.signal(number, stop) for number in numbers}
-    try:
+    with answered((KILLED_POLITELY, *CLOSED), stop):
         yield stopped
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

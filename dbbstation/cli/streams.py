@@ -7,6 +7,7 @@ import sys
 
 from dbbstation.errors import OutputError
 from dbbstation.files.refused import refusal
+from dbbstation.system.handles import open_nothing
 
 _STREAMS = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))
 
@@ -20,7 +21,7 @@ def open_missing() -> None:
         try:
             os.fstat(number)
         except OSError:
-            opened = os.open(os.devnull, os.O_RDWR)  # the lowest number that is free: this one
+            opened = open_nothing()  # the lowest number that is free: this one
             os.set_inheritable(opened, True)  # noqa: FBT003 - taken by its place alone
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
@@ -52,4 +53,4 @@ def drop_unwritable() -> None:
 
 def drop_output() -> None:
     """Let the interpreter flush what is left of the output into nothing."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    os.dup2(open_nothing(), sys.stdout.fileno())

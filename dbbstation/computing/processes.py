@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import threading
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, TypeVar
+
+from dbbstation.system.signals import deaf
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
@@ -85,16 +86,3 @@ def _say_nothing_of(pool: ProcessPoolExecutor) -> None:
             before(fault)
 
     threading.excepthook = hook
-
-
-@contextmanager
-def deaf() -> Iterator[None]:
-    """Ignore Ctrl-C: processes that are started now ignore it as long as they live, and this one alone answers it."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)

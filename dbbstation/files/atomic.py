@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import shutil
 import stat
 import tempfile
 from pathlib import Path
@@ -20,6 +19,7 @@ from dbbstation.files.inputs import was_read
 from dbbstation.files.places import real_path
 from dbbstation.files.recorded_ground import refuse_recorded
 from dbbstation.files.refused import refusal
+from dbbstation.system.replacing import remove, remove_tree, rename, replace, sync_folder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -54,9 +54,9 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
         temporary = _temporary(path)
         try:
             _write_synced(temporary, data)
-            temporary.replace(path)
+            replace(temporary, path)
         except BaseException:
-            temporary.unlink(missing_ok=True)
+            remove(temporary)
             raise
         sync_folder(path.parent)
     _LOG.info("wrote %s", path)
@@ -85,9 +85,9 @@ def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())
-            temporary.replace(target)
+            replace(temporary, target)
         except BaseException:
-            temporary.unlink(missing_ok=True)
+            remove(temporary)
             raise
         sync_folder(target.parent)
     _LOG.info("wrote %s", target)
@@ -121,9 +121,9 @@ def write_folder(
             try:
                 made.chmod(_usual_mode(0o777))
                 _fill(made, files, read_only)
-                made.rename(folder)
+                rename(made, folder)
             except BaseException:
-                shutil.rmtree(made, ignore_errors=True)
+                remove_tree(made)
                 raise
             sync_folder(folder.parent)
         _LOG.info("wrote %s with %d files", folder, len(files))
@@ -198,7 +198,7 @@ def remove_leftovers(folder: Path) -> None:
     """Remove the temporary files in a folder that a power cut left; only where nobody else writes into it."""
     for left in folder.glob(f".*{_MARK}"):
         if left.is_file() and not left.is_symlink():
-            left.unlink(missing_ok=True)
+            remove(left)
 
 
 def _make_parents(folder: Path) -> None:
@@ -207,16 +207,6 @@ def _make_parents(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for made in missing:
         sync_folder(made.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Make renames in a folder last over a power cut, where the system can do that."""
-    with contextlib.suppress(PermissionError, NotADirectoryError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 def set_read_only(path: Path) -> None:
@@ -260,10 +250,10 @@ def _replace_all(folder: Path, files: Mapping[str, str | bytes], read_only: Call
                 if read_only(name):
                     set_read_only(temporary)
         for temporary, path in written:
-            temporary.replace(path)
+            replace(temporary, path)
     except BaseException:
         for temporary, _ in written:
-            temporary.unlink(missing_ok=True)
+            remove(temporary)
         raise
     for parent in {path.parent for _, path in written}:
         sync_folder(parent)

@@ -14,6 +14,8 @@ import stat
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from dbbstation.system.handles import open_to_read
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from io import FileIO
@@ -24,10 +26,6 @@ LARGEST_BYTES = 2_000_000_000
 
 BLOCK_BYTES = 1 << 20
 """Bytes that are read at once: a thousandth of the largest file, and little beside what the program itself takes."""
-
-# Opening must not wait for whoever writes into a pipe, nor become the terminal that interrupts the program. Windows has
-# neither, and changes line ends unless told not to.
-_FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"))
 
 
 class NotRegularError(OSError):
@@ -98,7 +96,7 @@ def opened(path: Path, largest: int = LARGEST_BYTES) -> Iterator[Source]:
         OSError: there is no such file, it is a folder, or the system refuses it.
     """
     _check(path, _stat(path), largest)  # some devices do something when they are opened
-    with os.fdopen(os.open(path, _FLAGS), "rb", buffering=0) as file:
+    with os.fdopen(open_to_read(path), "rb", buffering=0) as file:
         found = os.fstat(file.fileno())  # it may be another one by now
         _check(path, found, largest)
         yield Source(file, path, found.st_size, largest)

@@ -13,14 +13,15 @@ import logging
 import os
 import sqlite3
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.files.keys import key_of
 from dbbstation.files.places import real_path
+from dbbstation.system.mounts import file_system
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from pathlib import Path
 
 _LOG = logging.getLogger(__name__)
 
@@ -32,8 +33,6 @@ SHARES = frozenset(
     | {"glusterfs", "ncpfs", "nfs", "nfs4", "smb3", "smbfs"}
 )
 """File systems of other computers, on which SQLite's locks cannot be relied on."""
-
-_MOUNTS = Path("/proc/self/mounts")
 
 
 @dataclass(frozen=True)
@@ -237,18 +236,5 @@ def _unfit(file: Path, folder: Path) -> str:
 
 def folder_problem(file: Path) -> str:
     """Return why nothing can be kept in a file, which need not be there; empty where it can."""
-    kind = _file_system(real_path(file))
+    kind = file_system(real_path(file))
     return f"the cache folder lies on a share ({kind}); set XDG_CACHE_HOME to a local one" if kind in SHARES else ""
-
-
-def _file_system(path: Path) -> str:
-    """Return the kind of file system that a path lies on; empty where the system does not say."""
-    if str(path).startswith("\\\\"):
-        return "cifs"
-    try:
-        lines = _MOUNTS.read_text("utf-8", "replace").splitlines()
-    except OSError:
-        return ""
-    mounts = [(Path(words[1].replace("\\040", " ")), words[2]) for words in map(str.split, lines) if len(words) > 2]  # noqa: PLR2004 - device, place, kind
-    over = [(len(place.parts), kind) for place, kind in mounts if path.is_relative_to(place)]
-    return max(over, default=(0, ""))[1]

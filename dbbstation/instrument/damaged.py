@@ -12,15 +12,7 @@ has eight: no text of an instrument has either, so no frame with such a characte
 from __future__ import annotations
 
 import re
-from contextlib import suppress
 from typing import TYPE_CHECKING
-
-try:
-    import termios
-except ImportError:  # Windows
-    _MARKS = False
-else:
-    _MARKS = True
 
 if TYPE_CHECKING:
     from dbbstation.instrument.protocol import LineSettings
@@ -28,26 +20,6 @@ if TYPE_CHECKING:
 _ESCAPED = re.compile(rb"\xff(?:\xff|\x00([\x00-\xff])|(\x00?\Z))")
 
 _SEVEN, _EIGHTH_BIT = 7, 0x80
-
-
-def mark_damaged(port: object) -> bool:
-    """Let the system mark characters with a wrong parity or stop bit; return whether it does.
-
-    Args:
-        port: an open port of pyserial, behind its last change of settings; other ports mark nothing.
-    """
-    descriptor = getattr(port, "fd", None)
-    if not _MARKS or not isinstance(descriptor, int):
-        return False
-    wanted = termios.INPCK | termios.PARMRK
-    with suppress(termios.error):
-        settings = termios.tcgetattr(descriptor)
-        settings[0] &= ~(termios.IGNPAR | termios.ISTRIP | termios.IGNBRK | termios.BRKINT)
-        settings[0] |= wanted
-        termios.tcsetattr(descriptor, termios.TCSANOW, settings)
-        # The system may take some of the settings and say nothing of the others.
-        return termios.tcgetattr(descriptor)[0] & wanted == wanted
-    return False
 
 
 class Marks:

@@ -13,22 +13,16 @@ from serial.tools import list_ports
 from serial.urlhandler.protocol_socket import Serial as SocketPort
 
 from dbbstation.errors import InstrumentError
-from dbbstation.instrument.damaged import Marks, mark_damaged
-from dbbstation.instrument.holders import holders
+from dbbstation.instrument.damaged import Marks
+from dbbstation.system.line_marks import LINE_ERRORS, mark_damaged
+from dbbstation.system.port_holders import holders
 
 if TYPE_CHECKING:
     from dbbstation.instrument.bytelog import ByteLog
     from dbbstation.instrument.protocol import LineSettings
 
-_ERRORS: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
+_ERRORS: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError, *LINE_ERRORS)
 """What a port can raise; pyserial lets some errors of the system through, and TypeError from a port just closed."""
-
-try:
-    from termios import error as _termios_error
-except ImportError:  # Windows has no termios
-    pass
-else:
-    _ERRORS += (_termios_error,)
 
 _OPENING_ERRORS: tuple[type[Exception], ...] = (*_ERRORS, ValueError)
 
@@ -204,7 +198,9 @@ def open_link(
     except _OPENING_ERRORS as error:
         _close_quietly(opened)
         raise _not_opened(port, speed, error) from None
-    marks = Marks(line.data_bits) if text and mark_damaged(opened) else None
+    descriptor = getattr(opened, "fd", None)  # of a serial port; a socket marks nothing
+    marked = text and isinstance(descriptor, int) and mark_damaged(descriptor)
+    marks = Marks(line.data_bits) if marked else None
     return Link(opened, name=port, owned=True, log=log, marks=marks, has_bits=has_bits)
 
 

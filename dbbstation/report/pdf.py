@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 import tempfile
 from pathlib import Path
 
 from dbbstation.errors import StationError
+from dbbstation.system.children import BoundExceededError, Bounds, is_root, run_bounded
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 """Names under which a Chromium is installed, on the PATH."""
@@ -16,8 +16,8 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 BROWSER_VARIABLE = "DBBSTATION_CHROMIUM"
 """Environment variable that names one elsewhere."""
 
-PATIENCE_S = 120.0
-"""A report of a hundred runs prints in seconds; a browser that takes longer waits for something that does not come [s]."""
+BOUNDS = Bounds(time_s=120.0, memory_mb=8000.0, output_mb=1000.0)
+"""A report of a hundred runs prints in seconds; a browser that takes longer waits for something that does not come."""
 
 
 def chromium() -> str:
@@ -62,15 +62,15 @@ def printed(html: bytes, browser: str) -> bytes:
             "--no-pdf-header-footer",
             f"--user-data-dir={folder}/profile",
         ]
-        if hasattr(os, "geteuid") and os.geteuid() == 0:
+        if is_root():
             command.append("--no-sandbox")  # as root it does not start with one; the page has no script
         command += [f"--print-to-pdf={out}", page.as_uri()]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise StationError(f"the browser did not print: {error}", where=browser, remedy=_BY_HAND) from error
+            done = run_bounded(command, Path(folder), BOUNDS)
+        except (OSError, BoundExceededError) as error:
+            raise StationError(f"the browser did not print: it {error}", where=browser, remedy=_BY_HAND) from error
         if not out.is_file():
-            said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+            said = done.said.strip().splitlines()[-1:] or [f"exit code {done.code}"]
             raise StationError(f"the browser did not print: {said[0]}", where=browser, remedy=_BY_HAND)
         return out.read_bytes()
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import logging
 import os
-import signal
 import subprocess
-import sys
 import tempfile
 import threading
 import time
 from contextlib import suppress
 from enum import StrEnum
 from typing import IO, TYPE_CHECKING
+
+from dbbstation.system.children import end_tree, python_module
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,7 +61,7 @@ class BackgroundWork:
         # A file takes any amount; a pipe that nobody reads would hold the work up.
         self._answer: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `close`
         self._process = subprocess.Popen(  # noqa: S603 - a module of the program
-            [sys.executable, "-m", WORKER],
+            python_module(WORKER),
             cwd=folder,
             # Read when NumPy is imported: the threads that `dbbstation.computing.threads` takes away are not even started.
             env={"OPENBLAS_NUM_THREADS": "1", **os.environ},
@@ -109,12 +109,11 @@ class BackgroundWork:
         return "\n".join(self._said[-4:])
 
     def cancel(self) -> None:
-        """Ask it to end, as Ctrl-C does; does nothing once it has ended."""
-        if self._process.poll() is not None:
-            return
-        self._cancelled = True
-        with suppress(OSError):
-            self._process.send_signal(signal.SIGINT)
+        """Ask it to end, as Ctrl-C does; does nothing once it has ended. It ends when its input does, on every system."""
+        self._cancelled = self._cancelled or self._process.poll() is None
+        if self._process.stdin is not None:
+            with suppress(OSError):
+                self._process.stdin.close()
 
     def close(self) -> None:
         """End it, and wait for that."""
@@ -122,8 +121,7 @@ class BackgroundWork:
         try:
             self._process.wait(_POLITE_S)
         except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+            end_tree(self._process)
         self._listener.join()
         if self._process.stderr is not None:
             self._process.stderr.close()
@@ -135,7 +133,7 @@ class BackgroundWork:
             return
         with suppress(OSError):
             self._process.stdin.write(self.job.model_dump_json() + "\n")
-            self._process.stdin.close()
+            self._process.stdin.flush()
 
     def _listen(self) -> None:
         if self._process.stderr is None:

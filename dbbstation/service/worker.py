@@ -1,16 +1,19 @@
 """The process that does a task for the station: `python -m dbbstation.service.worker`, which can be ended at any time.
 
-It is told its job as one line of JSON on standard input, tells stages and what it notices on standard error, and prints the result as
+It is told its job as one line of JSON on standard input and is interrupted when that input ends. It tells stages and what it notices on standard error, and prints the result as
 JSON on standard output. What it writes is written whole or not at all. It runs the tasks that commands run, and is the one part of the
 service that knows what is computed: the station itself never loads this module.
 """
 
 from __future__ import annotations
 
+import _thread
 import json
 import logging
+import os
 import shlex
 import sys
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,7 +54,9 @@ def main() -> None:
     logging.captureWarnings(capture=True)
     try:
         with input_book():
-            answer = done(SessionJob.model_validate_json(sys.stdin.readline()))
+            job = SessionJob.model_validate_json(sys.stdin.readline())
+            threading.Thread(target=_interrupted_at_the_end, name="input", daemon=True).start()
+            answer = done(job)
         sys.stdout.write(json.dumps(answer, allow_nan=False))
         sys.stdout.flush()
     except KeyboardInterrupt:
@@ -65,6 +70,14 @@ def main() -> None:
         _fail(
             f"{type(problem).__name__}: {problem}\nthis is a fault of dbbstation itself; the log shows what to report"
         )
+
+
+def _interrupted_at_the_end() -> None:
+    """Interrupt the work when the input ends: the station asks for that, or is gone."""
+    # Not by `sys.stdin`: its lock would be held when the interpreter ends.
+    while os.read(sys.stdin.fileno(), 1):
+        pass
+    _thread.interrupt_main()
 
 
 def done(job: SessionJob) -> Mapping[str, object]:

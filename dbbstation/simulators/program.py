@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import shutil
-import subprocess
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +15,7 @@ import numpy as np
 from dbbstation.diagnosis.simulator.ports import SimulationFault
 from dbbstation.files.gateway import content_of
 from dbbstation.simulators.exchanged import ExchangedSimulator
+from dbbstation.system.children import BoundExceededError, Bounds, run_bounded
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 
 INPUTS, PARAMETERS, OUTPUTS = "inputs.csv", "parameters.json", "outputs.csv"
 """Files in the folder in which the program is run."""
+
+MOST_MEMORY_MB = 4000.0
+"""Memory of a program and all that it starts [MB]: what a laptop of 8 GB leaves beside this program."""
+
+MOST_OUTPUT_MB = 500.0
+"""Files and printed text of one run [MB]: a million rows of twenty columns."""
 
 LINES_TOLD = 3
 """Last lines of what a program says on standard error that are reported where it fails."""
@@ -74,21 +80,15 @@ class ProgramSimulator(ExchangedSimulator):
     def _run(self, folder: Path) -> None:
         said = f"`{self.said}`"
         try:
-            done = subprocess.run(  # noqa: S603 - what the user's model file names
-                self._command,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                check=False,
-                timeout=self._limit_s,
-            )
-        except subprocess.TimeoutExpired:
-            raise SimulationFault(f"{said} takes longer than {self._limit_s:g} s; raise `time_limit_s`") from None
+            done = run_bounded(self._command, folder, Bounds(self._limit_s, MOST_MEMORY_MB, MOST_OUTPUT_MB))
+        except BoundExceededError as error:
+            remedy = "; raise `time_limit_s`" if error.of_time else ""
+            raise SimulationFault(f"{said} {error}{remedy}") from None
         except OSError as error:
             raise SimulationFault(f"{said} cannot be run: {error.strerror}") from error
-        if done.returncode:
-            last = done.stderr.decode("utf-8", "replace").strip().splitlines()[-LINES_TOLD:]
-            raise SimulationFault(f"{said} ended with code {done.returncode}: {' / '.join(last) or 'it said nothing'}")
+        if done.code:
+            last = done.said.strip().splitlines()[-LINES_TOLD:]
+            raise SimulationFault(f"{said} ended with code {done.code}: {' / '.join(last) or 'it said nothing'}")
 
 
 def _read(path: Path) -> dict[str, NDArray[np.float64]]:

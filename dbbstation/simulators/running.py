@@ -12,12 +12,13 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from dbbstation.catalogue import in_words, line_in
-from dbbstation.computing.processes import deaf, processes
+from dbbstation.computing.processes import processes
 from dbbstation.diagnosis.simulator.contract import simulated
 from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
 from dbbstation.errors import CalibrationError
 from dbbstation.simulators.kept import KeptSimulations
 from dbbstation.simulators.loading import know, simulator_of
+from dbbstation.system.signals import deaf
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

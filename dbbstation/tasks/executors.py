@@ -8,9 +8,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from dbbstation.computing.processes import deaf, processes
+from dbbstation.computing.processes import processes
 from dbbstation.errors import StationError
 from dbbstation.files.program_identity import differences_of, program_identity
+from dbbstation.system.signals import deaf
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.codec import encode
 from dbbstation.instrument.fields import Content
+from dbbstation.system.pseudo_terminal import HAS_PTY
 from dbbstation.virtual.wire_clock import ScaledClock
-from dbbstation.virtual.wire_ends import HAS_PTY, open_end
+from dbbstation.virtual.wire_ends import open_end
 from dbbstation.virtual.wire_uart import heard_at
 
 if TYPE_CHECKING:

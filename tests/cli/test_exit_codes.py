@@ -171,7 +171,7 @@ def test_what_nohup_made_it_deaf_to_stays_so():
 
 HANGS_UP = """
 import os, signal
-from dbbstation.cli.interrupted import politely_ended
+from dbbstation.system.signals import politely_ended
 with politely_ended():
     os.kill(os.getpid(), signal.SIGHUP)
 """

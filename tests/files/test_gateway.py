@@ -23,18 +23,16 @@ PACKAGE = Path(dbbstation.__file__).parent
 
 ROUND_IT = {
     "files/gateway.py": "is the gateway",
-    "files/atomic.py": "opens folders and its own files to write them",
-    "files/recordings/lock.py": "opens a lock, which it never reads",
+    "files/atomic.py": "opens its own files to write them",
+    "system/handles.py": "opens files for those who ask the gateway, and those that are changed in place",
+    "system/replacing.py": "opens folders to write them to disk",
     "files/recordings/journal.py": "creates the file that it writes",
-    "instrument/holders.py": "asks the system in /proc who holds a port",
-    "files/kept.py": "asks the system in /proc what is mounted",
-    "cli/hang_up.py": "opens the null device",
-    "cli/streams.py": "opens the null device",
+    "system/port_holders.py": "asks the system in /proc who holds a port",
+    "system/mounts.py": "asks the system in /proc what is mounted",
     "cli/settings.py": "reads a file of the package",
     "report/html.py": "reads a file of the package",
-    "files/recordings/event_log.py": "appends to the log, and cuts what could not be noted",
     "report/pdf.py": "reads what the browser has just printed",
-    "computing/memory.py": "asks the system in /proc how much memory it took",
+    "system/memory.py": "asks the system in /proc how much memory it took",
     "simulators/program.py": "creates the file that it writes",
 }
 """Files that open files themselves, each with its reason."""
@@ -46,7 +44,7 @@ def opens_files(tree: ast.AST) -> list[int]:
         if not isinstance(node, ast.Call):
             continue
         called = node.func
-        if isinstance(called, ast.Name) and called.id == "open":
+        if isinstance(called, ast.Name) and called.id in {"open", "open_to_read"}:
             found.append(node.lineno)
         elif isinstance(called, ast.Attribute):
             named = isinstance(called.value, ast.Name) and called.value.id in {"os", "io", "codecs", "gzip"}

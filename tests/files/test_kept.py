@@ -9,6 +9,7 @@ import pytest
 
 from dbbstation.files import kept as module
 from dbbstation.files.kept import Kept, NotedAnchor, Stamp, index_file
+from dbbstation.system import mounts as of_mounts
 
 STAMP = Stamp(1, 2)
 
@@ -137,7 +138,7 @@ def test_a_cache_folder_on_a_share_is_not_used(folder, monkeypatch, tmp_path):
     mounts = tmp_path / "mounts"
     cache = str(tmp_path / "cache").replace(" ", "\\040")
     mounts.write_text(f"/dev/sda1 / ext4 rw 0 0\nserver:/home {cache} nfs4 rw 0 0\n", encoding="utf-8")
-    monkeypatch.setattr(module, "_MOUNTS", mounts)
+    monkeypatch.setattr(of_mounts, "_MOUNTS", mounts)
     index = keep(folder)
     assert "on a share (nfs4)" in index.problem
     assert not (tmp_path / "cache").exists()

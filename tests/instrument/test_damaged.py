@@ -22,7 +22,7 @@ from dbbstation.errors import InstrumentError
 from dbbstation.instrument import driver
 from dbbstation.instrument.bytelog import ByteLog, read_byte_log
 from dbbstation.instrument.codec import Decoder, Garbage
-from dbbstation.instrument.damaged import Marks, mark_damaged
+from dbbstation.instrument.damaged import Marks
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument
 from dbbstation.instrument.link import Link, open_link
@@ -93,10 +93,6 @@ def test_bytes_of_numbers_are_not_marked(terminal: tuple[int, int]) -> None:
     os.write(terminal[0], b"\xff\xff\x00A")
     assert link.read() == b"\xff\xff\x00A"
     link.close()
-
-
-def test_a_port_without_a_descriptor_marks_nothing() -> None:
-    assert not mark_damaged(object())
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,7 @@ def test_the_instruments_need_nothing_of_ours_but_errors_and_files() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     # Faults are listed as people count, which is in `text`.
-    assert set(done.stdout.split()) == {"catalogue", "errors", "files", "instrument", "text"}
+    assert set(done.stdout.split()) == {"catalogue", "errors", "files", "instrument", "system", "text"}
 
 
 THIRD = GOOD.replace("dbb-instrument/1", "dbb-instrument/3")

@@ -21,11 +21,11 @@ from dbbstation.errors import InstrumentError
 from dbbstation.instrument import adapters
 from dbbstation.instrument.codec import Decoder, encode
 from dbbstation.instrument.driver import Instrument
-from dbbstation.instrument.holders import holders
 from dbbstation.instrument.library import load_instrument, with_zero
 from dbbstation.instrument.link import connected_ports, open_link
 from dbbstation.instrument.recognise import looks_like
 from dbbstation.instrument.symptoms import parity_in
+from dbbstation.system.port_holders import holders
 from dbbstation.virtual.control import ControlServer
 from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import ScaledClock

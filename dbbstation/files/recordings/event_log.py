@@ -21,11 +21,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import OutputError, Problem
-from dbbstation.files.atomic import sync_folder, write_bytes
+from dbbstation.files.atomic import write_bytes
 from dbbstation.files.gateway import content_of
 from dbbstation.files.recordings.session_name import RUNS
 from dbbstation.files.refused import refusal
 from dbbstation.files.source_text import read_bytes
+from dbbstation.system.handles import open_to_change, read_at, write_at
+from dbbstation.system.replacing import sync_folder
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -184,9 +186,8 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
     if event is None:
         raise ValueError(f"{members} is no change of a session file")
     # A log that was read is not begun anew where it has gone.
-    create = 0 if log.size else os.O_CREAT
     try:
-        handle = os.open(log.path, os.O_RDWR | create | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+        handle = open_to_change(log.path, create=not log.size)
     except FileNotFoundError as error:
         raise OutputError(
             "the event log is gone: the session was moved or deleted while it was written into",
@@ -202,7 +203,7 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
         try:
             if log.size > log.end:
                 os.ftruncate(handle, log.end)
-            _write(handle, line, log.end)
+            write_at(handle, line, log.end)
             os.fsync(handle)
             if not log.size:
                 sync_folder(log.path.parent)
@@ -226,13 +227,12 @@ def _parted(log: EventLog, handle: int) -> int:
     Raises:
         OutputError: the disk refuses; the log is as before then.
     """
+    os.close(handle)  # Windows replaces no file that is open
     try:
         write_bytes(log.path, content_of(log.path), force=True, rewrites=True)
-        parted = os.open(log.path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
+        return open_to_change(log.path)
     except OSError as error:
         raise _refused(log, error) from error
-    os.close(handle)
-    return parted
 
 
 def set_back(log: EventLog) -> list[str]:
@@ -256,7 +256,7 @@ CLOCK_S = 1.0
 def taken_back(log: EventLog) -> None:
     """Take back what was appended behind a log, as far as the disk allows: what could not be noted did not happen."""
     with contextlib.suppress(OSError):
-        handle = os.open(log.path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
+        handle = open_to_change(log.path)
         try:
             os.ftruncate(handle, log.end)
             os.fsync(handle)
@@ -273,7 +273,7 @@ def _refuse_another(log: EventLog, handle: int) -> None:
     size = os.fstat(handle).st_size
     last = log.links[-1] if log.events else ""
     begin = max(log.end - _LONGEST_LAST, 0)
-    there = os.pread(handle, log.end - begin, begin).splitlines()
+    there = read_at(handle, log.end - begin, begin).splitlines()
     if size != log.size or (last and (not there or not _ends_with(there[-1], last))):
         raise OutputError(
             "another program has written into this session since it was read",
@@ -288,13 +288,6 @@ _LONGEST_LAST = 1_000_000
 
 def _ends_with(line: bytes, last: str) -> bool:
     return line.startswith(last.encode()) or len(line) >= _LONGEST_LAST
-
-
-def _write(handle: int, data: bytes, at: int) -> None:
-    left = memoryview(data)
-    while left:
-        done = os.pwrite(handle, left, at)
-        left, at = left[done:], at + done
 
 
 def _refused(log: EventLog, error: OSError) -> OutputError:

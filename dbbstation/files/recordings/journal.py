@@ -15,10 +15,11 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError, Problem
-from dbbstation.files.atomic import set_read_only, sync_folder
+from dbbstation.files.atomic import set_read_only
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings.run_csv import PART, RunFile, parse_run
 from dbbstation.files.refused import refusal
+from dbbstation.system.replacing import rename, sync_folder
 from dbbstation.trace import columns
 
 if TYPE_CHECKING:
@@ -186,7 +187,7 @@ class RunWriter:
         if there is not None:
             # Another file stands in its place: it keeps what it holds, under a name that is free.
             number = next(k for k in range(1, _MANY) if not os.path.lexists(self._foreign(k)))
-            self.path.rename(self._foreign(number))
+            rename(self.path, self._foreign(number))
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._file = self.path.open("x+b", buffering=0)
         self._write(data)
@@ -242,7 +243,7 @@ class RunWriter:
             if self.sealed_path.exists():
                 raise OutputError("this run exists already", where=str(self.sealed_path), remedy="take the next repeat")
             set_read_only(self.path)
-            self.path.rename(self.sealed_path)
+            rename(self.path, self.sealed_path)
             sync_folder(self.sealed_path.parent)
         return digest
 

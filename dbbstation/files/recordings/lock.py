@@ -8,21 +8,18 @@ as the file server passes it on; where a file system has no locks the session is
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import socket
-import sys
 import time
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import OutputError
 from dbbstation.files.refused import refusal
+from dbbstation.system.handles import open_to_change, read_at, write_at
+from dbbstation.system.locks import lock
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-if sys.platform != "win32":  # Windows has locks of its own
-    import fcntl
 
 LOCK_FILE = ".lock"
 """In the session folder; nothing reads it but this."""
@@ -31,8 +28,6 @@ PATIENCE_S = 2.0
 """How long a command that notes one thing waits for another that does [s]."""
 
 _PAUSE_S = 0.01
-
-_NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS}
 
 
 class SessionLock:
@@ -57,7 +52,7 @@ class SessionLock:
         if self.held and self._file is not None:
             with contextlib.suppress(OSError):  # a full disk must not keep anybody from going on
                 os.ftruncate(self._file, 0)
-                os.pwrite(self._file, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
+                write_at(self._file, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
 
     def __enter__(self) -> Self:
         return self
@@ -78,7 +73,7 @@ class SessionLock:
     def _open(self, folder: Path) -> None:
         path = folder / LOCK_FILE
         try:
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+            self._file = open_to_change(path, create=True)
         except OSError as error:
             why, remedy = refusal(error)
             raise OutputError(f"cannot be written: {why}", where=str(path), remedy=remedy) from error
@@ -92,16 +87,16 @@ class SessionLock:
             return False
 
     def _locked(self, folder: Path, until_s: float) -> bool:
-        if sys.platform == "win32" or self._file is None:
+        if self._file is None:
             return False
         while True:
             try:
-                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return lock(self._file)
             except BlockingIOError as error:
                 if time.monotonic() < until_s:
                     time.sleep(_PAUSE_S)
                     continue
-                who = os.pread(self._file, 200, 0).decode(errors="replace").strip()
+                who = read_at(self._file, 200, 0).decode(errors="replace").strip()
                 self.close()
                 raise OutputError(
                     f"{who or 'another process'} writes into this session",
@@ -109,9 +104,6 @@ class SessionLock:
                     remedy="end it first, or measure into another folder",
                 ) from error
             except OSError as error:
-                if error.errno in _NO_LOCKS:
-                    return False
                 self.close()
                 why, remedy = refusal(error)
                 raise OutputError(f"cannot be locked: {why}", where=str(folder), remedy=remedy) from error
-            return True

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
 from contextlib import contextmanager
 from dataclasses import replace
@@ -11,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, OutputError, Problem, TraceError
-from dbbstation.files.atomic import sync_folder
 from dbbstation.files.formats.mapping import mapping_text
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.new_session import write_session
 from dbbstation.files.recordings.session import read_session
+from dbbstation.system.replacing import remove_tree, rename, sync_folder
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
@@ -95,12 +94,12 @@ def staged(
         _try_out(written, runs)
 
         def put() -> None:
-            written.rename(folder)
+            rename(written, folder)
             sync_folder(folder.parent)
 
         yield put
     finally:
-        shutil.rmtree(made, ignore_errors=True)
+        remove_tree(made)
 
 
 def _try_out(folder: Path, runs: Sequence[ImportedRun]) -> None:

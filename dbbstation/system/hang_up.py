@@ -4,31 +4,34 @@ from __future__ import annotations
 
 import os
 import select
-import signal
 import sys
 import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from dbbstation.cli import FAILED
+from dbbstation.system.handles import open_nothing
+from dbbstation.system.signals import end_as_hung_up
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 _LOOK_MS = 500
 _PATIENCE_S = 10.0
-"""The screen has so long to end by itself; it may be stuck in writing to what is no longer there [s]."""
+"""The screen has so long to end by itself; it may hang in writing to a terminal that is gone [s]."""
+
+_FAILED = 1
+"""Exit code."""
 
 
 @contextmanager
 def ended_when_hung_up(last: Callable[[], None]) -> Iterator[None]:
-    """Watch the terminal, and leave the program when it has gone; does nothing where input is no terminal.
+    """Watch the terminal, and leave the program when it has gone; does nothing if input is no terminal, or on Windows.
 
     The screen's own output stops at the first write that fails and then makes the program wait for ever, and the kernel's
-    signal may go to a shell that keeps it.
+    signal may go to a shell that keeps it. Windows ends the programs of a console that closes.
 
     Args:
-        last: ends what is being done, called in a thread of its own where the screen does not end by itself.
+        last: ends the work, in a thread of its own, if the screen does not end by itself.
     """
     if not hasattr(select, "poll") or not sys.stdin.isatty():
         yield
@@ -47,10 +50,10 @@ def _watch(terminal: int, over: threading.Event, last: Callable[[], None]) -> No
     while not poll.poll(_LOOK_MS):
         if over.is_set():
             return
-    nowhere = os.open(os.devnull, os.O_RDWR)
+    nowhere = open_nothing()
     for stream in (0, 1, 2):
         os.dup2(nowhere, stream)
-    os.kill(os.getpid(), signal.SIGHUP)
+    end_as_hung_up()
     if not over.wait(_PATIENCE_S):
         last()
-        os._exit(FAILED)
+        os._exit(_FAILED)

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from dbbstation.computing.memory import forget_largest_memory, largest_memory_mb
+from dbbstation.system.memory import forget_largest_memory, largest_memory_mb
 
 LARGE_MB = 200.0
 

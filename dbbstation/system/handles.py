@@ -1,0 +1,71 @@
+"""Files that are read and changed in place, through a number of the system."""
+
+from __future__ import annotations
+
+import errno
+import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def _flags(*names: str) -> int:
+    """Flags that this system has. Windows changes line ends without O_BINARY and has none of the others."""
+    return sum(getattr(os, name, 0) for name in ("O_BINARY", "O_CLOEXEC", *names))
+
+
+# Opening must neither wait for the writer of a pipe nor take a terminal that interrupts the program.
+_READING = os.O_RDONLY | _flags("O_NONBLOCK", "O_NOCTTY")
+_CHANGING = os.O_RDWR | _flags("O_NOFOLLOW")
+
+
+def open_to_read(path: Path) -> int:
+    """Return the number of a file that is open for reading.
+
+    Raises:
+        OSError: the system refuses it.
+    """
+    return os.open(path, _READING)
+
+
+def open_to_change(path: Path, *, create: bool = False) -> int:
+    """Return the number of a file that is open for reading and writing; a link is refused.
+
+    Args:
+        path: of the file.
+        create: make the file if it is missing.
+
+    Raises:
+        OSError: the system refuses it, or it is a link.
+    """
+    if not hasattr(os, "O_NOFOLLOW") and path.is_symlink():
+        raise OSError(errno.ELOOP, "this is a link", str(path))
+    return os.open(path, _CHANGING | (os.O_CREAT if create else 0), 0o666)
+
+
+def read_at(handle: int, count: int, at: int) -> bytes:
+    """Return at most `count` bytes from byte `at` on; fewer at the end of the file."""
+    os.lseek(handle, at, os.SEEK_SET)
+    pieces = []
+    while count > 0 and (piece := os.read(handle, count)):
+        pieces.append(piece)
+        count -= len(piece)
+    return b"".join(pieces)
+
+
+def write_at(handle: int, data: bytes, at: int) -> None:
+    """Write all bytes from byte `at` on.
+
+    Raises:
+        OSError: the disk refuses; some of them may be written.
+    """
+    os.lseek(handle, at, os.SEEK_SET)
+    left = memoryview(data)
+    while left:
+        left = left[os.write(handle, left) :]
+
+
+def open_nothing() -> int:
+    """Return the number of the null device, open for both; it takes the lowest number that is free."""
+    return os.open(os.devnull, os.O_RDWR)

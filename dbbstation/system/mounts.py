@@ -1,0 +1,24 @@
+"""Which file system a path lies on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_MOUNTS = Path("/proc/self/mounts")
+
+
+def file_system(path: Path) -> str:
+    """Return the kind of file system that a path lies on, such as `nfs4`; empty if the system does not say.
+
+    Args:
+        path: absolute, links followed.
+    """
+    if str(path).startswith("\\\\"):  # Windows: a folder of another computer
+        return "cifs"
+    try:
+        lines = _MOUNTS.read_text("utf-8", "replace").splitlines()
+    except OSError:
+        return ""
+    mounts = [(Path(words[1].replace("\\040", " ")), words[2]) for words in map(str.split, lines) if len(words) > 2]  # noqa: PLR2004 - device, place, kind
+    over = [(len(place.parts), kind) for place, kind in mounts if path.is_relative_to(place)]
+    return max(over, default=(0, ""))[1]

@@ -1,0 +1,112 @@
+"""Files that take another file's place, and files that go; on Windows another program may hold them for a moment."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import stat
+import time
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+PATIENCE_S = 2.0
+"""A virus scanner or an indexer holds a new file about so long [s]."""
+
+_PAUSE_S = 0.02
+
+_HELD = {5, 32, 33}
+"""Windows: access denied, sharing violation, lock violation (Microsoft, "System Error Codes (0-499)")."""
+
+
+def replace(path: Path, target: Path) -> None:
+    """Give a file the name of another one, which it replaces.
+
+    Windows replaces no file that may only be read, and none that a program has open.
+
+    Raises:
+        OSError: the system refuses; both files are as before.
+    """
+
+    def once() -> None:
+        try:
+            path.replace(target)
+        except PermissionError as error:
+            if not _made_writable(target, error):
+                raise
+            path.replace(target)
+
+    _patiently(once)
+
+
+def rename(path: Path, target: Path) -> None:
+    """Give a file or a folder a name that is free.
+
+    Raises:
+        OSError: the system refuses.
+    """
+    _patiently(lambda: path.rename(target))
+
+
+def remove(path: Path) -> None:
+    """Remove a file if it is there.
+
+    Raises:
+        OSError: the system refuses.
+    """
+
+    def once() -> None:
+        try:
+            path.unlink(missing_ok=True)
+        except PermissionError as error:
+            if not _made_writable(path, error):
+                raise
+            path.unlink(missing_ok=True)
+
+    _patiently(once)
+
+
+def remove_tree(folder: Path) -> None:
+    """Remove a folder and all that it holds, as far as the system allows."""
+    for path in folder.rglob("*"):
+        with contextlib.suppress(OSError):
+            if path.is_file() and not path.is_symlink() and not path.stat().st_mode & stat.S_IWUSR:
+                path.chmod(path.stat().st_mode | stat.S_IWUSR)  # Windows deletes no file that may only be read
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make renames in a folder outlast a power cut. Windows opens no folders and writes its own journal of names."""
+    with contextlib.suppress(PermissionError, NotADirectoryError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _made_writable(path: Path, error: OSError) -> bool:
+    """Let a file that may only be read be replaced; only Windows asks for that."""
+    if getattr(error, "winerror", None) not in _HELD or not path.is_file():
+        return False
+    if path.stat().st_mode & stat.S_IWUSR:
+        return False
+    path.chmod(path.stat().st_mode | stat.S_IWUSR)
+    return True
+
+
+def _patiently(act: Callable[[], object]) -> None:
+    """Try again while another program holds the file."""
+    until_s = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            act()
+        except PermissionError as error:
+            if getattr(error, "winerror", None) not in _HELD or time.monotonic() > until_s:
+                raise
+            time.sleep(_PAUSE_S)
+        else:
+            return

@@ -1,7 +1,7 @@
 """Measure, calibrate, diagnose and compensate a hexapod machine tool with a double ball bar.
 
-From Python, `import dbbstation as dbb` has a dozen names, each loaded when it is first used. They are provisional until 1.0: a change
-of theirs stands in the changelog.
+`import dbbstation as dbb` has a dozen names, loaded on first use. They are provisional until 1.0; the changelog lists
+changes.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Load a public name when it is first used: help of the command line must not wait for SciPy."""
+    """Load a public name on first use, so that help need not wait for SciPy."""
     if name not in _PUBLIC:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     found = getattr(import_module(_PUBLIC[name]), name)

@@ -1,7 +1,7 @@
-"""What is found by its name: error sources, NC dialects, instruments. One way for all of them.
+"""Find error sources, NC dialects and instruments by name.
 
-A class of the package stands in a file of its own in a folder, and is found by looking. One of an installed package is named
-by an entry point. `dbbstation.files.own_classes` finds those of Python files that a user names.
+Classes of the package are found in a folder, those of installed packages by entry points. `dbbstation.files.own_classes`
+finds those of a user's files.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True)
 class FoundClass(Generic[Base]):
-    """A class that is not the package's.
+    """A class outside the package.
 
     Attributes:
-        place: where it was found: file and line, or entry point.
+        place: file and line, or entry point.
     """
 
     kind: type[Base]
@@ -48,10 +48,10 @@ class FoundClass(Generic[Base]):
 
 
 def in_folders(base: type[Thing], *folders: ModuleType) -> Mapping[str, Thing]:
-    """One instance of every class of the package, sorted by name.
+    """Return one instance of every class of the package, sorted by name.
 
     Args:
-        base: what the classes derive from. Abstract ones and those whose name begins with an underscore do not count.
+        base: abstract classes and names with an underscore do not count.
     """
     found: dict[str, Thing] = {}
     for folder in folders:
@@ -65,13 +65,13 @@ def in_folders(base: type[Thing], *folders: ModuleType) -> Mapping[str, Thing]:
 
 
 def classes_of(module: ModuleType, base: type[Base]) -> list[type[Base]]:
-    """Return the public classes that a module itself defines, abstract ones too."""
+    """Return the public classes defined in a module, abstract ones too."""
     members = [member for _, member in getmembers(module, isclass) if member.__module__ == module.__name__]
     return [member for member in members if issubclass(member, base) and not member.__name__.startswith("_")]
 
 
 def installed(group: str, base: type[Base], faults: list[Problem]) -> list[FoundClass[Base]]:
-    """Classes that entry points of installed packages name; what cannot be loaded is added to `faults`."""
+    """Return classes of entry points; add those that cannot be loaded to `faults`."""
     found = []
     for point in loaded(group, faults):
         if isclass(point.value) and issubclass(point.value, base):
@@ -84,11 +84,7 @@ def installed(group: str, base: type[Base], faults: list[Problem]) -> list[Found
 
 @dataclass(frozen=True)
 class Loaded:
-    """What an entry point of an installed package names.
-
-    Attributes:
-        value: the thing itself.
-    """
+    """What an entry point of an installed package names."""
 
     value: object
     named: str
@@ -97,7 +93,7 @@ class Loaded:
 
 
 def loaded(group: str, faults: list[Problem]) -> list[Loaded]:
-    """Everything that entry points of a group name; what cannot be loaded is added to `faults`."""
+    """Return everything of an entry point group; add what cannot be loaded to `faults`."""
     found = []
     for point in importlib.metadata.entry_points(group=group):
         package = "a package" if point.dist is None else f"the package {point.dist.name}"
@@ -113,11 +109,11 @@ def loaded(group: str, faults: list[Problem]) -> list[Loaded]:
 def added(
     found: dict[str, Thing], whose: dict[str, str], one: Thing, place: Problem, *, called: str, faults: list[Problem]
 ) -> None:
-    """Put one more thing to those that are known; a name that is taken is added to `faults`.
+    """Add one thing, or a fault if its name is taken.
 
     Args:
-        whose: where each of them comes from, where it is not the program itself.
-        called: what things of this kind are called, with their article.
+        whose: origin of each that is not the program's.
+        called: kind in words, with its article.
     """
     if one.name in found:
         what = f"{called} `{one.name}` is known already, from {whose.get(one.name, 'dbbstation itself')}"
@@ -127,12 +123,12 @@ def added(
 
 
 def in_words(error: Exception) -> str:
-    """Return what the code of somebody else raised, with its kind."""
+    """Return an exception of foreign code with its kind."""
     return f"{type(error).__name__}: {error}"
 
 
 def line_in(error: Exception, file: str) -> int:
-    """Return the last line of a file that an error came through; 0 where it did not."""
+    """Return the last line of a file in a traceback; 0 if it has none."""
     frames = traceback.extract_tb(error.__traceback__)
     return next((frame.lineno or 0 for frame in reversed(frames) if frame.filename == file), 0)
 
@@ -140,12 +136,11 @@ def line_in(error: Exception, file: str) -> int:
 def looked_up(
     name: str, known: Mapping[str, Value], *, called: str, error: type[StationError], how_to_add: str = ""
 ) -> Value:
-    """Return what has a name.
+    """Return the thing with this name.
 
     Args:
-        called: what things of this kind are called.
-        error: raised where nothing has the name.
-        how_to_add: what the name may lack, a sentence without a full stop.
+        called: kind in words.
+        how_to_add: what may be missing, without a full stop.
 
     Raises:
         StationError: nothing has this name; the nearest is named, or all that are known.
@@ -156,7 +151,7 @@ def looked_up(
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return the name that is spelled nearly like one, as a question, or all that are known."""
+    """Return the nearest name as a question, or all that are known."""
     names = list(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"did you mean {near[0]}?" if near else f"known are {', '.join(names)}"

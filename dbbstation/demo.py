@@ -1,7 +1,7 @@
-"""The whole job on a virtual machine, over a real serial line, with the commands that anyone would type.
+"""The whole job on a virtual machine over a serial line, by the user's commands.
 
-A virtual hexapod has random errors of its joints and struts, and struts that gravity stretches. It is measured on the
-jig plate, calibrated, diagnosed; compensated programs are written, run on it and measured again.
+The machine has random errors of joints and struts, and gravity stretches its struts. It is measured, calibrated,
+diagnosed, compensated and measured again.
 """
 
 from __future__ import annotations
@@ -80,13 +80,12 @@ def run_demo(
 
     Args:
         folder: made anew.
-        seed: of the virtual machine's errors.
-        tell: told each command before it runs.
-        progress: told each circle as it begins, and how many of how many are done.
-        tests: names of those that are measured; None: all fifteen of [CAL Table II].
+        tell: receives each command before it runs.
+        progress: receives each circle, and how many are done.
+        tests: names; None: all fifteen of [CAL Table II].
 
     Raises:
-        StationError: a step failed; what the steps before it wrote stays.
+        StationError: a step failed; earlier results stay.
     """
     folder.mkdir(parents=True)
     machine_file = shipped_folder("fixtures") / "machines" / "reference.yaml"
@@ -138,7 +137,7 @@ def _write_plan(path: Path, whole: InlinePlan, names: Collection[str]) -> Path:
 
 @dataclass(frozen=True)
 class _Place:
-    """Port of the virtual instrument, and control address of the virtual machine."""
+    """Port of the virtual instrument and control address of the machine."""
 
     port: str
     control: str
@@ -146,7 +145,7 @@ class _Place:
 
 @dataclass(frozen=True)
 class _Job:
-    """Runs the program's own commands in the demonstration's folder."""
+    """Runs commands in the demonstration's folder."""
 
     folder: Path
     what: list[str]
@@ -154,7 +153,7 @@ class _Job:
     progress: Progress
 
     def answer(self, arguments: list[str]) -> str:
-        """Run a command and return what it printed as JSON."""
+        """Run a command and return its JSON."""
         self.tell("dbbstation " + " ".join(_short(argument) for argument in arguments))
         done = subprocess.run(
             [*_PROGRAM, *arguments, "--json"], cwd=self.folder, capture_output=True, text=True, check=False
@@ -186,7 +185,7 @@ class _Job:
 
     @contextmanager
     def emulated(self, arguments: list[str]) -> Iterator[_Place]:
-        """Switch on the virtual machine as a process of its own.
+        """Run the virtual machine as a process.
 
         Yields:
             Its port and its control address.
@@ -211,12 +210,12 @@ _PROGRAM = python_module("dbbstation")
 
 
 def _short(argument: str) -> str:
-    """Last part of a path that the package ships, so that commands can be read."""
+    """Return the last part of a shipped path."""
     return argument.rpartition("/")[2] if argument.endswith(".yaml") else argument
 
 
 def _side_by_side(before: DemoEvaluation, after: DemoEvaluation) -> tuple[DemoCircle, ...]:
-    """Measured figures of the same runs in two sessions, [CAL Table III]."""
+    """Return figures of the same runs in two sessions [CAL Table III]."""
     later = {(run.test, run.direction): _measured(run) for run in after.runs}
     return tuple(
         DemoCircle(run.test, _measured(run), later[run.test, run.direction])

@@ -61,8 +61,7 @@ def few(problems: Sequence[Problem], count: int | None = None) -> list[Problem]:
     """Return the problems, or the first of very many with a count of the others.
 
     Args:
-        problems: in the order of the file.
-        count: how many there are, where only the first `MOST_FAULTS` + 1 of them were made.
+        count: total, if only the first `MOST_FAULTS` + 1 were made.
     """
     more = (count or len(problems)) - MOST_FAULTS
     if more <= 0:
@@ -76,9 +75,9 @@ class StationError(Exception):
     """Base of all errors that a user can cause.
 
     Args:
-        what: what is wrong, one sentence without a full stop.
-        where: file, port, run or pose it concerns.
-        remedy: what the user can do about it.
+        what: one sentence without a full stop.
+        where: file, port, run or pose.
+        remedy: what the user can do.
     """
 
     def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
@@ -88,7 +87,7 @@ class StationError(Exception):
         super().__init__(what, where, remedy)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Let it come whole from another process: that would call the class with `args`, which have no names there."""
+        """Let the error be pickled: its arguments have names."""
         return _as_it_was, (type(self), self.args, self.__dict__)
 
     def __str__(self) -> str:
@@ -104,7 +103,7 @@ def _as_it_was(kind: type[StationError], args: tuple[object, ...], state: dict[s
 
 
 class InputError(StationError):
-    """A file's content is wrong; every fault found is kept, and the first of very many are listed."""
+    """Wrong content of a file, with every fault found."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(sorted(problems, key=lambda one: (natural(one.file), one)))

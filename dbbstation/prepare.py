@@ -1,7 +1,6 @@
 """Compile the numerical loops for this computer: `python -m dbbstation.prepare`.
 
-The first command that needs a loop compiles it, which takes seconds, and keeps the code on disk. Whoever sets the program
-up can have that done beforehand; `dev.py` does.
+Otherwise the first command compiles them, which takes seconds.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from dbbstation.sources.trial import tried
 
 
 def prepare() -> None:
-    """Call everything that is compiled, on a few poses of a machine that is shipped.
+    """Call everything that is compiled, on a few poses.
 
     Raises:
         InputError: the installation is not complete.

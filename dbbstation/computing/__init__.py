@@ -1,1 +1,1 @@
-"""Where computing is done: processes that end with the program, and how many threads linear algebra has."""
+"""Processes that end with the program, and threads of linear algebra."""

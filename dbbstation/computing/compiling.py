@@ -1,4 +1,4 @@
-"""Who is told when numerical loops are compiled, which takes seconds and happens once on a computer."""
+"""Who is told when loops are compiled, once on a computer, for seconds."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ _told: list[Callable[[bool], None]] = []
 
 
 def tell_of_compiling(tell: Callable[[bool], None]) -> None:
-    """Call `tell` with True when a loop begins to be compiled in this process, and with False when it is."""
+    """Call `tell` with True before a loop is compiled in this process and with False after."""
     _told[:] = [tell]
 
 
 def listen_to_compiler() -> None:
-    """Hand on what the compiler says; code that was kept on disk is loaded, and nobody is told."""
+    """Pass on the compiler's events; code loaded from disk has none."""
     from numba.core import event  # noqa: PLC0415 - a third of a second, of which the compiler's user has paid already
 
     class CompileListener(event.Listener):
-        """Counts compilations that are parts of others."""
+        """Counts nested compilations."""
 
         def __init__(self) -> None:
             self.depth = 0

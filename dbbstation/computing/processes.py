@@ -1,4 +1,4 @@
-"""Work on several cores, each piece in a process of its own, which ends at once where the work is interrupted."""
+"""Work on several cores in processes that end at once when interrupted."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ Result = TypeVar("Result")
 
 
 def each(work: Callable[[Item], Result], items: Sequence[Item], count: int) -> Generator[tuple[int, Result]]:
-    """Yield the place of an item and what was worked out of it, as they are done; close it where it is not read to its end.
+    """Yield the place and result of items as they are done.
 
-    Where processes cannot be started, or one is ended by the system, the rest is worked out in this one.
+    If processes cannot start or are killed, this one does the rest.
 
     Args:
-        work: can be sent to another process: a function of a module, or a `functools.partial` of one.
-        items: can be sent too.
-        count: of processes; up to 1: this one does it all, in order.
+        work: can be pickled: a module's function, or a `functools.partial`.
+        items: can be pickled.
+        count: up to 1: this process does it all, in order.
 
     Raises:
         Exception: whatever `work` raises.
@@ -51,7 +51,7 @@ def each(work: Callable[[Item], Result], items: Sequence[Item], count: int) -> G
 
 @contextmanager
 def processes(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield processes to work in, which end at once where this one is interrupted; hand them work while `deaf`."""
+    """Yield processes that end when this one is interrupted; give them work while `deaf`."""
     # Started anew rather than forked: a fork would copy the locks of the threads that kernels run on.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(count, mp_context=context, initializer=_end_with_parent) as pool:
@@ -66,7 +66,7 @@ def processes(count: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _end_with_parent() -> None:
-    """Let a process end with the one that started it: killed, that one can tell it nothing, and it would wait for ever."""
+    """End a process with its parent, which cannot tell it when killed."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_after, args=(parent.sentinel,), name="end-with-parent", daemon=True).start()
@@ -78,7 +78,7 @@ def _end_after(sentinel: int) -> None:
 
 
 def _say_nothing_of(pool: ProcessPoolExecutor) -> None:
-    """Keep the thread that hands out a pool's work quiet: its processes are gone, which was asked for and is no news."""
+    """Silence the thread of a pool whose processes were ended."""
     before, handing_out = threading.excepthook, getattr(pool, "_executor_manager_thread", None)
 
     def hook(fault: threading.ExceptHookArgs) -> None:

@@ -1,8 +1,7 @@
-"""One thread of linear algebra where the program's own matrices are worked on.
+"""One thread of linear algebra for the program's own narrow matrices.
 
-The matrices of a fit are narrow. Threads of the linear algebra (BLAS) cost more there than they save: they wait for each
-other between thousands of small products. Whoever calls the program from Python has other matrices, too; so the threads are
-limited while a fit runs and are given back behind it.
+More BLAS threads wait for each other between thousands of small products. Callers have other matrices, so the limit ends
+with the fit.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ Result = TypeVar("Result")
 
 
 def with_one_thread(work: Callable[Asked, Result]) -> Callable[Asked, Result]:
-    """Make a function run with one thread of linear algebra, whoever calls it, and give the threads back behind it.
+    """Run a function with one thread of linear algebra.
 
-    The limit is the process's: while the function runs, other threads of Python have one thread of linear algebra, too.
+    The limit holds for the whole process.
     """
 
     @wraps(work)
@@ -36,7 +35,7 @@ def with_one_thread(work: Callable[Asked, Result]) -> Callable[Asked, Result]:
 
 
 class _Limit:
-    """Counts who works: the first that begins sets the limit, the last that ends gives the threads back."""
+    """Counts workers: the first sets the limit, the last removes it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -65,10 +64,9 @@ _LIMIT = _Limit()
 
 
 def _set(library: LibController, count: int) -> None:
-    """Set how many threads a library has, from whatever thread of Python.
+    """Set a library's threads, from any thread of Python.
 
-    threadpoolctl lets only the thread that set a limit first set another. Here the last that ends may be another one than the
-    first that began: `_Limit` keeps order itself.
+    threadpoolctl allows only the first thread to reset a limit, so `_Limit` keeps order itself.
     """
     release = getattr(library, "clear_controlling_thread", lambda **_: None)  # from threadpoolctl 3.8 on
     release(force=True)
@@ -78,7 +76,7 @@ def _set(library: LibController, count: int) -> None:
 
 @cache
 def _libraries() -> list[LibController]:
-    """Libraries of linear algebra of this process: those of NumPy and of SciPy, which bring one each."""
+    """Return the BLAS libraries of this process: those of NumPy and SciPy."""
     import numpy as np  # noqa: F401, PLC0415 - loaded here, so that both are found
     import scipy.linalg  # noqa: F401, PLC0415
     from threadpoolctl import ThreadpoolController  # noqa: PLC0415 - whoever only asks for help does not wait for it

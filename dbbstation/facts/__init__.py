@@ -1,1 +1,1 @@
-"""What facts are made of: a value with its uncertainty, and the one way to JSON."""
+"""A value with its uncertainty, and the one way to JSON."""

@@ -1,6 +1,6 @@
-"""The one way from results to JSON, and to the JSON Schemas of results.
+"""The one way from results to JSON and its schemas.
 
-A result is a frozen dataclass. Its fields are the keys of the JSON, in the same words and units.
+A result is a frozen dataclass. Its fields are the keys of the JSON.
 """
 
 from __future__ import annotations
@@ -55,11 +55,7 @@ def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
 
 
 def plain(result: object) -> dict[str, Any]:
-    """Return a result as what JSON has: objects, lists, texts and numbers.
-
-    Args:
-        result: a frozen dataclass of this package.
-    """
+    """Return a result as objects, lists, texts and numbers."""
     kind: type[Any] = type(result)
     return _adapter(kind).dump_python(result, mode="json", by_alias=True)
 
@@ -68,12 +64,11 @@ def json_of(result: object, indent: int | None = 1, *, escaped: bool = False) ->
     """Return a result as JSON text.
 
     Args:
-        result: a frozen dataclass of this package.
-        indent: spaces by which each level is moved in; None: everything on one line.
-        escaped: characters beyond ASCII are escaped, so that names of files that are not in UTF-8 can be kept in a database.
+        indent: spaces a level; None: everything on one line.
+        escaped: escape characters beyond ASCII, for a database with file names that are not UTF-8.
 
     Raises:
-        ValueError: a number in it is not finite, which JSON cannot say.
+        ValueError: a number is not finite.
     """
     return json.dumps(plain(result), indent=indent, allow_nan=False, ensure_ascii=escaped)
 
@@ -84,7 +79,7 @@ def schema_of(kind: type) -> dict[str, Any]:
 
 
 def read_json(kind: type[_Kind], text: str | bytes) -> _Kind:
-    """Return what `json_of` wrote of a frozen dataclass whose keys are its fields' names.
+    """Return the dataclass that `json_of` wrote.
 
     Raises:
         ValueError: the text is no JSON, or not of this class.
@@ -94,11 +89,10 @@ def read_json(kind: type[_Kind], text: str | bytes) -> _Kind:
 
 
 def read_plain(kind: type[_Kind], data: Mapping[str, object]) -> _Kind:
-    """Return what `plain` made of a frozen dataclass, or as much of it as another class has.
+    """Return the dataclass that `plain` wrote, or the part of it that another class has.
 
     Args:
-        kind: the class; its fields' names are keys.
-        data: objects, lists, texts and numbers; further keys are let be.
+        data: further keys are ignored.
 
     Raises:
         ValueError: a key is missing, or its value is of another type.

@@ -1,4 +1,4 @@
-"""A number with its standard uncertainty and unit: the one type of it, in whatever is computed and in JSON."""
+"""A number with its standard uncertainty and unit, the one type of it."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ OrUnknown = Annotated[
 
 
 def finite(number: float | None) -> float | None:
-    """Return a number, or None where it is not finite: JSON has no word for that."""
+    """Return a number, or None if it is not finite."""
     return number if number is not None and math.isfinite(number) else None
 
 
 @dataclass(frozen=True)
 class Value:
-    """A number with its standard uncertainty u [GUM], in one unit."""
+    """A number with its standard uncertainty u [GUM] in one unit."""
 
     value: OrUnknown
     uncertainty: OrUnknown
@@ -35,5 +35,5 @@ class Value:
         return math.isfinite(self.uncertainty)
 
     def at_least(self, uncertainty: float) -> Value:
-        """Return it with the larger of its own and another standard uncertainty; one that is not known (nan) changes nothing."""
+        """Return it with at least this standard uncertainty; nan changes nothing."""
         return replace(self, uncertainty=uncertainty) if uncertainty > self.uncertainty else self

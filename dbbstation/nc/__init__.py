@@ -1,1 +1,1 @@
-"""NC programs: read, written in a dialect, compensated. Text in, text out: files are the command line's business."""
+"""NC programs: read, compensated, and written in a dialect, as text."""

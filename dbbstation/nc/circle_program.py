@@ -37,10 +37,10 @@ BAR_OFF = "stop recording, take the bar off, then continue"
 
 @dataclass(frozen=True)
 class Approach:
-    """How the machine comes to the first point, and leaves the last.
+    """Where the machine comes to the first point and leaves the last.
 
     Attributes:
-        clear_mm: height above these points that rapids go to: clear of ball, holder and bar [mm].
+        clear_mm: height of rapids above these points, clear of ball, holder and bar [mm].
     """
 
     clear_mm: float = 20.0
@@ -56,16 +56,12 @@ def circle_toolpath(
     step_deg: float = STEP_DEG,
     approach: Approach | None = USUAL_APPROACH,
 ) -> Toolpath:
-    """Return the nominal path of a run.
+    """Return the nominal path of a run as straight moves every `step_deg`.
 
-    Arcs are straight moves every `step_deg`, so that a nominal and a compensated program differ in nothing but
-    their numbers. A chord lies `chord_error_mm` inside the circle at most.
+    A nominal and a compensated program then differ only in their numbers.
 
     Args:
-        name: of the program, for messages.
-        step_deg: greatest angle between points of the arc [deg].
-        approach: where rapids go and the program waits for the bar to be put on and taken off; None: the bar is on already and
-            stays on, so the program starts with a feed move to its first point and ends at its last.
+        approach: where rapids go and the program waits for the bar; None: the bar stays on, and the program has feed moves only.
     """
     first, last = circle.poses(_ends_deg(circle), circle.feed_in_mm)
     path = ToolpathBuilder(name)
@@ -96,7 +92,7 @@ def circle_toolpath(
 
 
 def arc_phi_deg(circle: Circle, step_deg: float) -> NDArray[np.float64]:
-    """Progress of the programmed points, overshoot arcs included: both ends of the turn are points [deg]."""
+    """Return the progress of the programmed points, overshoot arcs included [deg]."""
     edges = [-circle.overshoot_deg, 0.0, FULL_TURN_DEG, FULL_TURN_DEG + circle.overshoot_deg]
     parts = [np.array(edges[:1])]
     for start, stop in pairwise(edges):
@@ -106,7 +102,7 @@ def arc_phi_deg(circle: Circle, step_deg: float) -> NDArray[np.float64]:
 
 
 def chord_error_mm(circle: Circle, step_deg: float) -> float:
-    """How far the middle of a chord lies inside the circle, r (1 - cos(step / 2)) [mm]."""
+    """Return how far the middle of a chord lies inside the circle, r (1 - cos(step / 2)) [mm]."""
     return circle.radius_mm * float(1.0 - np.cos(np.radians(step_deg) / 2.0))
 
 

@@ -1,4 +1,4 @@
-"""Commanded poses of a recorded run whose program is known, at the samples of its circle."""
+"""Commanded poses of a recorded run whose program is known."""
 
 from __future__ import annotations
 
@@ -29,11 +29,10 @@ SLACK_DEG = 1.0
 
 
 def commanded_poses(text: str, file: str, observation: Observation) -> NDArray[np.float64]:
-    """Commanded poses for `Observation.commanded`: its lead-in, then its samples, shape (n, 6) [mm, deg].
+    """Return the commanded poses of the lead-in and the samples, shape (n, 6) [mm, deg].
 
     Args:
-        text: the program that was run.
-        file: its name; the extension tells the dialect, or what the program holds.
+        file: name whose extension tells the dialect.
 
     Raises:
         InputError: the program cannot be read, or does not run this circle.
@@ -45,16 +44,13 @@ def commanded_poses(text: str, file: str, observation: Observation) -> NDArray[n
 
 
 def poses_at_progress(toolpath: Toolpath, circle: Circle, phi_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Commanded poses at the progress phi along the turn, shape (n, 6) [mm, deg].
+    """Return commanded poses at the progress phi along the turn, shape (n, 6) [mm, deg].
 
-    The counterpart of cutting a recording: phi is time at the plan's feed on the plan's circle, 180 degrees at the
-    middle between feed-in and feed-out. The arc is the program's longest stretch of feed moves without a stop; its
-    middle, by the program's own feeds, is 180 degrees. A program without stops at the corners has its feed-in and
-    feed-out in that stretch, which moves the middle nowhere.
+    Phi is time at the plan's feed; 180 degrees is the middle between feed-in and feed-out. The arc is the program's
+    longest stretch of feed moves without a stop.
 
     Args:
-        circle: the run's circle and direction.
-        phi_deg: progress, negative in the lead-in, shape (n,) [deg].
+        phi_deg: negative in the lead-in, shape (n,) [deg].
 
     Raises:
         InputError: the program does not run this circle.
@@ -75,7 +71,7 @@ def poses_at_progress(toolpath: Toolpath, circle: Circle, phi_deg: NDArray[np.fl
 
 
 def _arc_s(toolpath: Toolpath) -> tuple[float, float]:
-    """Begin and end of the longest stretch of feed moves [s]."""
+    """Return begin and end of the longest stretch of feed moves [s]."""
     # Comments and functions take no time and end no stretch.
     stops = np.isin(toolpath.kind, [RowKind.RAPID, RowKind.DWELL, RowKind.PAUSE, RowKind.OPTIONAL_STOP])
     stretch = np.cumsum(stops)

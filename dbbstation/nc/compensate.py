@@ -1,4 +1,4 @@
-"""Compensation of any toolpath: the machine model inverted along the path, moves in pieces that keep chord and feed."""
+"""Compensation of any toolpath: the machine model inverted along the path, in pieces that keep chord and feed."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ FEED_KEPT = 1e-3
 
 
 class Prefer(StrEnum):
-    """What to keep where the chord and the feed cannot both be kept."""
+    """What to keep if chord and feed cannot both be kept."""
 
     ACCURACY = "accuracy"
     """The chord: F is lowered to what the pieces let the control reach."""
@@ -61,9 +61,9 @@ class Slow:
     """The move that loses most of its feed.
 
     Attributes:
-        line: of the program; 0 where there is none.
-        reached_mm_min: F at which it would lose none.
-        chord_um: chord error at which it would keep its F, with pieces of the length that F needs [µm].
+        line: 0 if there is none.
+        reached_mm_min: F at which nothing is lost.
+        chord_um: chord error of pieces long enough for F.
     """
 
     line: int
@@ -77,17 +77,13 @@ class Compensation:
     """A compensated toolpath and what was done to it.
 
     Attributes:
-        toolpath: poses rounded as they will be written.
         greatest_um: largest shift of a programmed point, or of one `LEVER_MM` from the tip by the tilt [µm].
-        chord_um: largest distance between a commanded move and the curve that it stands for, looked for at `DENSELY` places
-            of each piece [µm].
-        chord_line: line of the program where that is; 0 where there is none.
-        tilt_um: largest correction of the tilt that was left out, as felt at `LEVER_MM` [µm].
-        seconds: time in moves at feed, by the planner's rule [s].
-        nominal_seconds: of the toolpath that was compensated [s].
-        rapid_seconds: time in rapids, by the same rule; 0 where the control looks ahead [s].
-        nominal_rapid_seconds: of the toolpath that was compensated [s].
-        slow: where the feed is lost; None where it is kept.
+        chord_um: largest distance between a commanded move and its curve, at `DENSELY` places of each piece [µm].
+        chord_line: 0 if there is none.
+        tilt_um: largest correction of the tilt that was left out, felt at `LEVER_MM` [µm].
+        seconds: time in moves at feed, by the planner's rule.
+        rapid_seconds: by the same rule; 0 if the control looks ahead.
+        slow: None if the feed is kept.
     """
 
     toolpath: Toolpath
@@ -116,18 +112,16 @@ def compensate_toolpath(
 ) -> Compensation:
     """Return the toolpath that takes the actual machine along the given one.
 
-    The path is inverted from its beginning to its end, rapids included, so that sources with a history see the one that the
-    machine will have.
+    The path is inverted from beginning to end, rapids included: sources with a history see the path that the machine
+    runs.
 
     Args:
-        model: calibrated model; what belongs to the machine is inverted.
-        chord_mm: moves at feed are written in the longest pieces that keep this tolerance; None writes one move for each.
-        keep_arcs: chords of arcs stay as they are: they were chosen for the feed before.
-        started_s: start of the program on the time scale of the model's sessions, for sources that need time [s]; None: not
-            known.
-        largest_mm: greatest correction that is applied, of the tip and of a point `LEVER_MM` from it by the tilt [mm].
-        planner: the control on its machine, which says how long pieces must be for their feed.
-        prefer: what to keep where chord and feed cannot both be kept; None: the chord, and F as it is.
+        model: calibrated; only sources of the machine are inverted.
+        chord_mm: tolerance of the longest pieces; None: one move for each.
+        keep_arcs: keep the chords of arcs, which were chosen for the feed before.
+        started_s: start of the program on the time scale of the model's sessions; None: not known.
+        largest_mm: greatest correction of the tip, and of a point `LEVER_MM` from it by the tilt.
+        prefer: None: the chord, with F as it is.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
@@ -205,7 +199,7 @@ class _Part:
     Attributes:
         commanded: pose at the end of each, shape (k, 6) [mm, deg].
         shift_mm: correction there, shape (k,) [mm].
-        off_mm: how far the curve leaves each piece, shape (k,) [mm].
+        off_mm: distance between curve and piece, shape (k,).
     """
 
     pieces: Pieces
@@ -215,7 +209,6 @@ class _Part:
 
 
 def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: NDArray[np.float64], largest_mm: float) -> None:
-    """Refuse corrections that no machine needs."""
     if shift_mm.max(initial=0.0) <= largest_mm:
         return
     worst = int(np.argmax(shift_mm))
@@ -229,17 +222,16 @@ def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: NDArray[np.
 
 
 def _off_mm(toolpath: Toolpath, pieces: Pieces, at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far the curve leaves each piece at feed, at `DENSELY` places, shape (k,) [mm]."""
+    """Return how far the curve leaves each piece at feed, at `DENSELY` places, shape (k,) [mm]."""
     begin, end = at[:, 0], at[:, -1]
     off = np.array([felt_mm(at[:, 1 + k] - (begin + share * (end - begin))) for k, share in enumerate(DENSELY)])
     return np.where(toolpath.kind[pieces.row] == RowKind.FEED, off.max(axis=0, initial=0.0), 0.0)
 
 
 def _needed_mm(toolpath: Toolpath, planner: Planner, prefer: Prefer | None) -> NDArray[np.float64]:
-    """Length of a piece that keeps the feed of each row, shape (n,) [mm]: 0 where any length does.
+    """Return the length of a piece that keeps the feed of each row, shape (n,) [mm]; 0 if any length does.
 
-    Every move turns A, B and C once it is compensated, unless they are held. A move that turns them as it is programmed
-    is as slow as its length lets it be, compensated or not.
+    Every compensated move turns A, B and C, unless they are held.
     """
     limited = planner.limited(toolpath)
     mm_s = np.where(toolpath.kind == RowKind.FEED, np.nan_to_num(toolpath.feed) / 60.0, 0.0)
@@ -251,23 +243,23 @@ def _needed_mm(toolpath: Toolpath, planner: Planner, prefer: Prefer | None) -> N
 
 @dataclass(frozen=True, eq=False)
 class _Of:
-    """Number of the run that each row belongs to: of the toolpath as it was, shape (n,), and of the compensated one, (k,)."""
+    """Run of each row of the toolpath, shape (n,), and of the compensated one, (k,)."""
 
     before: NDArray[np.int64]
     after: NDArray[np.int64]
 
     def lost(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sums of each run, those of the compensated toolpath over those of the other, shape (2, runs)."""
+        """Return each run's sum before and after, shape (2, runs)."""
         count = int(self.before[-1]) + 1
         pairs = ((self.after, after), (self.before, before))
         return np.array([np.bincount(number, weights=each, minlength=count) for number, each in pairs])
 
 
 def _slowest(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner, short: dict[int, float]) -> Slow | None:
-    """Return the move that loses most of its feed; None where all keep it, and all together with their ramps.
+    """Return the move that loses most of its feed, or None, and all together with their ramps.
 
     Args:
-        short: how near to the curve the pieces are that the feed needs, by run [mm].
+        short: distance of the pieces that the feed needs from the curve, by run [mm].
     """
     cutting = cuts(done)
     if not cutting.any():
@@ -291,12 +283,12 @@ def _slowest(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner, shor
 
 
 def _tilt_held(toolpath: Toolpath) -> NDArray[np.float64]:
-    """Poses of the toolpath, shape (n, 6), with A, B and C at zero."""
+    """Return poses, shape (n, 6), with A, B and C at zero."""
     return np.where(np.arange(6) < 3, toolpath.poses, 0.0)  # noqa: PLR2004 - X, Y and Z
 
 
 def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner) -> Slow | None:
-    """Return the move that loses most in its ramps, with the feed at which all together lose little enough."""
+    """Return the move that loses most in its ramps, with the feed at which all lose little enough."""
 
     def share(of_feed: float) -> float:
         slower = [
@@ -321,12 +313,11 @@ def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner
 
 
 def _seconds(path: Toolpath, planner: Planner, *, in_chords: bool = False) -> NDArray[np.float64]:
-    """Time of each row at feed, zero in others, shape (n,) [s]."""
+    """Return the time of each row at feed, zero in others, shape (n,) [s]."""
     return np.where(path.kind == RowKind.FEED, planner.seconds(path, in_chords=in_chords), 0.0)
 
 
 def _slowed(done: Toolpath, planner: Planner) -> Toolpath:
-    """The toolpath with no F beyond what the control reaches, so that it runs evenly."""
     mm_min = np.floor(60.0 * planner.reached_mm_s(np.maximum(done.tip_mm, SHORTEST_MM)))
     slower = planner.limited(done) & (done.feed_mm_min > mm_min)
     return replace(done, feed_mm_min=np.where(slower, mm_min, done.feed_mm_min))
@@ -341,10 +332,9 @@ def _assembled(
     machine: Machine,
     corner_mm: float,
 ) -> Toolpath:
-    """The toolpath with one row for each piece, rapids in one.
+    """Return the toolpath with one row for each piece, rapids in one.
 
-    Corners between the pieces of a move may be rounded by as much as the pieces may leave the path: such a corner needs
-    no more at full feed, and no less.
+    Corners between the pieces of a move may be rounded by the pieces' tolerance.
     """
     row = pieces.row
     of = runs[row]
@@ -364,14 +354,13 @@ def _assembled(
 
 
 def _written(toolpath: Toolpath, pieces: Pieces) -> NDArray[np.bool_]:
-    """Which pieces become a row: all at feed, the last one of a rapid, or of those that go on in one direction."""
     row = pieces.row
     last = np.append(row[1:] != row[:-1], True)[: len(row)]
     return np.asarray((last & ~rapids.go_on(toolpath)[row]) | (toolpath.kind[row] == RowKind.FEED))
 
 
 def _until(toolpath: Toolpath, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Way of the tool tip [mm] and time [s] from the begin of the program to places, shapes (k,)."""
+    """Return way of the tool tip [mm] and time [s] from the begin of the program, shapes (k,)."""
     at = np.arange(len(toolpath) + 1)
     ways = (np.concatenate([[0.0], np.cumsum(each)]) for each in (toolpath.tip_mm, toolpath.duration_s))
     way_mm, time_s = (np.interp(places, at, way) for way in ways)
@@ -384,12 +373,10 @@ def _feeds(
     wanted_mm: NDArray[np.float64],
     wanted_s: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Feeds of a compensated path, shape (n,): of the tool tip [mm/min], of the angles where it stands still [deg/min].
+    """Return the feeds of a compensated path, shape (n,) [mm/min], or of angles if the tip stands still [deg/min].
 
-    The feed is that of the tool tip in X, Y and Z, and the compensated move has the wanted length within a few
-    parts in ten thousand, so F stays. Not so where the platform turns about a tool tip that hardly moves: there the
-    correction is most of the way, and the old F would run it in no time. Such moves get the feed that takes the
-    wanted time.
+    F stays, because the compensated move has nearly the wanted length. A turn about a tip that hardly moves gets the feed
+    that takes the wanted time.
     """
     # Controls take F for a turning speed only where X, Y and Z stand still to the last digit.
     way = np.where(path.tip_mm > 0.0, path.tip_mm, path.turn_deg)

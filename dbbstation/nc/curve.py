@@ -1,4 +1,4 @@
-"""The curve to command so that the tool goes along a toolpath: the machine model inverted at places of it."""
+"""The curve to command so that the tool follows a toolpath."""
 
 from __future__ import annotations
 
@@ -43,15 +43,13 @@ class Behind:
 class CommandCurve:
     """What to command along a toolpath.
 
-    A place is a number: the row that it lies in and the share of it that is behind it, so that a row ends at the number
-    of the next one.
+    A place is a number: row plus the share of it that is passed. A row ends at the number of the next one.
 
     Args:
-        toolpath: as the tool should go.
-        model: calibrated model; what belongs to the machine is inverted.
-        started_s: start of the program on the time scale of the model's sessions [s]; None where not known.
-        hold_tilt: command A, B and C as they are programmed, and correct the tool tip alone.
-        before: what was left by the part that this one follows; None: it is the first that moves.
+        model: calibrated; only sources of the machine are inverted.
+        started_s: start of the program on the time scale of the model's sessions; None if not known.
+        hold_tilt: correct the tool tip alone and command A, B and C as programmed.
+        before: from the preceding part; None: this is the first that moves.
     """
 
     def __init__(
@@ -78,11 +76,10 @@ class CommandCurve:
         """What is left behind the last of the places that were looked at last."""
 
     def at(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Poses to command at places in the order in which the program comes to them, shape (k, 6) [mm, deg].
+        """Return poses to command at places in program order, shape (k, 6) [mm, deg].
 
-        Rows that do not move take over the pose before them; NaN before the machine's place is known. Where the model has a
-        history, the end of those that last a while is inverted as well, and what is commanded for it is commanded for the
-        move before: what acts in time comes to rest there.
+        Rows without motion take over the pose before them; NaN before the place is known. If the model has a history, the
+        end of long stops is inverted as well and commanded for the move before.
 
         Raises:
             KinematicsError: a pose that the machine cannot take.
@@ -114,7 +111,7 @@ class CommandCurve:
         return np.where(self._known[row][:, None], inverse[at_rest], np.nan)
 
     def _inverted(self, wanted: Motion) -> NDArray[np.float64]:
-        """Invert stretch by stretch: what a source with a history remembers goes from each to the next.
+        """Invert stretch by stretch, handing the sources' memory on.
 
         Returns:
             Commands, those before the first that moves first, shape (1 + number of places that move, 6) [mm, deg].
@@ -145,15 +142,15 @@ class CommandCurve:
 
 
 def row_and_share(places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Rows and the shares of them that are behind, shapes (k,); the end of a row belongs to it, its begin does not."""
+    """Return rows and shares passed, shapes (k,); the end of a row belongs to it, its begin does not."""
     row = np.maximum(np.ceil(places).astype(np.int64) - 1, 0)
     return row, places - row
 
 
 def felt_mm(off: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What differences of poses, shape (k, 6), are at the tip or, where more, by their tilt at the lever, (k,) [mm].
+    """Return the way at the tip, or of a point at the lever if larger, of pose differences (k, 6), shape (k,) [mm].
 
-    Zero where a place is not known.
+    Zero if a place is not known.
     """
     lengths = in_mm(off)
     moved, tilted = np.linalg.norm(lengths[:, :3], axis=1), np.linalg.norm(lengths[:, 3:], axis=1)
@@ -162,5 +159,5 @@ def felt_mm(off: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def in_mm(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Poses, shape (k, 6), with angles as the way of a point at the lever [mm]."""
+    """Return poses, shape (k, 6), with angles as the way of a point at the lever [mm]."""
     return poses * np.repeat([1.0, np.radians(LEVER_MM)], 3)

@@ -1,4 +1,4 @@
-"""What a dialect is: one control's way to write and read a toolpath."""
+"""One control's way to write and read a toolpath."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ LONGEST_COMMENT = 200
 
 
 def plain(text: str) -> str:
-    """Text on one line of printable ASCII, no longer than a comment may be."""
+    """Return text on one line of printable ASCII, cut to a comment's length."""
     ascii_text = text.replace("µ", "u").encode("ascii", "replace").decode()
     printable = "".join(letter if letter.isprintable() else " " for letter in ascii_text)
     return printable[:LONGEST_COMMENT].strip()
 
 
 class Dialect(ABC):
-    """One control's language. Each stands in a file of its own in `dialects/` and carries no state."""
+    """One control's language, without state; each has a file in `dialects/`."""
 
     name: ClassVar[str]
     extension: ClassVar[str]
@@ -39,17 +39,13 @@ class Dialect(ABC):
 
     @abstractmethod
     def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
-        """Return the program, with the header's lines as comments before anything else.
+        """Return the program, with the header's lines as comments first.
 
-        The same toolpath and header give the same text: no date, nothing of the computer it was written on. Where the
-        toolpath has `numbers`, its first and last line that are no comment carry them.
+        The same toolpath and header give the same text. `numbers` go to the first and last line that are no comment.
         """
 
     def is_in(self, text: str) -> bool:  # noqa: ARG002
-        """Whether a program may be in this language; asked where several dialects have files of one ending.
-
-        A dialect that shares its ending looks for what only it has, such as the first line of its programs.
-        """
+        """Return whether a program may be in this language; asked if several dialects share an ending."""
         return True
 
     @abstractmethod
@@ -57,8 +53,7 @@ class Dialect(ABC):
         """Return what a program commands.
 
         Args:
-            name: file it came from, for messages.
-            start: pose before the program, shape (6,) [mm, deg]; None where unknown: then its first move must name all six axes.
+            start: pose before the program, shape (6,) [mm, deg]; None: the first move must name all six axes.
 
         Raises:
             InputError: faults with line and column.

@@ -1,4 +1,4 @@
-"""Programs of a plan's circles and compensated programs, checked against the machine's travel, as text."""
+"""Nominal and compensated programs as text, checked against the machine's travel."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ class Inverse:
     """The model to compensate with.
 
     Attributes:
-        origin: where it comes from, for the header: what by which name or hash.
-        started_s: start of each program on the time scale of the model's sessions [s]; None where not known.
-        identified: the same model with the covariance of its values; None where that is not known.
+        origin: file or hash of the model, for the header.
+        started_s: start of each program on the time scale of the model's sessions; None if not known.
+        identified: the model with its covariance; None if not known.
         largest_mm: greatest correction that is applied [mm].
-        prefer: what to keep where chord and feed cannot both be kept; None: refuse the program then.
-        accepted_um: chord error that is accepted where the one asked for is missed [µm]; None: none is.
+        prefer: None: refuse a program that cannot keep chord and feed.
+        accepted_um: chord error accepted if the requested one is missed; None: none.
     """
 
     model: MachineModel
@@ -77,21 +77,20 @@ class Program:
 
     Attributes:
         points: moves at feed.
-        greatest_um: largest correction of a programmed point [µm]; None in a nominal program.
-        chord_um: largest distance between a move and the path that it stands for [µm]; None in a nominal program.
-        chord_asked_um: chord error that was asked for [µm]; None in a nominal program.
-        uncertainty_um: greatest standard uncertainty of the model's tool tip along the path, all three coordinates together [µm];
-            None where not known.
-        uncertainty_by_axis_um: the same of X, Y and Z each; None where not known, empty where no model is.
-        why_unknown: why one of them is not known; empty where all are.
-        tilt_left_um: correction of the tilt that was left out, as felt 100 mm from the tip [µm]; None in a nominal program.
-        feed_s: time of all moves at feed, as the control plans them [s]; None in a nominal program.
-        nominal_feed_s: of the program that it was made from [s]; None in a nominal program.
-        rapid_s: time of all rapids, as the control plans them at the machine's greatest feed; None in a nominal program [s].
-        cost: what a preference cost, in words; empty without one.
-        slower_rapids: what rapids lose, in words; empty where that is next to nothing.
-        merged_um: distance of points that were left out from the lines in their place, where short moves had to be made one [µm].
-        merged: the same in words; empty where none were.
+        greatest_um: None in a nominal program.
+        chord_um: largest distance between a move and its path; None in a nominal program.
+        chord_asked_um: None in a nominal program.
+        uncertainty_um: greatest standard uncertainty of the tool tip along the path; None if not known.
+        uncertainty_by_axis_um: of X, Y and Z; None if not known, empty without a model.
+        why_unknown: empty if all are known.
+        tilt_left_um: correction of the tilt that was left out, felt 100 mm from the tip; None in a nominal program.
+        feed_s: time at feed as the control plans it; None in a nominal program.
+        nominal_feed_s: None in a nominal program.
+        rapid_s: time of rapids at the machine's greatest feed; None in a nominal program.
+        cost: cost of a preference in words; empty without one.
+        slower_rapids: loss in words; empty if negligible.
+        merged_um: distance of left-out points from merged lines.
+        merged: the same in words; empty if none.
     """
 
     name: str
@@ -127,17 +126,14 @@ def circle_programs(
     approach: Approach | None = USUAL_APPROACH,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> list[Program]:
-    """Return the programs of all runs of a plan, named TEST-DIRECTION with the dialect's extension.
+    """Return the programs of all runs, named TEST-DIRECTION with the dialect's extension.
 
     Args:
-        machine: nominal machine, whose travel holds.
-        inverse: compensate with this; None for nominal programs.
-        origin: where plan and machine come from, for the header.
-        tests: names of the tests wanted; empty for all.
-        step_deg: angle between programmed points [deg]; in compensated programs it is larger where the feed needs that.
-        chord_mm: greatest distance of a compensated program's moves from the circle [mm].
-        approach: see `circle_toolpath`.
-        progress: told how many of how many are done.
+        inverse: None for nominal programs.
+        origin: source of plan and machine, for the header.
+        tests: names; empty for all.
+        step_deg: angle between points; compensated programs take a larger one if the feed needs it.
+        chord_mm: greatest distance of a compensated move from the circle.
 
     Raises:
         TravelError: a program leaves the travel; none is returned then.
@@ -185,11 +181,7 @@ def dry_run(
     """Try the nominal programs of all runs of a plan, and write none.
 
     Args:
-        machine: nominal machine, whose travel and feeds hold.
-        tests: names of the tests wanted, which the plan has; empty for all.
-        step_deg: greatest angle between programmed points [deg].
-        approach: see `circle_toolpath`.
-        progress: told how many of how many are done.
+        tests: names that the plan has; empty for all.
 
     Returns:
         Number of programs, and what `circle_programs` would refuse: for each program the first point outside the travel and
@@ -218,15 +210,15 @@ def compensated_program(
     chord_mm: float = CHORD_MM,
     origin: Mapping[str, str] | None = None,
 ) -> Program:
-    """Return any program compensated, and named after the one that it was.
+    """Return any program compensated, with its name.
 
     Raises:
         TravelError: the compensated path leaves the travel.
         KinematicsError: a pose that the machine cannot take.
         ModelError: the model has a source that needs what a program lacks.
         MachineError: a feed that the machine does not reach.
-        StationError: the program is compensated already or for another machine, its corrections are too large, or chord
-            and feed cannot both be kept.
+        StationError: the program is compensated already or for another machine, its corrections are too large, or chord and feed
+            cannot both be kept.
         MergedMovesError: they are, but for short moves that the control makes one in the nominal program.
     """
     machine = inverse.model.machine
@@ -272,13 +264,10 @@ def _or_the_feed_that_is_kept(
     slower: Callable[[float], What],
     inverse: Inverse | None,
 ) -> Program:
-    """Return a program, or refuse it with a feed at which it is written.
-
-    Pieces for a smaller feed are shorter. Where the feed is preferred, one that was found with the pieces of a greater feed may be
-    more than they reach.
+    """Return a program, or refuse it and name a feed at which it can be written.
 
     Args:
-        slower: the same with no F beyond this [mm/min].
+        slower: the program with F limited to this [mm/min].
 
     Raises:
         TooSlowError: names that feed.
@@ -387,9 +376,9 @@ def _step_deg(
     machine: Machine,
     dialect: Dialect,
 ) -> float:
-    """Angle between the points of a compensated circle [deg]: what its feed needs, and no less than was asked for.
+    """Return the angle between points of a compensated circle [deg]: what the feed needs, at least `step_deg`.
 
-    Where the chord error is preferred, no more than that allows.
+    If the chord error is preferred, it limits the angle.
 
     Raises:
         StationError: a chord as long as the feed needs leaves the circle by more than `chord_mm`.
@@ -416,7 +405,7 @@ UNCERTAIN_AT = 2000
 
 
 def _uncertainty_um(path: Toolpath, inverse: Inverse) -> tuple[float | None, tuple[float | None, ...], str]:
-    """Greatest standard uncertainty of the tool tip along the path, of all coordinates together and of each [µm], why one is None."""
+    """Return the greatest standard uncertainty of the tool tip along the path, in total and by axis [µm], and why one is None."""
     if inverse.identified is None:
         return None, (), ""
     row, share = path.subdivided(REACH_MM, REACH_DEG)

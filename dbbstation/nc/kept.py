@@ -1,4 +1,4 @@
-"""Whether a compensated program keeps the chord error and the feed that were asked for, and what it costs to give one up."""
+"""Check that a compensated program keeps chord error and feed, and state what a preference costs."""
 
 from __future__ import annotations
 
@@ -26,9 +26,7 @@ class TooSlowError(StationError):
     """The control cannot keep a feed.
 
     Args:
-        slow: the move that loses most.
-        machine: whose acceleration was reckoned with.
-        prefer: what was preferred; None: nothing.
+        prefer: None: nothing was preferred.
     """
 
     def __init__(self, name: str, slow: Slow, asked_um: float, machine: Machine, prefer: Prefer | None) -> None:
@@ -48,16 +46,16 @@ class TooSlowError(StationError):
         )
 
     def reaching(self, mm_min: float) -> TooSlowError:
-        """The same with another feed that is reached [mm/min]."""
+        """Return the error with another reachable feed [mm/min]."""
         name, slow, asked_um, machine, prefer = self._about
         return TooSlowError(name, replace(slow, reached_mm_min=mm_min), asked_um, machine, prefer)
 
 
 class MergedMovesError(StationError):
-    """The feed is kept in each move, and the control is faster through the nominal program, whose short moves it makes one.
+    """Each move keeps its feed, but the control merges short moves of the nominal program and is faster there.
 
     Args:
-        merged_um: distance of points that are left out from the lines in their place [µm].
+        merged_um: distance of merged points from their line.
     """
 
     def __init__(self, refused: TooSlowError, merged_um: float) -> None:
@@ -73,9 +71,9 @@ class MergedMovesError(StationError):
 def check_chord(
     name: str, done: Compensation, asked_um: float, accepted_um: float | None, prefer: Prefer | None
 ) -> None:
-    """Refuse a program that leaves the path by more than was asked for, unless a larger number was accepted.
+    """Refuse a program that leaves the path by more than requested, unless a larger error was accepted.
 
-    Where the feed is preferred, a chord error as large as what is corrected is as wrong as the program that is not corrected.
+    Even if the feed is preferred, the chord error must stay below the correction.
 
     Raises:
         StationError: names the line and what is reached.
@@ -100,7 +98,7 @@ def check_chord(
 
 
 def check_feed(name: str, done: Compensation, asked_um: float, machine: Machine, prefer: Prefer | None) -> None:
-    """Refuse a program that the control runs slower than the one that it was made from, unless that was preferred.
+    """Refuse a program slower than its original, unless that was preferred.
 
     Raises:
         StationError: names the line and the feed that can be reached.
@@ -110,7 +108,7 @@ def check_feed(name: str, done: Compensation, asked_um: float, machine: Machine,
 
 
 def said_acceleration(machine: Machine) -> str:
-    """Return the acceleration that was reckoned with, and whether the machine file says it."""
+    """Return the assumed acceleration, and whether the machine file states it."""
     known = "" if machine.acceleration_mm_s2 is not None else " (the machine file has no `acceleration_mm_s2`)"
     return f"{machine.planned_acceleration_mm_s2 / 1e3:g} m/s²{known}"
 
@@ -126,7 +124,7 @@ def cost(done: Compensation, asked_um: float, prefer: Prefer) -> str:
 
 
 def slower_rapids(done: Compensation) -> str:
-    """Return what rapids lose, in words; empty where they, or the whole program, take no more than `KEPT` of their time."""
+    """Return what rapids lose, in words; empty if they or the whole program keep `KEPT` of their time."""
     takes, took = done.rapid_seconds, done.nominal_rapid_seconds
     if takes <= KEPT * took or takes + done.seconds <= KEPT * (took + done.nominal_seconds):
         return ""
@@ -140,7 +138,7 @@ def slower_rapids(done: Compensation) -> str:
 
 
 def merged_moves(merged_um: float) -> str:
-    """Return what making short moves one costs, in words [µm]."""
+    """Return the cost of merging short moves, in words."""
     return (
         f"short moves are made one within {up(merged_um)} µm, as the control makes those of the nominal program under G64 P Q "
         "(P without Q); Q0 would keep each of them"

@@ -1,4 +1,4 @@
-"""How large a correction and a chord error may be. Free of imports: the command line shows the numbers before anything is loaded."""
+"""Limits of correction and chord error. Free of imports, so that help loads fast."""
 
 LARGEST_CORRECTION_MM = 1.0
 """What a machine that works is off by at most. Beyond it a model is of another machine, or has a slip of the pen."""

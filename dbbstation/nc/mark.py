@@ -1,8 +1,8 @@
-"""The mark of a compensated program in its own geometry: the last decimals of its poses.
+"""The mark of a compensated program: last decimals of its poses.
 
-Each pose of a compensated program is moved by the last decimal of its angles, or of X, Y and Z where the angles stand still,
-until a hash of its six written numbers begins with zero bits (`BITS`), as few poses of any other program do by chance. The mark is in every pose, so it survives what texts do not: comments and line numbers taken out or changed, numbers
-spelt otherwise, feeds changed, lines added, moved or deleted. It does not survive other geometry: fewer decimals, another place.
+Each pose is moved by the last decimal of its angles (or of X, Y and Z if the angles stand still) until a hash of its six
+numbers begins with `BITS` zero bits. The mark survives edits of comments, line numbers and feeds, and added or deleted
+lines. Fewer decimals or another place destroy it.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ known by: never change them."""
 
 
 def marked(toolpath: Toolpath) -> Toolpath:
-    """Return a compensated toolpath with the mark in its poses, which are rounded as they will be written."""
+    """Return a compensated toolpath with marked poses, rounded as they will be written."""
     moves = np.flatnonzero(toolpath.is_move)
     if not len(moves):
         return toolpath
@@ -82,7 +82,7 @@ def marked(toolpath: Toolpath) -> Toolpath:
 
 
 def is_marked(toolpath: Toolpath) -> bool:
-    """Whether more poses of a toolpath have the mark than chance gives."""
+    """Return whether more poses are marked than chance gives."""
     sums = np.unique(_sums(_numbers(toolpath.poses[toolpath.is_move])))
     for bits in BITS.values():
         hits = int(np.count_nonzero(_has_mark(sums, bits)))
@@ -92,7 +92,7 @@ def is_marked(toolpath: Toolpath) -> bool:
 
 
 def _mark_many(numbers: NDArray[np.int64], free: NDArray[np.bool_], missing: NDArray[np.int64]) -> None:
-    """Move these rows of six by the steps that are felt least, step by step; those that no step gives the mark stay."""
+    """Move rows of six by the least felt steps; rows that no step marks stay."""
     sums = _sums(numbers)
     missing = missing[~_has_mark(sums[missing], BITS[4])]
     steps = _steps(FARTHEST_ANGLE, 1)
@@ -130,14 +130,14 @@ def _numbers(poses: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _sums(numbers: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """Weighted sum of each row of six; that of a row that is moved by some steps is the sum of both."""
+    """Return the weighted sum of each row of six; it is linear in the steps."""
     with np.errstate(over="ignore"):
         weighted: NDArray[np.uint64] = (numbers.astype(np.uint64) * _ODD).sum(axis=-1, dtype=np.uint64)
     return weighted
 
 
 def _has_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.bool_]:
-    """Whether a sum, spread evenly over 64 bits, begins with so many zeros. [finaliser of SplitMix64, Steele et al. 2014]."""
+    """Return whether a sum, spread over 64 bits, begins with zeros [finaliser of SplitMix64, Steele et al. 2014]."""
     with np.errstate(over="ignore"):
         mixed = (sums ^ (sums >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
         mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -146,7 +146,7 @@ def _has_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.bool_]:
 
 
 def _free(toolpath: Toolpath, moves: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Axes that each move may have moved by a few last decimals, shape (m, 6)."""
+    """Return which axes each move may shift by a few last decimals, shape (m, 6)."""
     poses = toolpath.poses[moves]
     way = np.abs(np.diff(poses, axis=0))
     tips = way[:, :3].max(axis=1) > 0.0
@@ -161,11 +161,11 @@ def _free(toolpath: Toolpath, moves: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 @cache
 def _steps(angle: int, angle_and_place: int) -> NDArray[np.int64]:
-    """Steps of the six last decimals, shape (k, 6), the least felt first; none at the beginning.
+    """Return steps of the six last decimals, shape (k, 6), the least felt first, beginning with none.
 
     Args:
-        angle: greatest step of angles where X, Y and Z stay.
-        angle_and_place: greatest step of angles where X, Y and Z move too.
+        angle: greatest step of angles if X, Y and Z stay.
+        angle_and_place: greatest step of angles if X, Y and Z move too.
     """
     alone, beside = np.arange(-angle, angle + 1), np.arange(-angle_and_place, angle_and_place + 1)
     place = np.arange(-FARTHEST_PLACE, FARTHEST_PLACE + 1)

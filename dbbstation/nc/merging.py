@@ -1,8 +1,8 @@
-"""Short moves that a control makes one before it plans them, as LinuxCNC's naive CAM detector does under `G64 P Q`.
+"""Short moves that LinuxCNC's naive CAM detector merges under `G64 P Q`.
 
-Lines that follow each other become one straight move while each of their points lies within Q of it; without Q, P counts. An
-arc in X and Y that leaves its chord by less than Q becomes two lines first, to its middle and to its end. A move in which A, B or C
-turn stays by itself [LinuxCNC 2.9, `linkable`, `see_segment` and `ARC_FEED` in `src/emc/task/emccanon.cc`].
+Successive lines become one straight move while all points lie within Q of it (P without Q). An arc in X and Y that leaves
+its chord by less than Q first becomes two lines. Moves that turn A, B or C stay [LinuxCNC 2.9, `linkable`, `see_segment`
+and `ARC_FEED` in `src/emc/task/emccanon.cc`].
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class Queued:
     """A toolpath as a control queues it, k rows.
 
     Attributes:
-        path: with one row for moves that are one. What is said between them stands before it.
-        of: row of it that each of the n rows of the program is part of, shape (n,).
+        path: with one row for merged moves; words between them come first.
+        of: row of `path` for each row of the program, shape (n,).
         share: of the time of that row, shape (n,).
-        off_mm: greatest distance of a point that is left out from the line in its place [mm].
+        off_mm: greatest distance of a left-out point from its line.
     """
 
     path: Toolpath
@@ -44,7 +44,7 @@ class Queued:
 
 
 def queued(toolpath: Toolpath) -> Queued | None:
-    """Return the moves as a control queues them; None where no move is merged with another."""
+    """Return the moves as a control queues them; None if none are merged."""
     within_mm = toolpath.merges_mm
     if not (within_mm > 0.0).any():
         return None
@@ -89,7 +89,7 @@ def queued(toolpath: Toolpath) -> Queued | None:
 
 
 def _off_mm(points: NDArray[np.float64], begins: NDArray[np.float64], ends: NDArray[np.float64]) -> float:
-    """Greatest distance of poses from straight moves between others, shapes (k, 6) [mm]."""
+    """Return the greatest distance of poses from straight moves between others, shapes (k, 6) [mm]."""
     along, to = (each[:, :3] - begins[:, :3] for each in (ends, points))
     square = np.einsum("ij,ij->i", along, along)
     share = np.divide(np.einsum("ij,ij->i", along, to), square, out=np.zeros(len(square)), where=square > 0.0)
@@ -98,7 +98,7 @@ def _off_mm(points: NDArray[np.float64], begins: NDArray[np.float64], ends: NDAr
 
 
 def _begins(at: NDArray[np.int64], straight: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Row in which the line to each of these points begins, shape (k,): behind the point before, for the second half of an arc."""
+    """Return the row in which the line to each point begins, shape (k,)."""
     begins = np.append(0, at[:-1] + 1)
     # The first row after that which is a line: what lies between may be anything.
     lines = np.flatnonzero(straight)
@@ -108,7 +108,7 @@ def _begins(at: NDArray[np.int64], straight: NDArray[np.bool_]) -> NDArray[np.in
 def _short_arcs(
     toolpath: Toolpath, arc: NDArray[np.float64], within_mm: NDArray[np.float64]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Chords of arcs that become two lines, and which of them end where one of these does, shapes (n,)."""
+    """Return the chords of arcs that become two lines, and those that end one, shapes (n,)."""
     number = moves_of(toolpath)
     angle = np.bincount(number, weights=np.abs(arc[:, 2]))
     first = np.searchsorted(number, np.arange(len(angle)))
@@ -126,12 +126,12 @@ def _short_arcs(
 def _chain_ends(
     points: NDArray[np.float64], begins: NDArray[np.float64], within_mm: NDArray[np.float64], new: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Whether the line to each point is the last of those that become one, shape (k,).
+    """Return whether the line to each point is the last of a merged one, shape (k,).
 
     Args:
         points: X, Y, Z at the end of each line, shape (k, 3) [mm].
-        within_mm: distance from the one line that its points have at most, shape (k,).
-        new: whether something stands before the line, shape (k,).
+        within_mm: greatest distance of its points from the merged line, shape (k,).
+        new: whether words precede the line, shape (k,).
     """
     count = len(points)
     ends = np.zeros(count, dtype=np.bool_)

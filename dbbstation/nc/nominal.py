@@ -1,4 +1,4 @@
-"""Whether a program is fit to be compensated: nominal so far, and for this machine."""
+"""Check that a program is nominal and for this machine."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _MACHINE = re.compile(r"machine\s*[:=]\s*(?P<name>.*\S)\s*", re.IGNORECASE)
 
 
 def checksum(toolpath: Toolpath) -> int:
-    """Number of what a toolpath does: its moves, dwells and stops in order, with the decimals that programs write.
+    """Return a checksum of moves, dwells and stops in order, with written decimals.
 
-    Comments, feeds, line numbers, units, and how numbers are written have no part in it.
+    Comments, feeds, line numbers and units do not count.
     """
     told = np.isin(toolpath.kind, [RowKind.RAPID, RowKind.FEED, RowKind.DWELL, RowKind.PAUSE])
     decimals = np.repeat([10.0**DECIMALS_MM, 10.0**DECIMALS_DEG], 3)
@@ -44,10 +44,9 @@ def checksum(toolpath: Toolpath) -> int:
 
 
 def check_nominal(toolpath: Toolpath) -> None:
-    """Refuse a program that was compensated before.
+    """Refuse a compensated program.
 
-    It says so in a comment. In case somebody took the comments out, its poses have the mark in their last decimals; and its first
-    and its last line carry the checksum of its motion as their line number, which tells programs of a few poses.
+    Three signs show one: a comment, the mark in its poses, and the checksum as first and last line number.
 
     Raises:
         StationError: it is compensated already.

@@ -1,8 +1,7 @@
-"""Which places of a curve to join by straight pieces: the longest that stay near it, or the nearest of a least length.
+"""Choose the places of a curve to join by straight pieces.
 
-Both are paths through a graph whose nodes are the places and whose edges are the pieces between them, found in order of the
-places. The first has the longest shortest piece of all, which decides the feed, and among those with that the fewest pieces;
-the second has the smallest greatest distance.
+Both ways are paths through a graph with places as nodes and pieces as edges. `longest` maximises the shortest piece,
+which decides the feed, then minimises their number. `truest` minimises the greatest distance from the curve.
 """
 
 from __future__ import annotations
@@ -26,16 +25,15 @@ def longest(
     may_end: NDArray[np.bool_],
     tolerance_mm: float,
 ) -> NDArray[np.int64]:
-    """Places at which pieces end, whose shortest is as long as can be while the curve stays within the tolerance.
+    """Return where pieces end, with the shortest as long as the tolerance allows.
 
-    From each place a piece to the next that it may end at is allowed, whatever lies between: a step has no piece that fits.
+    A piece to the next allowed end is always possible, even across a step.
 
     Args:
         way: along the curve at each place, rising, shape (n,).
-        curve: points at these places, in which distances are the root of the sum of squares of the first three, or of the
-            others where that is more, shape (n, 6) [mm].
-        may_end: where pieces may end; at the first and the last place they do anyway, shape (n,).
-        tolerance_mm: greatest distance of a place from the point of its piece at the same share of the way.
+        curve: points whose distance is that of the first three or the last three coordinates, the larger, shape (n, 6) [mm].
+        may_end: where pieces may end, besides first and last place, shape (n,).
+        tolerance_mm: from a place to the point of its piece at the same share of the way.
 
     Returns:
         Numbers of places, rising, the last one among them and the first one not.
@@ -50,9 +48,9 @@ def truest(
     may_end: NDArray[np.bool_],
     least: float,
 ) -> NDArray[np.int64]:
-    """Places at which pieces end that are no shorter than `least`, and as near to the curve as can be.
+    """Return where pieces end that are at least `least` long and nearest to the curve.
 
-    Where all of the curve is shorter, it is one piece. Other arguments and the answer as for `longest`.
+    A shorter curve is one piece. See `longest`.
     """
     way, curve, ends = _arrays(way, curve, may_end)
     # Some places for each length are enough to choose from.
@@ -82,7 +80,7 @@ def _traced(before: NDArray[np.int64]) -> NDArray[np.int64]:
 
 @compiled
 def _distance_mm(way: NDArray[np.float64], curve: NDArray[np.float64], start: int, end: int) -> float:
-    """Greatest distance of the places between two from the straight piece that joins them."""
+    """Return the greatest distance of intermediate places from the straight piece."""
     worst = 0.0
     length = way[end] - way[start]
     for k in range(start + 1, end):
@@ -130,7 +128,7 @@ def _fewest(
     tolerance_mm: float,
     least: float,
 ) -> NDArray[np.int64]:
-    """The place before each on the way there with the fewest pieces, none shorter than `least`."""
+    """Return the place before each on the way with the fewest pieces, none shorter than `least`."""
     count = len(way)
     pieces = np.full(count, count + 1)
     before = np.zeros(count, np.int64)

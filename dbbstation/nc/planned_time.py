@@ -66,18 +66,17 @@ class Segments:
 
     Attributes:
         rows: of the toolpath, those at feed that cut, shape (n,).
-        of: number of the segment that each of these rows belongs to, shape (n,).
+        of: segment of each row, shape (n,).
         length_mm: shape (m,).
-        feed_mm_s: F, or less where the arc is too narrow for it, shape (m,) [mm/s].
+        feed_mm_s: F, or less in a narrow arc, shape (m,) [mm/s].
         radius_mm: of arcs in X and Y; infinite of straight moves, shape (m,).
-        limited: whether A, B or C move in it, on a control that does not look ahead there, shape (m,).
-        follows: whether the next one comes behind it, with a stop between them or without, shape (m - 1,).
+        limited: whether A, B or C move without look-ahead, shape (m,).
+        follows: whether another segment follows, shape (m - 1,).
         goes_on: whether the next one follows without an exact stop, shape (m - 1,).
-        open: whether it ends where nothing follows, without an exact stop, shape (m,).
-        allowed_mm: by how much the corner to the next one may be left, shape (m - 1,) [mm].
+        open: whether it ends without exact stop and without successor, shape (m,).
+        allowed_mm: tolerance of the corner to the next one, shape (m - 1,) [mm].
         half_sine: sine of half the angle of that corner, shape (m - 1,).
-        kink: greatest difference of the directions before and after it along one axis, of the moves that are written, which are chords where arcs
-            are no longer arcs, shape (m - 1,).
+        kink: greatest change of direction along one axis, of the written moves, shape (m - 1,).
     """
 
     rows: NDArray[np.int64]
@@ -95,7 +94,7 @@ class Segments:
 
 
 def arc_radius_mm(toolpath: Toolpath) -> NDArray[np.float64]:
-    """Radius in X and Y of the arc that each row is a chord of, infinite in straight rows, shape (n,) [mm]."""
+    """Return the radius in X and Y of each row's arc, infinite in straight rows, shape (n,) [mm]."""
     radius = np.full(len(toolpath), np.inf)
     if toolpath.arc is not None:
         chord = toolpath.arc[:, 2] != 0.0
@@ -111,11 +110,11 @@ def segments_of(
     *,
     in_chords: bool = False,
 ) -> Segments:
-    """Return the written moves that some rows of a toolpath belong to.
+    """Return the written moves of some rows of a toolpath.
 
     Args:
-        rows: of moves of one kind that move the tool tip, at least one.
-        limited: rows in which A, B or C move, on a control that does not look ahead there, shape (n,).
+        rows: of one kind, each moving the tool tip; at least one.
+        limited: rows that turn A, B or C on a control without look-ahead there, shape (n,).
     """
     number = moves_of(toolpath)[rows]
     first = np.concatenate([[True], number[1:] != number[:-1]])
@@ -146,13 +145,13 @@ def segments_of(
 
 
 def _turned(toolpath: Toolpath, into: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Difference of the unit vectors at the begin of some rows and at the end of others, shape (k, 3)."""
+    """Return the differences of unit vectors from ends to begins of rows, shape (k, 3)."""
     leaves, goes = _ways(toolpath, into, toolpath.poses), _ways(toolpath, out, toolpath.before)
     return np.asarray(goes - leaves, dtype=np.float64)
 
 
 def _ways(toolpath: Toolpath, rows: NDArray[np.int64], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors of the tip's way in some rows at one of their ends, those of arcs along their tangent, shape (k, 3).
+    """Return unit vectors of the tip's way at one end of rows, tangents for arcs, shape (k, 3).
 
     Args:
         rows: shape (k,).
@@ -177,7 +176,7 @@ STANDS = (RowKind.DWELL, RowKind.PAUSE, RowKind.OPTIONAL_STOP, RowKind.FUNCTION)
 
 
 def _next(toolpath: Toolpath, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The row after each of these that moves or stands still, shape (m,); the number of rows where there is none."""
+    """Return the next row that moves or stands still, shape (m,); the number of rows if none."""
     leads_on = toolpath.is_move & ((toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0))
     something = np.append(np.flatnonzero(leads_on | np.isin(toolpath.kind, STANDS)), len(toolpath))
     return something[np.searchsorted(something, rows, side="right")]
@@ -189,7 +188,7 @@ def seconds_of(
     """Return the time of each row of the segments, shape (n,) [s].
 
     Args:
-        alone_mm_s: speed that a segment of its length reaches with half the acceleration, shape (m,) [mm/s].
+        alone_mm_s: speed that a segment reaches alone with half the acceleration, shape (m,) [mm/s].
     """
     a, length = acceleration_mm_s2, segments.length_mm
     feed = np.minimum(segments.feed_mm_s, length / (LEAST_CYCLES * cycle_s))
@@ -248,15 +247,13 @@ def _takes(
     most_mm_s: NDArray[np.float64],
     of_peak: NDArray[np.float64] | float = 1.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Time of moves [s] and their greatest speed [mm/s], shapes (k,).
-
-    They speed up and slow down as fast as they may, and evenly over their length where that takes next to no time.
+    """Return time [s] and greatest speed [mm/s] of moves, shapes (k,).
 
     Args:
         length_mm: shape (k,).
-        begins: speed at their begin, shape (k,) [mm/s].
+        begins: speed at the begin, shape (k,) [mm/s].
         acceleration: shape (k,) [mm/s²].
-        most_mm_s: speed that they do not exceed, shape (k,).
+        most_mm_s: speed limit, shape (k,).
     """
     peak = of_peak * np.sqrt(np.maximum((2.0 * acceleration * length_mm + begins**2 + ends**2) / 2.0, 0.0))
     peak = np.maximum(np.minimum(peak, most_mm_s), np.maximum(begins, ends))
@@ -268,10 +265,7 @@ def _takes(
 
 
 def _asked_of_kinks(segments: Segments, a: float, cycle_s: float) -> NDArray[np.float64]:
-    """What the kink in each corner asks for at full speed, as a share of what may be asked of it, shape (m - 1,) [`tpSetupTangent`].
-
-    The axis that changes most does so in one servo cycle, which speeds up by a beside.
-    """
+    """Return what each kink asks for at full speed, as a share of what is allowed, shape (m - 1,) [`tpSetupTangent`]."""
     slower = np.minimum(segments.feed_mm_s[1:], segments.feed_mm_s[:-1])
     arc = np.isfinite(segments.radius_mm)
     most = OF_A_KINK * a * np.where(arc[1:] | arc[:-1], OF_A_KINK_OF_ARCS, 1.0)
@@ -283,7 +277,7 @@ class _Arcs:
     """What is between two moves, shapes (m - 1,).
 
     Attributes:
-        enters: speed at its begin, 0 where the first move stops or hands over to the second [mm/s].
+        enters: speed at its begin, 0 if the first move stops or overlaps [mm/s].
     """
 
     enters: NDArray[np.float64]
@@ -296,7 +290,7 @@ class _Arcs:
 def _arcs_in_corners(
     segments: Segments, a: float, cycle_s: float, kink_mm_s: NDArray[np.float64], smooth: NDArray[np.bool_]
 ) -> _Arcs:
-    """Fit arcs into corners that are not left otherwise, where an arc is faster than the kink as it is [mm/s]."""
+    """Fit arcs into corners if they are faster than the kink [mm/s]."""
     half_sine = np.maximum(segments.half_sine, LEAST_ANGLE_RAD / 2.0)  # no arc fits below that
     half_cosine = np.sqrt(1.0 - half_sine**2)
     first, second = segments.feed_mm_s[:-1], segments.feed_mm_s[1:]
@@ -328,7 +322,7 @@ def _overlaps(
     reach: NDArray[np.float64],
     overlapped: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], ...]:
-    """How long two moves run at once [s], the speed of the second one after that [mm/s], and what is gained beside it [s], shapes (m - 1,)."""
+    """Return overlap time [s], the speed after it [mm/s] and the gain [s], shapes (m - 1,)."""
     length = segments.length_mm
     # Half of each move at most, and no longer than the slower ramp takes.
     longest_s = np.minimum(length[:-1] / reach[:-1], length[1:] / reach[1:])
@@ -357,7 +351,7 @@ def _in_reach(
     acceleration: NDArray[np.float64],
     length: NDArray[np.float64],
 ) -> None:
-    """Lower the speeds at both ends of segments to what their lengths allow [mm/s]; an end is the begin of the next one."""
+    """Limit the speeds at both ends of segments to what their lengths allow [mm/s]."""
     last = len(length) - 1
     for k in range(last):
         ends[k] = min(ends[k], np.sqrt(begins[k] * begins[k] + 2.0 * acceleration[k] * length[k]))

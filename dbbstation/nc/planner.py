@@ -1,9 +1,8 @@
-"""What a control's trajectory planner makes of pieces: the feed that it reaches in them, and the time that they take.
+"""The feed and time that a control's trajectory planner makes of pieces.
 
-LinuxCNC's planner (2.9, `src/emc/tp`) neither looks ahead nor fits arcs into corners where A, B or C move
-(`tcRotaryMotionCheck`). It plans such a piece from standstill to standstill with half the acceleration, and lets the next
-one begin when this one starts to slow down; the other half of the acceleration is for that. A piece of length L then
-reaches v² = a·L/2.
+LinuxCNC 2.9 (`src/emc/tp`) neither looks ahead nor fits arcs into corners if A, B or C move (`tcRotaryMotionCheck`). It
+plans such a piece from standstill to standstill with half the acceleration and overlaps it with the next. A piece of
+length L then reaches v² = a·L/2.
 """
 
 from __future__ import annotations
@@ -60,14 +59,14 @@ class Planner:
     """A control on a machine.
 
     Attributes:
-        look_ahead: of the control where A, B or C move; None: as far as it needs to.
+        look_ahead: in moves of A, B or C; None: unlimited.
     """
 
     acceleration_mm_s2: float
     look_ahead: LookAhead | None
 
     def needed_mm(self, mm_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Length of a piece with turning axes that reaches these speeds, same shape [mm]."""
+        """Return the length of a turning piece that reaches these speeds, same shape [mm]."""
         if self.look_ahead is None:
             return np.zeros_like(mm_s)
         least = mm_s**2 / (self.look_ahead.share * self.acceleration_mm_s2)
@@ -75,7 +74,7 @@ class Planner:
         return needed
 
     def reached_mm_s(self, length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Speeds that pieces with turning axes of these lengths reach, same shape; the inverse of `needed_mm` [mm/s]."""
+        """Return the speeds of turning pieces of these lengths, same shape [mm/s]."""
         if self.look_ahead is None:
             return np.full_like(length_mm, np.inf)
         a = self.look_ahead.share * self.acceleration_mm_s2
@@ -84,13 +83,13 @@ class Planner:
         return reached
 
     def limited(self, toolpath: Toolpath) -> NDArray[np.bool_]:
-        """Rows at feed that move the tool tip and turn A, B or C, in which the control does not look ahead, shape (n,)."""
+        """Return the rows at feed without look-ahead, shape (n,)."""
         if self.look_ahead is None:
             return np.zeros(len(toolpath), dtype=np.bool_)
         return cuts(toolpath) & (toolpath.turn_deg > 0.0)
 
     def speed_mm_s(self, toolpath: Toolpath) -> NDArray[np.float64]:
-        """Speed that each row at feed reaches, shape (n,) [mm/s]: F, or less where pieces or the way between stops are short."""
+        """Return the speed of each row at feed, F or less, shape (n,) [mm/s]."""
         way_mm = toolpath.tip_mm
         between = np.cumsum(np.isin(toolpath.kind, STOPS))
         stretch_mm = np.bincount(between, weights=way_mm)[between]
@@ -102,16 +101,15 @@ class Planner:
         return np.where(cutting, np.minimum(asked, at_most), 1.0)
 
     def turning_mm_s(self, toolpath: Toolpath) -> NDArray[np.float64]:
-        """Greatest speed in the arc that each row is a chord of, infinite in straight rows, shape (n,) [mm/s]."""
+        """Return the greatest speed in each row's arc, infinite in straight rows, shape (n,) [mm/s]."""
         if self.look_ahead is None:
             return np.full(len(toolpath), np.inf)
         return np.sqrt(OF_AN_ARC * self.acceleration_mm_s2 * arc_radius_mm(toolpath))
 
     def seconds(self, toolpath: Toolpath, *, in_chords: bool = False) -> NDArray[np.float64]:
-        """Time of each row, shape (n,) [s]: dwells as written, rapids without, moves at feed with their ramps.
+        """Return the time of each row, shape (n,) [s]: dwells as written, rapids zero, moves at feed with ramps.
 
-        `planned_time` says how they are reckoned. Moves in which A, B or C move by themselves, or nearly so, take their time.
-        Moves that the control makes one share its time by their length. `in_chords` says that arcs are written as their chords, as in compensated programs.
+        See `planned_time`. `in_chords`: arcs are written as chords, as in compensated programs.
         """
         one = queued(toolpath)
         if one is not None:
@@ -128,15 +126,15 @@ class Planner:
 
 
 def cuts(toolpath: Toolpath) -> NDArray[np.bool_]:
-    """Rows at feed that move the tool tip, apart from turns about a tip that hardly moves, shape (n,).
+    """Return the rows at feed that move the tool tip, shape (n,).
 
-    How fast those are is a matter of the angles' own acceleration, which is not known here.
+    Turns about a resting tip depend on the angles' acceleration, which is not known.
     """
     return (toolpath.kind == RowKind.FEED) & (toolpath.tip_mm > LEAST_MM_PER_DEG * toolpath.turn_deg)
 
 
 def move_mm(toolpath: Toolpath) -> NDArray[np.float64]:
-    """Length of the written move that each row belongs to, shape (n,) [mm]: LinuxCNC runs an arc as one."""
+    """Return the length of each row's written move, shape (n,) [mm]: LinuxCNC runs an arc as one."""
     number = moves_of(toolpath)
     return np.asarray(np.bincount(number, weights=toolpath.tip_mm)[number], dtype=np.float64)
 

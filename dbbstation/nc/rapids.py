@@ -1,8 +1,7 @@
-"""The rapids of a compensated program: where they stop between each other or are joined so that they are as fast as those of the nominal one.
+"""The rapids of a compensated program: stop or join them, whichever is quicker.
 
-A rapid whose A, B and C are corrected turns by some thousandths of a degree. LinuxCNC lets it overlap with the rapids beside it, and
-plans it with half the acceleration for that (`planned_time`), where it fitted arcs into the corners before. Where it stops at its ends,
-as it does before a move at feed anyway, it has all of the acceleration.
+A corrected rapid turns A, B and C a little. LinuxCNC then plans it with half the acceleration and overlaps it with its
+neighbours (`planned_time`). With stops at its ends it has all of the acceleration.
 """
 
 from __future__ import annotations
@@ -32,9 +31,9 @@ SAME_WAY = 1e-6
 
 
 def go_on(toolpath: Toolpath) -> NDArray[np.bool_]:
-    """Rapids that the next row goes on with, in the same direction, work system and path control, no word between, shape (n,).
+    """Return rapids that continue in direction, work system and path control, shape (n,).
 
-    LinuxCNC runs such rapids as one, and would stop between them where A, B and C are corrected.
+    LinuxCNC runs such rapids as one, and would stop between them if A, B and C were corrected.
     """
     plain = (toolpath.kind == RowKind.RAPID) & (toolpath.tip_mm > 0.0) & (toolpath.turn_deg == 0.0)
     way = np.where(plain[:, None], toolpath.poses[:, :3] - toolpath.before[:, :3], 0.0)
@@ -49,12 +48,7 @@ def go_on(toolpath: Toolpath) -> NDArray[np.bool_]:
 
 
 def seconds(toolpath: Toolpath, planner: Planner, fastest_mm_min: float) -> float:
-    """Return the time of all rapids that move the tool tip [s].
-
-    Args:
-        toolpath: nominal or compensated.
-        planner: the control on its machine.
-    """
+    """Return the time of all rapids that move the tool tip [s]."""
     rows = _rows(toolpath)
     if planner.look_ahead is None or len(rows) == 0:
         return 0.0
@@ -81,14 +75,13 @@ def _segments(toolpath: Toolpath, rows: NDArray[np.int64], planner: Planner, fas
 def corners_mm(
     done: Toolpath, turned: NDArray[np.bool_], planner: Planner, fastest_mm_min: float
 ) -> NDArray[np.float64]:
-    """Return the bounds of the corners of a compensated toolpath, shape (n,) [mm]: 0 between rapids that are quicker with a stop.
+    """Return the bounds of corners, shape (n,) [mm]: 0 between rapids that are quicker with a stop.
 
-    Of rapids that follow each other none, all or those at tight corners stop, whatever is quickest. Nothing is changed where one of them turns by itself, or where the program does not
-    say how far corners may be rounded: what holds then is not known, and could not be written again.
+    Of successive rapids none, all or those at tight corners stop. Nothing changes if one turns by itself or the program
+    states no tolerance.
 
     Args:
-        turned: rows that moved A, B or C before they were compensated, shape (n,).
-        planner: the control on its machine.
+        turned: rows that moved A, B or C before compensation, shape (n,).
     """
     rows = _rows(done)
     if planner.look_ahead is None or len(rows) < 2:  # noqa: PLR2004 - a pair

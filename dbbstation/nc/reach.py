@@ -1,4 +1,4 @@
-"""Whether the machine can run a whole toolpath: its travel, between programmed points as well, and its feeds."""
+"""Check a whole toolpath against the machine's travel and feeds."""
 
 from __future__ import annotations
 
@@ -26,10 +26,7 @@ AT_ONCE = 200_000
 
 
 def check_reach(machine: Machine, toolpath: Toolpath) -> None:
-    """Refuse a toolpath that leaves the travel of axes, angles or struts anywhere on its way.
-
-    Nothing is looked at behind the first programmed point outside: moves between points inside are short, so that the
-    number of poses between them is bounded.
+    """Refuse a toolpath that leaves the travel of axes, angles or struts, also between points.
 
     Raises:
         TravelError: names program, line, pose and limit.
@@ -69,7 +66,7 @@ def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
 
 
 class _Poses:
-    """Poses within rows of a toolpath, where they are known; its start before its first row."""
+    """Known poses within rows of a toolpath, its start first."""
 
     def __init__(self, toolpath: Toolpath, row: NDArray[np.int64], share: NDArray[np.float64]) -> None:
         poses = toolpath.between(row, share)
@@ -79,7 +76,7 @@ class _Poses:
             self.row, self.poses = np.concatenate([[0], self.row]), np.vstack([toolpath.start, self.poses])
 
     def first_outside(self, machine: Machine) -> int | None:
-        """Number of the first pose outside the travel; None where all are inside."""
+        """Return the first pose outside the travel, or None."""
         if _is_inside(machine, self.poses):
             return None
         inside, outside = 0, len(self.poses)
@@ -92,7 +89,7 @@ class _Poses:
         return inside
 
     def refuse(self, machine: Machine, toolpath: Toolpath, outside: int | None) -> None:
-        """Refuse the pose of this number, by its line; nothing where there is none."""
+        """Refuse a pose, naming its line."""
         if outside is not None:
             where = _where(toolpath, int(self.row[outside]))
             check_travel(machine, self.poses[outside : outside + 1], where=where)

@@ -1,4 +1,4 @@
-"""Every dialect by name: those of the package, found by looking in `dialects/`, and those of installed packages."""
+"""Every dialect by name: from `dialects/` and from installed packages."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HOW_TO_ADD = "one of your own is given as its file, FILE.py, or its package inst
 
 @cache
 def known_dialects() -> Mapping[str, Dialect]:
-    """All dialects of the package and of installed ones, sorted by name.
+    """Return all dialects, sorted by name.
 
     Raises:
         InputError: a package has a dialect that cannot be used, or whose name is taken.
@@ -49,7 +49,7 @@ def dialect_named(name: str) -> Dialect:
 
 
 def dialect_of_file(file: str, text: str) -> Dialect:
-    """Return the dialect that a program is in: its extension says, or what it holds where several have that one.
+    """Return a program's dialect by its extension, or by its text if several share that.
 
     Raises:
         StationError: no dialect has that extension, or several have it and the program does not tell them apart.

@@ -1,4 +1,4 @@
-"""Moves in pieces: the curve to command is looked at closely, and the pieces that follow it are chosen among its places."""
+"""Moves in pieces that follow the curve to command."""
 
 from __future__ import annotations
 
@@ -68,34 +68,34 @@ MOST_CELLS = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Places where pieces begin and end, as `CommandCurve` counts them, shapes (k,)."""
+    """Begins and ends of pieces as places of `CommandCurve`, shapes (k,)."""
 
     begin: NDArray[np.float64]
     end: NDArray[np.float64]
 
     def behind(self, rows: int) -> Pieces:
-        """The same places, counted from so many rows before."""
+        """Return the places counted from so many rows before."""
         return Pieces(self.begin + rows, self.end + rows)
 
     @property
     def row(self) -> NDArray[np.int64]:
-        """The row that each ends in, shape (k,)."""
+        """Return the row in which each piece ends, shape (k,)."""
         return row_and_share(self.end)[0]
 
     def places(self, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Places at shares of each piece, in order, shape (k, len(shares)); a share of 1 is its end to the last bit."""
+        """Return places at shares of each piece, shape (k, len(shares)); share 1 is exactly its end."""
         inside = self.begin[:, None] + (self.end - self.begin)[:, None] * shares
         return np.where(shares == 1.0, self.end[:, None], inside)
 
 
 def rows_as_pieces(toolpath: Toolpath) -> Pieces:
-    """Return one piece for each row, rapids in steps for the sake of sources with a history."""
+    """Return one piece for each row, rapids in steps for sources with a history."""
     history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
     return _in(toolpath, np.where(toolpath.kind == RowKind.RAPID, history, 1.0))
 
 
 def moves_of(toolpath: Toolpath) -> NDArray[np.int64]:
-    """Number of the written move that each row belongs to, shape (n,): all chords of an arc belong to one."""
+    """Return the written move of each row, shape (n,); an arc is one move."""
     goes_on = np.zeros(len(toolpath), dtype=np.bool_)
     if toolpath.arc is not None and len(toolpath) > 1:
         same = (toolpath.arc[1:] == toolpath.arc[:-1]).all(axis=1) & (toolpath.arc[1:, 2] != 0.0)
@@ -105,10 +105,9 @@ def moves_of(toolpath: Toolpath) -> NDArray[np.int64]:
 
 
 def parts_of(toolpath: Toolpath, runs: NDArray[np.int64]) -> list[slice]:
-    """Rows that are compensated one part after the other, so that long programs take little memory.
+    """Return rows to compensate part by part, so that long programs take little memory.
 
-    A part begins with a move at feed that leads on, where nothing rests that belongs to the part before; with a new run where
-    there is one near, else within an arc.
+    A part begins with a move at feed, with a new run if one is near, else within an arc.
     """
     leads_on = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
     # The first move shows where the machine comes from.
@@ -128,13 +127,12 @@ def parts_of(toolpath: Toolpath, runs: NDArray[np.int64]) -> list[slice]:
 
 
 def runs_of(toolpath: Toolpath, needed_mm: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Number of the run that each row belongs to, shape (n,): a written move, or several that are shorter than their feed needs.
+    """Return the run of each row, shape (n,): a written move, or several shorter than their feed needs.
 
-    Such moves follow each other at one F, in one work system, with corners that may be rounded, and go on in nearly the same
-    direction: a curve in short lines, whose pieces may join any of its points.
+    Such moves share one F and one work system, may round their corners, and keep nearly one direction.
 
     Args:
-        needed_mm: length of a piece that keeps the feed of each row, shape (n,).
+        needed_mm: length of a piece that keeps the feed, shape (n,).
     """
     moves = moves_of(toolpath)
     if len(toolpath) < 2:  # noqa: PLR2004 - a pair
@@ -164,13 +162,13 @@ def split(
     """Return the pieces in which a toolpath is written.
 
     Args:
-        model: whose shortest period says how closely to look.
+        model: its shortest period decides how closely to look.
         tolerance_mm: greatest distance of a piece from the curve.
-        needed_mm: length of a piece that keeps the feed, for each row; 0 where any does, shape (n,).
-        runs: number of the run that each row belongs to, within which pieces may end anywhere, shape (n,).
-        for_feed: where the two cannot both be had, keep the feed.
-        whole: rows that are one piece each, shape (n,).
-        how_near: look how near to the curve pieces of the needed length are; it takes as long as all the rest.
+        needed_mm: length of a piece that keeps the feed, shape (n,); 0 if any does.
+        runs: run of each row, within which pieces may end anywhere, shape (n,).
+        for_feed: prefer the feed to the tolerance.
+        whole: rows of one piece each, shape (n,).
+        how_near: also compute the distance of pieces of the needed length, which doubles the time.
 
     Returns:
         The pieces, and for each run whose longest pieces are shorter than needed: its number, and how near to the curve
@@ -233,11 +231,9 @@ class _Nodes:
         self.way = np.concatenate([[first], way])
 
     def shortest(self, ended: NDArray[np.int64]) -> float:
-        """Length of the shortest piece."""
         return float(np.diff(self.way[np.concatenate([[0], ended])]).min())
 
     def distance_mm(self, ended: NDArray[np.int64]) -> float:
-        """Greatest distance of a place from its piece [mm]."""
         nodes = np.concatenate([[0], ended])
         on = np.column_stack([np.interp(self.way, self.way[nodes], self.at[nodes, axis]) for axis in range(6)])
         off = self.at - on
@@ -245,7 +241,7 @@ class _Nodes:
 
 
 def cell_off_mm(at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far the curve leaves the chord of each cell at the places that are looked at, shape (k,) [mm].
+    """Return how far the curve leaves the chord of each cell, shape (k,) [mm].
 
     Args:
         at: poses at the begin of each cell and at `LOOKED_AT`, shape (k, 1 + len(LOOKED_AT), 6).
@@ -257,10 +253,10 @@ def cell_off_mm(at: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def with_begins(at_places: NDArray[np.float64], start: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Poses at places of each piece, shape (k, m, 6), with that at its begin before them, shape (k, 1 + m, 6).
+    """Return poses of each piece, shape (k, m, 6), with its begin first, shape (k, 1 + m, 6).
 
     Args:
-        start: pose before the first piece, shape (6,).
+        start: before the first piece, shape (6,).
     """
     begins = np.vstack([start, at_places[:-1, -1]])
     # Where nobody knows where the machine stands, a piece begins where it ends.
@@ -269,7 +265,7 @@ def with_begins(at_places: NDArray[np.float64], start: NDArray[np.float64]) -> N
 
 
 def looked_at(curve: CommandCurve, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Poses of the curve at the begin and at shares of the way of each piece, the last of them 1, shape (k, 1 + len(shares), 6)."""
+    """Return poses of the curve at begin and shares of each piece, shape (k, 1 + len(shares), 6)."""
     first = curve.toolpath.before[:1]
     places = np.concatenate([[0.0], _along(curve.toolpath, pieces, shares).reshape(-1)])
     at = curve.at(places)
@@ -278,7 +274,7 @@ def looked_at(curve: CommandCurve, pieces: Pieces, shares: NDArray[np.float64]) 
 
 
 def _along(toolpath: Toolpath, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places at shares of the way of each piece, shape (k, len(shares)): rows that a piece joins may have any lengths."""
+    """Return places at shares of each piece's way, shape (k, len(shares))."""
     places = pieces.places(shares)
     across = np.flatnonzero(np.floor(pieces.begin) < pieces.row)
     if len(across):
@@ -329,9 +325,9 @@ def _in(toolpath: Toolpath, number: NDArray[np.float64]) -> Pieces:
 
 
 def _way_mm(toolpath: Toolpath, machine: Machine) -> NDArray[np.float64]:
-    """Bound of the way of the tool tip and of every platform joint in each row, which bounds a strut's, shape (n,) [mm].
+    """Return a bound of the way of tool tip and platform joints in each row, shape (n,) [mm].
 
-    The platform turns by the three angles one after the other: by their sum at most, √3 times the root of their squares.
+    The platform turns by at most the sum of the three angles: √3 times the root of their squares.
     """
     reach_mm = float(np.linalg.norm(machine.hexapod.platform_joints_mm, axis=1).max())
     return toolpath.tip_mm + math.sqrt(3.0) * reach_mm * np.radians(toolpath.turn_deg)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def in_systems(toolpath: Toolpath) -> Toolpath:
-    """Return a compensated toolpath that stays right where it counts in several systems, or is guarded."""
+    """Return a compensated toolpath that stays right in several systems, or is guarded."""
     if not elsewhere(toolpath).any():
         return toolpath
     if not _mixed_feeds(toolpath).any() and not np.any(toolpath.frame[toolpath.is_move] == BY_INCREMENTS):
@@ -40,20 +40,20 @@ def in_systems(toolpath: Toolpath) -> Toolpath:
 
 
 def elsewhere(toolpath: Toolpath) -> NDArray[np.bool_]:
-    """Axes of moves whose place was named in another system than the row counts in, shape (n, 6)."""
+    """Return axes whose place was named in another system than the row counts in, shape (n, 6)."""
     apart: NDArray[np.bool_] = (toolpath.frame != toolpath.system[:, None]) & toolpath.is_move[:, None]
     return apart
 
 
 def _mixed_feeds(toolpath: Toolpath) -> NDArray[np.bool_]:
-    """Moves at feed that begin or end with an axis in another system, shape (n,)."""
+    """Return moves at feed with an axis in another system, shape (n,)."""
     before = np.vstack([toolpath.frame[:1], toolpath.frame])[:-1]
     begins = (before != toolpath.system[:, None]).any(axis=1)
     return (toolpath.kind == RowKind.FEED) & (begins | elsewhere(toolpath).any(axis=1))
 
 
 def _held(toolpath: Toolpath) -> Toolpath:
-    """The toolpath with such axes where they were before, in the rows that are no moves as well."""
+    """Return the toolpath with such axes held."""
     poses = toolpath.poses.copy()
     apart = elsewhere(toolpath)
     for axis in np.flatnonzero(apart.any(axis=0)):

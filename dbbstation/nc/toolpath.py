@@ -1,4 +1,4 @@
-"""A toolpath: what an NC program makes the machine do, in order, free of any control's language."""
+"""A toolpath: what an NC program makes the machine do, free of any control's language."""
 
 from __future__ import annotations
 
@@ -76,33 +76,27 @@ belongs to the ends of the move that was written; its pieces meet at angles that
 
 @dataclass(frozen=True, eq=False)
 class Toolpath:
-    """Rows in the order they are run; every move is straight in X, Y, Z, A, B and C at once.
+    """Rows in order; every move is straight in X, Y, Z, A, B and C at once.
 
     Attributes:
-        name: what to call the program in messages; the file where it was read from one.
+        name: for messages; the file if it was read from one.
         kind: `RowKind` of each row, shape (n,).
-        poses: [X, Y, Z, A, B, C] after each row, shape (n, 6) [mm, deg]; NaN before the first move where nobody knows where the
-            machine stands.
-        feed_mm_min: feed of `FEED` rows along the path of the tool tip, shape (n,) [mm/min]; NaN in other rows.
-        feed_deg_min: feed of `FEED` rows in which nothing but angles move, shape (n,) [deg/min]; NaN in other rows.
-        dwell_s: duration of `DWELL` rows, shape (n,) [s]; zero in other rows.
-        line: line of the program that each row came from, counted from 1, shape (n,); 0 where there is none.
+        poses: [X, Y, Z, A, B, C] after each row, shape (n, 6) [mm, deg]; NaN before the first move if the place is unknown.
+        feed_mm_min: of `FEED` rows along the tip's path, shape (n,); NaN in other rows.
+        feed_deg_min: of `FEED` rows that only turn, shape (n,); NaN in other rows.
+        dwell_s: of `DWELL` rows, shape (n,); zero in other rows.
+        line: of the program, from 1, shape (n,); 0 if there is none.
         text: words of `PAUSE`, `COMMENT` and `FUNCTION` rows, by row.
         start: pose before the first row, shape (6,); None where unknown.
-        corners_mm: how far the control may round the corner at the end of each row, shape (n,) [mm]: 0 for exact path, infinite
-            for as much as the feed needs, NaN where the program does not say.
-        system: in which the numbers of each row count, shape (n,): `MACHINE_SYSTEM`, `ACTIVE_SYSTEM`, or 1 to 9 for one of
-            `SYSTEMS`.
-        frame: in which the place of each axis was named last, up to each row, shape (n, 6): values as in `system`, or
-            `BY_INCREMENTS`.
-        guard: not None where the program stops, says why and ends before it moves, if the work system in force or one of these,
-            G92 or a tool length is not zero.
-        units_said: whether the program says in which unit its lengths are.
-        numbers: line numbers of the first and the last line that have one; a compensated program carries its checksum there.
-        merges_mm: distance from one straight line within which the control makes short moves one before it plans them, shape (n,)
-            [mm]; 0 where it makes none.
-        arc: of rows that are chords of an arc: X and Y of its centre [mm] and the angle that the chord spans [rad],
-            counter-clockwise positive, shape (n, 3); the angle is 0 in straight rows. None: there are no arcs.
+        corners_mm: rounding allowed at the end of each row, shape (n,): 0 exact, infinite unlimited, NaN not stated.
+        system: of each row's numbers, shape (n,): `MACHINE_SYSTEM`, `ACTIVE_SYSTEM`, or 1 to 9 for `SYSTEMS`.
+        frame: system in which each axis was named last, shape (n, 6): as `system`, or `BY_INCREMENTS`.
+        guard: not None if the program ends before it moves when one of these systems, G92 or a tool length is not zero.
+        units_said: whether the program states its unit of length.
+        numbers: first and last line number; a compensated program carries its checksum there.
+        merges_mm: distance within which the control merges short moves, shape (n,); 0 if it does not.
+        arc: centre X, Y [mm] and spanned angle of a chord [rad], counter-clockwise positive, shape (n, 3); angle 0 in straight
+            rows. None: no arcs.
     """
 
     name: str
@@ -129,18 +123,17 @@ class Toolpath:
 
     @property
     def corner_mm(self) -> float | None:
-        """How far corners may be rounded at the first move [mm]; None where the program does not say."""
+        """Return the rounding allowed at the first move [mm], or None."""
         corners = self.corners_mm[self.is_move]
         return None if not len(corners) or np.isnan(corners[0]) else float(corners[0])
 
     def divided(self, row: NDArray[np.int64], poses: NDArray[np.float64]) -> Toolpath:
-        """The toolpath with some rows in several pieces.
+        """Return the toolpath with some rows in several pieces.
 
-        A text goes with the last piece of its row, and so does an exact stop. Pieces are not merged.
+        Texts and exact stops go with a row's last piece. Pieces are not merged.
 
         Args:
-            row: that each piece ends in, rising, shape (k,); rows that a piece goes through to the end of a later one are
-                missing, and have no text.
+            row: in which each piece ends, rising, shape (k,); rows inside a piece are missing and have no text.
             poses: after each piece, shape (k, 6) [mm, deg].
         """
         last = np.append(row[1:] != row[:-1], True)[: len(row)]
@@ -163,12 +156,12 @@ class Toolpath:
         )
 
     def part(self, rows: slice) -> Toolpath:
-        """Rows that follow each other as a toolpath of their own, without texts."""
+        """Return successive rows as a toolpath without texts."""
         begins = rows.indices(len(self))[0]
         return replace(self.only(rows), start=self.start if begins == 0 else self.before[begins])
 
     def only(self, rows: slice | NDArray[np.int64]) -> Toolpath:
-        """Some rows as a toolpath, without texts; each move begins where the one before it ends."""
+        """Return some rows as a toolpath without texts; each move begins where the one before ends."""
         return replace(
             self,
             kind=self.kind[rows],
@@ -187,42 +180,42 @@ class Toolpath:
 
     @property
     def is_move(self) -> NDArray[np.bool_]:
-        """Rows that are moves, whether or not they lead elsewhere, shape (n,)."""
+        """Return which rows are moves, with or without way, shape (n,)."""
         return (self.kind == RowKind.RAPID) | (self.kind == RowKind.FEED)
 
     @cached_property
     def before(self) -> NDArray[np.float64]:
-        """Pose before each row, shape (n, 6) [mm, deg]; that after it where the machine's place is not known."""
+        """Return the pose before each row, shape (n, 6) [mm, deg]; the pose after it if the place is not known."""
         start = np.full(6, np.nan) if self.start is None else self.start
         before = np.vstack([start, self.poses])[:-1]
         return np.where(np.isnan(before), self.poses, before)
 
     @cached_property
     def tip_mm(self) -> NDArray[np.float64]:
-        """Way of the tool tip in each row, shape (n,) [mm]; zero where it is rounding."""
+        """Return the way of the tool tip in each row, shape (n,) [mm]; zero if it is rounding."""
         return _norm(self.poses[:, :3] - self.before[:, :3], LEAST_MM)
 
     @cached_property
     def turn_deg(self) -> NDArray[np.float64]:
-        """Turn of each row, root of the sum of squares of the three angles, shape (n,) [deg]; zero where it is rounding."""
+        """Return each row's root sum of squares of the three angles, shape (n,) [deg]; zero if it is rounding."""
         return _norm(self.poses[:, 3:] - self.before[:, 3:], LEAST_DEG)
 
     @property
     def only_turns(self) -> NDArray[np.bool_]:
-        """Rows in which nothing but angles move, shape (n,)."""
+        """Return the rows that only turn, shape (n,)."""
         return (self.tip_mm == 0.0) & (self.turn_deg > 0.0)
 
     @property
     def feed(self) -> NDArray[np.float64]:
-        """What F is in each row, shape (n,): along the path [mm/min], or of the angles [deg/min] where only they move."""
+        """Return F of each row, shape (n,): along the path [mm/min], or of angles [deg/min] if only they move."""
         return np.where(self.only_turns, self.feed_deg_min, self.feed_mm_min)
 
     @cached_property
     def duration_s(self) -> NDArray[np.float64]:
-        """Time that each row takes at its feed, without ramps, shape (n,) [s].
+        """Return the time of each row at its feed, without ramps, shape (n,) [s].
 
-        A feed holds for the way of X, Y and Z as if A, B and C stood still; only in a move that does not move X, Y
-        and Z it is a turning speed. [RS274/NGC 2.1.2.5; LinuxCNC does the same]
+        F holds for the way of X, Y and Z, and for the angles only if X, Y and Z rest [RS274/NGC 2.1.2.5; LinuxCNC does
+        the same].
         """
         way = np.where(self.tip_mm > 0.0, self.tip_mm, self.turn_deg)
         feeding = np.divide(60.0 * way, self.feed, out=np.zeros(len(self)), where=self.kind == RowKind.FEED)
@@ -231,18 +224,15 @@ class Toolpath:
 
     @cached_property
     def end_s(self) -> NDArray[np.float64]:
-        """Time at the end of each row, from the start of the program, shape (n,) [s]."""
+        """Return the time at the end of each row from the start, shape (n,) [s]."""
         return np.cumsum(self.duration_s)
 
     def at_time(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Commanded poses at times after the start of the program, shape (n, 6); its ends hold beyond them."""
+        """Return commanded poses at times after the start, shape (n, 6); the ends hold beyond them."""
         return self._interpolated(time_s, self.end_s)
 
     def between(self, row: NDArray[np.int64], share: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Poses within rows, shape (k, 6): `share` 0 before the row, 1 after it, both of shape (k,).
-
-        In chords of an arc they lie on the arc.
-        """
+        """Return poses within rows, shape (k, 6); `share` 0 before the row, 1 after it, both of shape (k,)."""
         before, after = self.before[row], self.poses[row]
         inside = before + share[:, None] * (after - before)
         if self.arc is not None:
@@ -252,11 +242,11 @@ class Toolpath:
         return np.where(share[:, None] == 1.0, after, inside)
 
     def subdivided(self, step_mm: float, step_deg: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Rows and shares, shapes (k,), that pass through all moves in pieces no longer than these steps."""
+        """Return rows and shares, shapes (k,), in pieces no longer than these steps."""
         return in_pieces(self.pieces(step_mm, step_deg))
 
     def pieces(self, step_mm: float, step_deg: float) -> NDArray[np.int64]:
-        """Number of pieces of each row that are no longer than these steps, shape (n,)."""
+        """Return the number of such pieces in each row, shape (n,)."""
         pieces = np.maximum(np.ceil(np.maximum(self.tip_mm / step_mm, self.turn_deg / step_deg)), 1.0)
         return np.where(np.isnan(pieces), 1.0, pieces).astype(np.int64)
 
@@ -275,7 +265,7 @@ _STRAIGHT = (0.0, 0.0, 0.0)
 
 
 class _Rows(NamedTuple):
-    """Rows of a toolpath that were added together; what is one value holds for all of them."""
+    """Rows that were added together; a single value holds for all."""
 
     kind: RowKind
     poses: NDArray[np.float64]
@@ -293,14 +283,13 @@ class ToolpathBuilder:
     """Collects the rows of a toolpath.
 
     Args:
-        start: pose before the first row, shape (6,) [mm, deg]; None where unknown.
+        start: pose before the first row, shape (6,) [mm, deg]; None if unknown.
 
     Attributes:
-        corner_mm: how far the control may round the corners of the moves that follow [mm]; None: not said.
-        merge_mm: distance from one straight line within which the control makes those moves one [mm].
-        system: in which the numbers of the moves that follow count, as `Toolpath.system`.
-        increments: whether they are increments, which name no place.
-        units_said: whether the program says in which unit its lengths are.
+        corner_mm: rounding allowed in the moves that follow; None: not stated.
+        merge_mm: distance within which the control merges those moves.
+        system: of the numbers that follow, as `Toolpath.system`.
+        increments: whether numbers are increments.
     """
 
     def __init__(self, name: str, start: NDArray[np.float64] | None = None) -> None:
@@ -332,8 +321,8 @@ class ToolpathBuilder:
 
         Args:
             pose: to go to, shape (6,) [mm, deg].
-            named: axes that the line names, 0 to 5; the others stay where they are.
-            system: in which this move's numbers count; None: as those before it.
+            named: axes that the line names, 0 to 5.
+            system: of this move's numbers; None: unchanged.
         """
         self._named(named, system)
         self._add(RowKind.RAPID, pose[None], line=line, system=system)
@@ -353,10 +342,10 @@ class ToolpathBuilder:
 
         Args:
             poses: to go through, shape (k, 6) [mm, deg].
-            deg_min: feed of moves that only turn [deg/min]; None: the same number.
-            named: axes that the line names, 0 to 5; the others stay where they are.
-            system: in which the numbers of these moves count; None: as those before them.
-            arc: that the moves are chords of, as a row of `Toolpath.arc`.
+            deg_min: of moves that only turn; None: `mm_min`.
+            named: axes that the line names, 0 to 5.
+            system: None: unchanged.
+            arc: as a row of `Toolpath.arc`.
         """
         self._named(named, system)
         feed = (mm_min, mm_min if deg_min is None else deg_min)
@@ -367,25 +356,25 @@ class ToolpathBuilder:
         self._add(RowKind.DWELL, self._pose[None], dwell_s=seconds, line=line)
 
     def say(self, kind: RowKind, text: str, *, line: int = 0) -> None:
-        """Add a row that is no move and no dwell, with its words."""
+        """Add a row of words."""
         if text:
             self._text[self._count] = text
         self._add(kind, self._pose[None], line=line)
 
     def taken_back(self) -> str:
-        """Remove the last row, which `say` added, and return its text."""
+        """Remove the last row added by `say` and return its text."""
         self._rows.pop()
         self._count -= 1
         return self._text.pop(self._count, "")
 
     @property
     def last_kind(self) -> RowKind | None:
-        """Kind of the last row; None where there is none."""
+        """Return the kind of the last row, or None."""
         return self._rows[-1].kind if self._rows else None
 
     @property
     def last_text(self) -> str:
-        """Text of the last row; empty where it has none."""
+        """Return the text of the last row, or an empty one."""
         return self._text.get(self._count - 1, "")
 
     def built(self) -> Toolpath:
@@ -420,7 +409,7 @@ class ToolpathBuilder:
         return self._count
 
     def _corners_mm(self, count: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Of each row; an arc that became chords stops at its own ends only."""
+        """Return the rounding of each row; an arc as chords stops only at its own ends."""
         corners = np.repeat(np.array([rows.corner_mm for rows in self._rows], dtype=np.float64), count)
         last = np.zeros(len(corners), dtype=np.bool_)
         last[np.cumsum(count) - 1] = True
@@ -457,7 +446,7 @@ def _on_arc(
     arc: NDArray[np.float64],
     share: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """X and Y at shares of chords, shape (k, 2), turned about the centre; of a spiral the radius changes evenly [mm]."""
+    """Return X and Y at shares of chords, shape (k, 2) [mm]; the radius of a spiral changes evenly."""
     centre, turned = arc[:, :2], share * arc[:, 2]
     first, last = before - centre, after - centre
     radius = np.linalg.norm(first, axis=1)
@@ -468,19 +457,19 @@ def _on_arc(
 
 
 def in_pieces(pieces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Rows and the shares at which their pieces end, shapes (k,), for the number of pieces of each row, shape (n,)."""
+    """Return rows and end shares of pieces, shapes (k,), for the piece count of each row, shape (n,)."""
     row = np.repeat(np.arange(len(pieces)), pieces)
     number = np.arange(len(row)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1
     return row, number / pieces[row]
 
 
 def rounded(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Poses, shape (n, 6), as programs write them; adding zero turns -0 into 0."""
+    """Return poses, shape (n, 6), as programs write them, without -0."""
     return np.hstack([np.round(poses[:, :3], DECIMALS_MM), np.round(poses[:, 3:], DECIMALS_DEG)]) + 0.0
 
 
 def _norm(vectors: NDArray[np.float64], least: float) -> NDArray[np.float64]:
-    """Lengths of vectors, shape (n, 3), without components below the least; zero where a place is not known."""
+    """Return lengths of vectors, shape (n, 3), without components below `least`; zero for unknown places."""
     known = np.nan_to_num(vectors)
     length: NDArray[np.float64] = np.linalg.norm(np.where(np.abs(known) < least, 0.0, known), axis=1)
     return length

@@ -1,7 +1,7 @@
-"""The trial of a dialect: whether it reads what it wrote, row by row, or says that it has no words for it.
+"""The trial of a dialect: does it read what it wrote?
 
-Everything that a toolpath can hold is written and read back, each thing by itself and then all that the dialect has words for
-in one program, in order. What a dialect drops, changes or moves elsewhere is a fault; what it refuses by an error is none.
+Everything that a toolpath can hold is written and read back, singly and together. Dropped, changed or moved rows are
+faults. An error for missing words is none.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SHARE_WITHIN = 1e-4
 
 
 def faults_of(dialect: Dialect) -> list[str]:
-    """What a dialect reads otherwise than it wrote it, a sentence each; empty where it may be used.
+    """Return what a dialect reads otherwise than written, a sentence each; empty if it may be used.
 
     Raises:
         Exception: whatever the dialect raises while it writes moves, or reads what it wrote.
@@ -64,7 +64,6 @@ def faults_of(dialect: Dialect) -> list[str]:
 
 
 def _from_first(by: list[float]) -> NDArray[np.float64]:
-    """The first pose, moved by as much [mm, deg]."""
     return FIRST + np.array(by)
 
 
@@ -142,7 +141,7 @@ THINGS: dict[str, Callable[[ToolpathBuilder], None]] = {
 
 
 class _Row(NamedTuple):
-    """One row as a sentence needs it: what it is, and the numbers that rounding may change."""
+    """One row for a sentence, with the numbers that rounding may change."""
 
     what: str
     numbers: tuple[float, ...] = ()
@@ -185,7 +184,7 @@ def _differences(wrote: Toolpath, read: Toolpath, tried: str) -> list[str]:
 
 
 def _rows(path: Toolpath) -> Iterator[_Row]:
-    """Rows that mean something to a machine, with what holds where it changes."""
+    """Return rows that act on a machine, with modal changes."""
     if path.guard is not None:
         yield _Row(" ".join(["a guard against offsets", *path.guard]))
     feeds, corner = path.feed, np.nan

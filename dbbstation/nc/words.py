@@ -1,7 +1,7 @@
-"""Writing a toolpath as lines of words: numbers without exponents, axes where they change, a method for each kind of row.
+"""Write a toolpath as lines of words, with one method for each kind of row.
 
-A dialect of one's own derives from `WordDialect`, says how its words look, and leaves out what its control cannot do: a row
-that it has no method for is refused by name and line, never left out.
+An own dialect derives from `WordDialect` and leaves out what its control cannot do. A row without a method is refused by
+name and line.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ AT_ONCE = 20_000
 
 
 def digits(value: float) -> str:
-    """A number with seven significant digits and no exponent, which NC languages do not know."""
+    """Return a number with seven significant digits and no exponent."""
     if value == 0.0:
         return "0"
     decimals = min(max(0, SIGNIFICANT_DIGITS - 1 - math.floor(math.log10(abs(value)))), MOST_DECIMALS)
@@ -43,12 +43,12 @@ def digits(value: float) -> str:
 
 
 def number(value: float) -> str:
-    """A number with all its digits and no exponent: the shortest that reads back as the same."""
+    """Return the shortest number without exponent that reads back the same."""
     return str(np.format_float_positional(value, trim="-"))
 
 
 class CannotSayError(StationError):
-    """A dialect has no words for something that a program does."""
+    """The dialect has no words for a row."""
 
     def __init__(self, dialect: str, what: str, *, where: str = "") -> None:
         self.dialect, self.asked = dialect, what
@@ -57,10 +57,9 @@ class CannotSayError(StationError):
 
 
 class WordDialect(Dialect):
-    """A dialect of lines of words: an axis where it changes, F where it changes, the motion code in every line.
+    """A dialect of lines of words; axes and F are written when they change.
 
-    Each method returns the text of one line, or raises `CannotSayError` where it is not overridden. `begin` and `end`
-    give the lines around the program, which may be none.
+    Each method returns one line. It raises `CannotSayError` if not overridden.
     """
 
     axis_forms: ClassVar[Sequence[str]] = tuple(
@@ -78,7 +77,7 @@ class WordDialect(Dialect):
         return "\n".join(self.lines(toolpath, header)) + "\n"
 
     def lines(self, toolpath: Toolpath, header: Sequence[str] = ()) -> Iterator[str]:
-        """Lines of the program in order, made some thousand at a time.
+        """Yield lines of the program, made some thousand at a time.
 
         Raises:
             CannotSayError: the dialect has no words for something in it.
@@ -102,67 +101,67 @@ class WordDialect(Dialect):
         yield from around
 
     def before_header(self, toolpath: Toolpath) -> Iterable[str]:  # noqa: ARG002
-        """Lines before the header's comments."""
+        """Return lines before the header's comments."""
         return ()
 
     def begin(self, toolpath: Toolpath) -> Iterable[str]:  # noqa: ARG002
-        """Lines that set what a program must not inherit from the one before it."""
+        """Return lines that set all modes."""
         return ()
 
     def end(self, toolpath: Toolpath) -> Iterable[str]:
-        """Lines that end the program as `toolpath.ending` says."""
+        """Return lines for `toolpath.ending`."""
         raise self.cannot_say(f"the end of a program by {toolpath.ending.value}")
 
     def line_number(self, line: int) -> str:
-        """What stands before a line to number it."""
+        """Return the number in front of a line."""
         return f"N{line} "
 
     def rapid(self, words: str) -> str:  # noqa: ARG002
-        """Move as fast as the machine can, to the words of the axes that change."""
+        """Return a rapid to the words of changed axes."""
         raise self.cannot_say("a rapid")
 
     def feed(self, words: str, feed: float | None) -> str:  # noqa: ARG002
-        """Move at a feed [mm/min; deg/min where only angles move]; None where it is that of the move before."""
+        """Return a move at a feed [mm/min; deg/min if only angles move]; None if unchanged."""
         raise self.cannot_say("a move at feed")
 
     def in_machine(self, move: str) -> str:  # noqa: ARG002
-        """The line of a move, with its numbers in machine coordinates."""
+        """Return a move in machine coordinates."""
         raise self.cannot_say("a move in machine coordinates (G53)")
 
     def corner(self, corner_mm: float) -> str:  # noqa: ARG002
-        """How far corners may be rounded from here on [mm]: 0 for exact, infinite for as much as the feed needs."""
+        """Return the rounding from here on [mm]: 0 exact, infinite unlimited."""
         raise self.cannot_say("how far corners may be rounded")
 
     def dwell(self, seconds: float) -> str:  # noqa: ARG002
-        """Stop for some seconds."""
+        """Return a timed stop [s]."""
         raise self.cannot_say("a dwell")
 
     def pause(self, text: str) -> str:  # noqa: ARG002
-        """Stop until the operator goes on, with a message where there is a text."""
+        """Return a stop for the operator, with a message if there is a text."""
         raise self.cannot_say("a stop")
 
     def optional_stop(self) -> str:
-        """Stop that the operator has switched on or off."""
+        """Return an optional stop."""
         raise self.cannot_say("an optional stop (M1)")
 
     def comment(self, text: str) -> str:  # noqa: ARG002
-        """A comment, which nothing reacts to."""
+        """Return a comment without effect."""
         raise self.cannot_say("a comment")
 
     def message(self, text: str) -> str:  # noqa: ARG002
-        """What the control shows or logs: keyword, comma, text, as in `MSG, hello`."""
+        """Return what the control shows or logs: keyword, comma, text, as in `MSG, hello`."""
         raise self.cannot_say("a message without a stop")
 
     def function(self, words: str) -> str:
-        """Spindle and coolant, as words that mean the same to every control: `S800 M3`."""
+        """Return words of spindle and coolant that every control knows: `S800 M3`."""
         raise self.cannot_say(words)
 
     def system(self, name: str) -> str:
-        """The work coordinate system from here on, `G54` to `G59.3`."""
+        """Return the work system, `G54` to `G59.3`."""
         raise self.cannot_say(f"the work system {name}")
 
     def guard(self, systems: Sequence[str]) -> str:  # noqa: ARG002
-        """Lines that stop, say why and end where offsets are not zero: of the work system in force, and of those named."""
+        """Return lines that end the program if an offset of these work systems is not zero."""
         raise self.cannot_say("a stop where offsets are not zero")
 
     def cannot_say(self, what: str) -> CannotSayError:
@@ -215,10 +214,7 @@ class WordDialect(Dialect):
         return said[kind](text)
 
     def _words(self, toolpath: Toolpath, changed: NDArray[np.bool_], rows: slice) -> list[str]:
-        """Words of the axes that each of these rows moves; nothing for rows that are no moves.
-
-        Moves that change the same axes are written together, by one form.
-        """
+        """Return words of the axes that each row moves; empty for other rows."""
         poses, changed = toolpath.poses[rows], changed[rows]
         texts = [""] * len(poses)
         which = changed @ (1 << np.arange(6))
@@ -234,7 +230,7 @@ class WordDialect(Dialect):
 
 
 class _Modal:
-    """What holds until it is changed."""
+    """What holds until it changes."""
 
     def __init__(self, feed: float, corner_mm: float) -> None:
         self.feed, self.corner_mm = feed, corner_mm
@@ -244,10 +240,10 @@ _MOVES = frozenset((int(RowKind.RAPID), int(RowKind.FEED)))
 
 
 def changed_axes(toolpath: Toolpath) -> NDArray[np.bool_]:
-    """Axes that each row must name, shape (n, 6); none in rows that are no moves.
+    """Return axes that each row must name, shape (n, 6); none in rows that are no moves.
 
-    Those whose number changes, and those that were last named in another coordinate system. The first move names all,
-    except those that stand where the program found them.
+    A row names changed axes and axes last named in another system. The first move names all, except axes at the program's
+    start.
     """
     moves = np.flatnonzero(toolpath.is_move)
     poses, frame = toolpath.poses[moves], toolpath.frame[moves]

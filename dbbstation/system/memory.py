@@ -1,4 +1,4 @@
-"""The largest memory that this process has had, since it was last forgotten."""
+"""The largest memory of this process since the last reset."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ KB_PER_MB = 1024.0
 
 
 def forget_largest_memory() -> None:
-    """Begin anew with what the process has in use now; nothing happens where the system cannot (proc(5), `clear_refs`)."""
+    """Reset to the memory in use now, if the system can (proc(5), `clear_refs`)."""
     _give_back_what_is_free()
     try:
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
@@ -19,7 +19,7 @@ def forget_largest_memory() -> None:
 
 
 def _give_back_what_is_free() -> None:
-    """Give the pages back that the C library keeps of what was freed (malloc_trim(3)); other libraries do it by themselves, or cannot."""
+    """Give freed pages back to the system (malloc_trim(3))."""
     if sys.platform != "linux":
         return
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
@@ -28,7 +28,7 @@ def _give_back_what_is_free() -> None:
 
 
 def largest_memory_mb() -> float | None:
-    """Largest resident memory since it was forgotten, or since the process began [MB]; None where the system does not say."""
+    """Return the largest resident memory since the reset [MB]; None if not known."""
     try:
         status = Path("/proc/self/status").read_text(encoding="ascii")
     except OSError:

@@ -1,1 +1,1 @@
-"""Texts: what a cause says of itself, digits of numbers, the order in which people count, what a terminal may be sent."""
+"""Texts of causes, digits of numbers, sorting, and safe output to a terminal."""

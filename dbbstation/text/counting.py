@@ -1,4 +1,4 @@
-"""Names and runs in the order in which people count."""
+"""Sort names and runs as people count."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NUMBER = re.compile(r"(\d+)")
 
 
 def natural(name: str) -> tuple[tuple[int, int, str], ...]:
-    """Return a key that sorts names with numbers as people count: `w9` before `w10`."""
+    """Return a sort key: `w9` before `w10`."""
     parts = (part for part in _NUMBER.split(name) if part)
     return tuple((0, int(part), "") if part.isdecimal() else (1, 0, part) for part in parts)
 
@@ -41,10 +41,7 @@ Run = TypeVar("Run", bound=Repeated)
 
 
 def repeats_in_order(runs: Iterable[Run]) -> tuple[Run, ...]:
-    """Return runs in their order, but the repeats of a test and direction as they are counted, at the places that these have.
-
-    A list of files that was sorted by name has `a-ccw-10` before `a-ccw-2`.
-    """
+    """Return runs in their order, but repeats of a test and direction as counted."""
     given = tuple(runs)
     alike: dict[tuple[str, str], list[Run]] = defaultdict(list)
     for run in given:

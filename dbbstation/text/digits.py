@@ -1,4 +1,4 @@
-"""How many decimals a value has: as many as its expanded uncertainty, which has two digits that count [GUM 7.2.6]."""
+"""Decimals of a value: its expanded uncertainty has two significant digits [GUM 7.2.6]."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ SIGNIFICANT = 2
 
 
 def expanded_uncertainty(u: float | None, coverage_factor: float) -> float | None:
-    """Return U = k u; None where u is not known."""
+    """Return U = k u; None if u is not known."""
     return None if u is None else coverage_factor * u
 
 
 def decimals_of(expanded: float) -> int:
-    """Return the decimals of a value with this expanded uncertainty, and of that; of none with uncertainty zero the most."""
+    """Return the decimals of a value with this expanded uncertainty."""
     if not expanded > 0.0:
         return MOST_DECIMALS
     shown = float(f"{expanded:.{SIGNIFICANT - 1}e}")  # 0.0996 is written as 0.10
@@ -25,7 +25,7 @@ def decimals_of(expanded: float) -> int:
 
 
 def with_uncertainty(value: float, expanded: float | None, plain: int = 1) -> tuple[str, str]:
-    """Return a value and its expanded uncertainty as they are printed: to the same decimals."""
+    """Return a value and its expanded uncertainty as printed, to the same decimals."""
     if expanded is None:
         return f"{value:z.{plain}f}", "-"
     decimals = decimals_of(expanded)

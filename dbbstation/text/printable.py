@@ -1,8 +1,4 @@
-r"""Text that other people typed, made safe for a terminal: control characters are shown, not obeyed.
-
-A name, a reason or a cell of a table may hold `\x1b]0;…`, which renames the window, `\r`, which writes over what stood
-before, or marks that turn the direction of writing, behind which words change places.
-"""
+r"""Text typed by others, made safe for a terminal: control characters are shown, not obeyed."""
 
 from __future__ import annotations
 

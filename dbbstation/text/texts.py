@@ -1,4 +1,4 @@
-"""What every cause says of itself to people: those of a hexapod and those of a single drive alike."""
+"""Texts that every cause has, for hexapods and single drives."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Texts:
-    """What a cause says of itself.
+    """Texts of a cause.
 
     Attributes:
-        shows: how it shows in the recordings that it is looked for in.
-        confirm: how to confirm it on the machine or the drive.
-        equation: the equation, in words or symbols.
+        shows: symptoms in recordings.
+        confirm: test on the machine or the drive.
         origin: where the equation comes from.
     """
 

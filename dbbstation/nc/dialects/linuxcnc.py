@@ -1,4 +1,4 @@
-"""LinuxCNC: RS274/NGC as its interpreter has it."""
+"""LinuxCNC: RS274/NGC as its interpreter reads it."""
 
 from __future__ import annotations
 
@@ -52,15 +52,15 @@ class LinuxCNC(WordDialect):
         return read_program(text, name, start=start)
 
     def before_header(self, toolpath: Toolpath) -> Iterable[str]:
-        """The percent sign of a program that ends with one."""
+        """Return the percent sign, if the program ends with one."""
         return ("%",) if toolpath.ending is Ending.TEXT else ()
 
     def begin(self, toolpath: Toolpath) -> Iterable[str]:  # noqa: ARG002
-        """The modes."""
+        """Return the modes."""
         return (MODES,)
 
     def end(self, toolpath: Toolpath) -> Iterable[str]:
-        """M2, M30 or the percent sign."""
+        """Return M2, M30 or the percent sign."""
         return (toolpath.ending.value,)
 
     def rapid(self, words: str) -> str:
@@ -76,7 +76,7 @@ class LinuxCNC(WordDialect):
         return f"G53 {move}"
 
     def corner(self, corner_mm: float) -> str:
-        """G61, G64, or G64 with P and Q0."""
+        """Return G61, G64, or G64 with P and Q0."""
         if corner_mm == 0.0:
             return "G61"
         return "G64" if math.isinf(corner_mm) else f"G64 P{digits(corner_mm)} Q0"
@@ -86,7 +86,7 @@ class LinuxCNC(WordDialect):
         return f"G4 P{digits(seconds)}"
 
     def pause(self, text: str) -> str:
-        """M0, with a message before it."""
+        """Return M0 behind its message."""
         return f"({message_before_stop(text)})\nM0" if text else "M0"
 
     def optional_stop(self) -> str:
@@ -94,28 +94,28 @@ class LinuxCNC(WordDialect):
         return "M1"
 
     def comment(self, text: str) -> str:
-        """Behind a semicolon, where nothing in it means anything to LinuxCNC."""
+        """Return a comment behind a semicolon, which LinuxCNC ignores."""
         return f"; {plain(text)}".rstrip()
 
     def message(self, text: str) -> str:
-        """A comment that LinuxCNC acts on, to the letter."""
+        """Return a comment that LinuxCNC acts on."""
         return f"({text})"
 
     def function(self, words: str) -> str:
-        """The words as they are, spindle and coolant; a tool has another tip than the model."""
+        """Return the words of spindle and coolant; refuse a tool, whose tip the model does not know."""
         if not all(_FUNCTION.fullmatch(word) for word in words.split()):
             raise self.cannot_say(words)
         return words
 
     def system(self, name: str) -> str:
-        """The word as it is."""
+        """Return the word."""
         return name
 
     def guard(self, systems: Sequence[str]) -> str:
-        """A condition of O-words on LinuxCNC's parameters."""
+        """Return a condition of O-words on LinuxCNC's parameters."""
         return "\n".join(guard_lines(systems))
 
 
 def message_before_stop(text: str) -> str:
-    """What a pause's text becomes as a message: on one line, its brackets square."""
+    """Return a pause's text as a message: one line, square brackets."""
     return f"MSG, {plain(text).replace('(', '[').replace(')', ']')}"

@@ -1,1 +1,1 @@
-"""Reading RS274/NGC, the language that LinuxCNC and its kin share: tokens, blocks, modal state, toolpath."""
+"""Read RS274/NGC: tokens, blocks, modal state, toolpath."""

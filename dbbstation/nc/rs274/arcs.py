@@ -30,13 +30,13 @@ FULL_TURN_RAD = 1e-6
 
 @dataclass(frozen=True)
 class Arc:
-    """An arc in XY, with everything else moving evenly along it.
+    """An arc in XY, with all other axes moving evenly along it.
 
     Attributes:
         start: pose before it, shape (6,) [mm, deg].
         end: pose after it, shape (6,) [mm, deg].
         clockwise: seen from +Z.
-        turns: 1 for less than a full turn or one; each more adds a full turn.
+        turns: each above 1 adds a full turn.
     """
 
     start: NDArray[np.float64]
@@ -51,7 +51,7 @@ class Arc:
         return math.hypot(self.start[0] - x, self.start[1] - y), math.hypot(self.end[0] - x, self.end[1] - y)
 
     def is_round(self) -> bool:
-        """Whether both ends lie on one circle, within what LinuxCNC allows."""
+        """Return whether both ends lie on one circle within LinuxCNC's tolerance."""
         first, last = self.radii_mm()
         off, radius = abs(first - last), max(first, last)
         if min(first, last) < LEAST_RADIUS_MM or off > RADIUS_ABSOLUTE_MM * RADIUS_WORST:
@@ -60,7 +60,7 @@ class Arc:
 
     @property
     def swept_rad(self) -> float:
-        """Angle from start to end in the arc's own direction, all turns together."""
+        """Return the angle from start to end in the arc's direction, all turns."""
         begin, end = (self._angle_rad(pose) for pose in (self.start, self.end))
         swept = math.fmod(end - begin if not self.clockwise else begin - end, math.tau)
         while swept <= FULL_TURN_RAD:
@@ -69,12 +69,12 @@ class Arc:
 
     @property
     def chords(self) -> int:
-        """Number of straight moves that keep `CHORD_ERROR_MM`."""
+        """Return the number of straight moves that keep `CHORD_ERROR_MM`."""
         return max(1, math.ceil(self.swept_rad / math.sqrt(8.0 * CHORD_ERROR_MM / max(self.radii_mm()))))
 
     @property
     def chord(self) -> tuple[float, float, float]:
-        """Centre [mm] and angle of each chord [rad], counter-clockwise positive, as `Toolpath.arc` has them."""
+        """Return centre [mm] and angle of each chord [rad], counter-clockwise positive."""
         return *self.centre_mm, (-self.swept_rad if self.clockwise else self.swept_rad) / self.chords
 
     def poses(self) -> NDArray[np.float64]:
@@ -100,12 +100,10 @@ def centre_by_radius(
     *,
     clockwise: bool,
 ) -> tuple[float, float] | None:
-    """Centre of the arc through two points, shapes (2,) or longer, with this radius; None where there is none.
+    """Return the centre of the arc through two points, shapes (2,) or longer, or None.
 
     Args:
-        start: where it begins [mm].
-        end: where it ends [mm].
-        radius_mm: positive for the arc of at most half a turn, negative for the other [mm].
+        radius_mm: positive for at most half a turn, negative for more.
         clockwise: seen from +Z.
     """
     dx, dy = float(end[0] - start[0]), float(end[1] - start[1])

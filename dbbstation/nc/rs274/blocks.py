@@ -1,4 +1,4 @@
-"""Blocks: the words of one line sorted by what they are, checked for what must not stand together."""
+"""Blocks: the sorted words of one line, checked for conflicts."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class ProgramBlock:
     """One line.
 
     Attributes:
-        words: those that are no code, by letter.
-        codes: G and M codes by their group.
-        comments: texts of its comments, of which nothing takes notice.
-        message: a comment that LinuxCNC acts on, to the letter; empty where there is none.
-        guard: work systems that a guard names which begins in this line; None where none begins.
+        words: other than codes, by letter.
+        codes: G and M codes by group.
+        comments: those without effect.
+        message: a comment that LinuxCNC acts on; empty if none.
+        guard: work systems of a guard that begins here; None if none begins.
     """
 
     place: Place
@@ -52,16 +52,16 @@ class ProgramBlock:
     guard: tuple[str, ...] | None = None
 
     def code(self, group: ModalGroup) -> float | None:
-        """Number of the code of a group, None where the line has none."""
+        """Return the code of a group, or None."""
         word = self.codes.get(group)
         return None if word is None else word.value
 
 
 def blocks(text: str, file: str, faults: list[Problem]) -> Iterator[ProgramBlock]:
-    """All lines up to the program's end, one by one, so that a long program is read in little memory.
+    """Yield lines up to the program's end, one by one to save memory.
 
     Args:
-        faults: those of the lines so far; complete once every block was taken. A program without an end is one.
+        faults: complete once every block was taken; a missing end is one.
     """
     lines = text.split("\n")
     percent, first = _opening(lines)
@@ -93,10 +93,9 @@ def blocks(text: str, file: str, faults: list[Problem]) -> Iterator[ProgramBlock
 
 
 def _opening(lines: list[str]) -> tuple[bool, int]:
-    """Whether the first line that is not empty is a percent sign, and the index of the first line to be read.
+    """Return whether the first line that is not empty is a percent sign, and the index of the first line to read.
 
-    Between percent signs a program needs no other end; what follows the second one is not part of it. Elsewhere a
-    percent sign is a fault, as for LinuxCNC.
+    Between percent signs a program needs no other end. Elsewhere a percent sign is a fault, as for LinuxCNC.
     """
     start = next((index for index, line in enumerate(lines) if line.strip(BLANKS)), 0)
     return (True, start + 1) if _is_percent(lines[start]) else (False, 0)
@@ -112,7 +111,7 @@ def _cut_short(file: str, lines: list[str], end: str) -> Problem:
 
 
 def _one_line(line: str, place: Place) -> str:
-    """The line without the CR that may come before the line feed.
+    """Return the line without a CR at its end.
 
     Raises:
         BadLine: it is longer than LinuxCNC reads, or has a character in it that some programs take for the end of a line.
@@ -158,7 +157,7 @@ _PYTHON = re.compile(r"py,|pyrun,|pyreload", re.IGNORECASE)
 
 
 def _take_comment(block: ProgramBlock, comment: Comment) -> None:
-    """Add a comment. Of several in brackets LinuxCNC looks at the last one only [measured with rs274 2.9]."""
+    """Add a comment. LinuxCNC obeys only the last of several in brackets [measured with rs274 2.9]."""
     text = comment.text.lstrip(BLANKS)
     if _PYTHON.match(text):
         what = "a comment that runs Python in the control, which may move it"

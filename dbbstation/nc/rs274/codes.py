@@ -1,4 +1,4 @@
-"""G and M codes that the reader knows, their modal groups, and why it refuses others."""
+"""G and M codes that the reader knows, their modal groups, and reasons to refuse others."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ _LETTERS_NOT_READ = {
 
 
 def remedy_of_letter(letter: str) -> str:
-    """What to do about words with a letter that is not read."""
+    """Return what to do about a letter that is not read."""
     return _LETTERS_NOT_READ.get(letter, "post the program without it")
 
 
@@ -100,7 +100,7 @@ def name(letter: str, value: float) -> str:
 
 
 def remedy(letter: str, value: float) -> str:
-    """What to do about a code that is not read."""
+    """Return what to do about a code that is not read."""
     if letter == "M" and value in {98, 99}:
         return _LETTERS_NOT_READ["O"]
     if letter == "M":

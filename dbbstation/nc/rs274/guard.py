@@ -1,8 +1,8 @@
-"""The guard of a program: O-words that stop it, say why and end it where an offset of LinuxCNC is not zero.
+"""The guard of a program: O-words that stop it if a LinuxCNC offset is not zero.
 
 Parameters [LinuxCNC, G-code overview, Numbered Parameters]: #5220 is the number n of the work system in force, 1 to 9;
-#5201 + 20 n and the eight after it are its offsets in X to W, #5210 + 20 n its rotation about Z; #5211 to #5219 are G92, in
-force or put aside; #<_tool_offset> is 1 while a tool length is in force. They are looked at before the program's own G49.
+#5201 + 20 n and the next eight are its offsets in X to W, #5210 + 20 n its rotation about Z; #5211 to #5219 are G92;
+#<_tool_offset> is 1 while a tool length is in force.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TOOL = "a tool length is in force: this program is for the tool tip of the mach
 
 
 def guard_lines(systems: Sequence[str] = ()) -> tuple[str, ...]:
-    """Lines of a guard for the work system in force and for those named, `G54` to `G59.3`."""
+    """Return a guard for the work system in force and those named, `G54` to `G59.3`."""
     offsets = range(1, 11)  # X to W, and the rotation
     checks = [([f"#[{_SYSTEM + k}+{_PER_SYSTEM}*#5220]" for k in offsets], _WORK.format("in force"))]
     for name in systems:
@@ -52,9 +52,9 @@ _OF_A_GUARD = re.compile(r"o\d+|m0$|m02$")
 
 
 def guard_at(lines: Sequence[str]) -> tuple[tuple[str, ...], int] | None:
-    """The guard that some lines begin with: the systems that it names, and how many lines it has; None where it is none.
+    """Return the guard at the beginning of lines: its systems and line count, or None.
 
-    Comments, blanks, empty lines, line numbers and the size of letters do not matter; everything else does.
+    Comments, blanks, line numbers and letter case are ignored.
     """
     found: list[tuple[int, str]] = []
     systems: list[str] = []
@@ -73,7 +73,7 @@ def guard_at(lines: Sequence[str]) -> tuple[tuple[str, ...], int] | None:
 
 
 def _bare(lines: Sequence[str]) -> Iterator[tuple[int, str]]:
-    """Number and text of the lines that hold more than comments, without blanks and line numbers, in small letters."""
+    """Return number and text of lines with content, without blanks and line numbers, in small letters."""
     for place, line in enumerate(lines):
         text = re.sub(r"\([^()]*\)|;.*|\s+", "", line).lower()
         text = re.sub(r"^n\d+", "", text)

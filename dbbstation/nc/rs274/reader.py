@@ -1,4 +1,4 @@
-"""From blocks to a toolpath: the modal state of a control, and what each block does to it."""
+"""From blocks to a toolpath through the modal state of a control."""
 
 from __future__ import annotations
 
@@ -42,8 +42,7 @@ def read_program(text: str, file: str, *, start: NDArray[np.float64] | None = No
     """Return what a program commands.
 
     Args:
-        file: for messages, and the name of the toolpath.
-        start: pose before the program, shape (6,) [mm, deg]; None where unknown.
+        start: pose before the program, shape (6,) [mm, deg]; None if unknown.
 
     Raises:
         InputError: faults with line and column; all unreadable words at once, or the first block that makes no sense.
@@ -71,14 +70,14 @@ def read_program(text: str, file: str, *, start: NDArray[np.float64] | None = No
 
 
 class Feed(NamedTuple):
-    """What F stands for: of the tool tip where it moves, of the angles where nothing but they move."""
+    """What F stands for: the tool tip, or the angles if only they move."""
 
     mm_min: float
     deg_min: float
 
 
 class _Interpreter:
-    """Modal state; begins as LinuxCNC does, with millimetres where the program does not say."""
+    """Modal state; begins as LinuxCNC does, in millimetres."""
 
     def __init__(self, path: ToolpathBuilder, start: NDArray[np.float64] | None) -> None:
         self.path = path
@@ -90,7 +89,7 @@ class _Interpreter:
         self._absolute_centres = False
 
     def run(self, block: ProgramBlock) -> None:
-        """Execute one block in the order that RS274/NGC gives [RS274/NGC 3.8]."""
+        """Execute one block in the order of [RS274/NGC 3.8]."""
         if "N" in block.words:
             numbered = int(block.words["N"].value)
             self.path.numbers = (*self.path.numbers[:1], numbered)
@@ -154,7 +153,7 @@ class _Interpreter:
             self.path.say(RowKind.FUNCTION, text, line=block.place.line)
 
     def _shared_words(self, block: ProgramBlock) -> None:
-        """Refuse codes in one line that take the same word, or of which one undoes the other."""
+        """Refuse codes in one line that share a word or undo each other."""
         if not block.codes:
             return
         users = [self._in_line(block, ModalGroup.ONCE, {DWELL}), self._in_line(block, ModalGroup.PATH, {64.0})]
@@ -174,7 +173,7 @@ class _Interpreter:
         return name("G", value) if value in values and value is not None else ""
 
     def _modal_arc(self, block: ProgramBlock) -> str:
-        """The arc that this line makes without saying so again; empty where it makes none."""
+        """Return the arc of a line without its own code; empty if it makes none."""
         is_arc = self._motion in {CLOCKWISE, COUNTER_CLOCKWISE} and ModalGroup.MOTION not in block.codes
         return name("G", self._motion or 0.0) if is_arc and block.words.keys() & set(AXES + "IJ") else ""
 
@@ -265,7 +264,7 @@ class _Interpreter:
             )
 
     def _target(self, block: ProgramBlock) -> NDArray[np.float64]:
-        """Pose that a block leads to, shape (6,)."""
+        """Return the pose that a block leads to, shape (6,)."""
         target: list[float] = self._pose.tolist()  # six numbers are sooner done without arrays
         for axis, letter in enumerate(AXES):
             word = block.words.get(letter)
@@ -334,7 +333,7 @@ class _Interpreter:
             self.path.ending = Ending(name("M", stop))
 
     def _said_before(self) -> str:
-        """The message of a stop: the one before it, where it is written as a dialect would write it for the stop."""
+        """Return the message written before a stop, or the stop's own."""
         text = self.path.last_text.removeprefix(MESSAGE)
         is_own = (
             self.path.last_kind == RowKind.MESSAGE and self.path.last_text == MESSAGE + text and text == plain(text)
@@ -342,7 +341,7 @@ class _Interpreter:
         return self.path.taken_back().removeprefix(MESSAGE) if is_own else ""
 
     def _nothing_left(self, block: ProgramBlock) -> None:
-        """Refuse words that nothing in the block has used: a control would stop there, or do something else."""
+        """Refuse words that the block does not use."""
         for letter, word in block.words.items():
             if letter != "N":
                 what = f"nothing in this line uses {letter}{word.value:g}"
@@ -350,7 +349,7 @@ class _Interpreter:
 
 
 def _first_column(block: ProgramBlock) -> int:
-    """Column of the first word that is neither a code nor a line number; of the motion code where there is none."""
+    """Return the column of the first word that is neither code nor line number, else of the motion code."""
     words = [word.column for letter, word in block.words.items() if letter != "N"]
     return min(words) if words else block.codes[ModalGroup.MOTION].column
 

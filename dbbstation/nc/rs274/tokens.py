@@ -1,4 +1,4 @@
-"""Tokens of one line of RS274/NGC: words (a letter and a number) and comments, each with its column."""
+"""Words and comments of one line of RS274/NGC, each with its column."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ _NOT_READ = {
 
 
 class Word(NamedTuple):
-    """A letter, in capitals, with its number.
+    """A capital letter with its number.
 
     Attributes:
-        column: of the letter, counted from 1.
+        column: from 1.
     """
 
     letter: str
@@ -56,9 +56,8 @@ class Comment(NamedTuple):
     """A comment.
 
     Attributes:
-        text: between its brackets, or after its semicolon.
-        bracketed: whether it stands in brackets; LinuxCNC acts on those only.
-        column: where it begins, counted from 1.
+        bracketed: LinuxCNC acts on bracketed comments only.
+        column: from 1.
     """
 
     text: str
@@ -67,7 +66,7 @@ class Comment(NamedTuple):
 
 
 class BadLine(Exception):  # noqa: N818 - never leaves this package
-    """One fault in one line, as a `Problem`."""
+    """One fault in one line."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -82,7 +81,7 @@ class Place:
     line: int
 
     def fault(self, column: int, what: str, remedy: str) -> BadLine:
-        """Return the exception that says what is wrong here."""
+        """Return the exception for a fault in this place."""
         return BadLine(Problem(self.file, self.line, column, what, remedy))
 
 

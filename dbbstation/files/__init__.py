@@ -1,1 +1,1 @@
-"""Every file format: schemas, places for error messages, whole-or-nothing writing, the session with its journal."""
+"""File formats: schemas, places for messages, whole-or-nothing writing, sessions."""

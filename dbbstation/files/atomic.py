@@ -1,7 +1,6 @@
-"""Writing whole or not at all: temporary file beside the target, synced to disk, renamed, folder synced.
+"""Write whole or not at all: a temporary file beside the target, synced, renamed, folder synced.
 
-A power cut leaves the old file, the new one or a temporary one with `.new` in its name, never half a file under the
-name that was asked for.
+A power cut leaves the old file, the new one or a temporary one with `.new` in its name.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ _MARK = ".new"
 
 
 def write_text(path: Path, text: str, *, force: bool = False, rewrites: bool = False) -> None:
-    """Write a text file, UTF-8 with LF, as `write_bytes` does."""
+    """Write a text file, UTF-8 with LF; see `write_bytes`."""
     write_bytes(path, text.encode(), force=force, rewrites=rewrites)
 
 
@@ -38,12 +37,11 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
     """Write a file.
 
     Args:
-        force: replace a file that exists.
-        rewrites: the file is the program's own and was read to be changed, such as a session file.
+        rewrites: the file is the program's own and was read to be changed.
 
     Raises:
-        OutputError: it exists and `force` is not given, it lies in a session, the same command has read it, or it cannot be
-            written; the old file is then untouched.
+        OutputError: the file exists without `force`, lies in a session, was read by this command, or cannot be written; the old
+            file stays.
     """
     _refuse_unfit(path, force=force)
     if not rewrites:
@@ -64,16 +62,13 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
 
 @contextlib.contextmanager
 def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
-    """Open a file that is written piece by piece, and put it in its place once all is written.
-
-    Args:
-        force: replace a file that exists.
+    """Yield a file to write piece by piece; it takes its place when all is written.
 
     Yields:
         The file to write to.
 
     Raises:
-        OutputError: as `write_bytes`; the old file is untouched then, as after any other error while it is written.
+        OutputError: as `write_bytes`; the old file stays after any error.
     """
     refuse_existing(path, force=force)
     _refuse_input(path)
@@ -101,16 +96,15 @@ def write_folder(
     own: bool = False,
     read_only: Callable[[str], bool] = lambda _name: False,
 ) -> None:
-    """Write several files into one folder, all or none; the folder is made where it does not exist.
+    """Write several files into one folder, made if missing, all or none.
 
     Args:
-        files: content by path within the folder; a path that ends with a slash is an empty folder.
-        force: replace files that exist; others in the folder stay.
-        own: the folder is a session and the files are part of it.
+        files: content by path; a path that ends with a slash is an empty folder.
+        force: replace files that exist; others stay.
+        own: the files are part of this session folder.
 
     Raises:
-        OutputError: one exists and `force` is not given, it lies in a session, or one cannot be written; nothing has changed
-            then.
+        OutputError: a file exists without `force`, lies in a session, or cannot be written; nothing has changed.
     """
     if not own:
         refuse_recorded(folder / "any")
@@ -143,10 +137,10 @@ def write_folder(
 
 
 def refuse_existing(path: Path, *, force: bool) -> None:
-    """Refuse to overwrite, and to work for a folder that is not there: asked before long work, not after it.
+    """Refuse to overwrite, or a missing folder, before long work.
 
     Raises:
-        OutputError: the path exists and `force` is not given, is a folder, has no folder to go into, or lies in a session.
+        OutputError: the path exists without `force`, is a folder, has no folder to go into, or lies in a session.
     """
     refuse_recorded(path)
     _refuse_unfit(path, force=force)
@@ -160,7 +154,7 @@ def _refuse_unfit(path: Path, *, force: bool) -> None:
 
 
 def refuse_outputs(paths: Iterable[Path | None], *, force: bool) -> None:
-    """Refuse what cannot be written or would be overwritten, of all outputs of a command that are asked for.
+    """Refuse outputs of a command that cannot be written.
 
     Raises:
         OutputError: as `refuse_existing`, or two outputs have one name.
@@ -176,7 +170,7 @@ def refuse_outputs(paths: Iterable[Path | None], *, force: bool) -> None:
 
 
 def _refuse_input(path: Path) -> None:
-    """Never write over what the same command has read: `--force` is meant for results of an earlier one."""
+    """Refuse to overwrite what this command has read."""
     if was_read(path):
         what = "this file was read just now: the result would take its place"
         raise OutputError(what, where=str(path), remedy="name another file")
@@ -195,14 +189,14 @@ def _refuse_overwriting(path: Path, *, force: bool) -> None:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove the temporary files in a folder that a power cut left; only where nobody else writes into it."""
+    """Remove temporary files that a power cut left, with no other writer there."""
     for left in folder.glob(f".*{_MARK}"):
         if left.is_file() and not left.is_symlink():
             remove(left)
 
 
 def _make_parents(folder: Path) -> None:
-    """Make a folder and those that it needs, so that all of them outlast a power cut."""
+    """Make a folder and its parents, synced to disk."""
     missing = [one for one in (folder, *folder.parents) if not one.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     for made in missing:
@@ -210,7 +204,7 @@ def _make_parents(folder: Path) -> None:
 
 
 def set_read_only(path: Path) -> None:
-    """Let a file be read and no more, where the system can do that: who may write the folder can still exchange it.
+    """Make a file read-only, if the system can.
 
     Raises:
         OSError: it is not there.
@@ -237,7 +231,7 @@ def _fill(folder: Path, files: Mapping[str, str | bytes], read_only: Callable[[s
 
 
 def _replace_all(folder: Path, files: Mapping[str, str | bytes], read_only: Callable[[str], bool]) -> None:
-    """Write all beside their targets first: what can fail has failed before the first target is touched."""
+    """Write all beside their targets first, so that errors come before the first target changes."""
     written: list[tuple[Path, Path]] = []
     try:
         for name, content in files.items():
@@ -283,7 +277,7 @@ def _write_synced(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def _told(path: Path) -> Iterator[None]:
-    """Turn what the system refuses into an error that says what could not be written."""
+    """Turn a refusal of the system into an OutputError."""
     try:
         yield
     except OSError as error:

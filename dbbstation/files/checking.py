@@ -1,4 +1,4 @@
-"""Checking any file of any format, and whole sessions, for `dbbstation check`."""
+"""Check files of any format and whole sessions, for `dbbstation check`."""
 
 from __future__ import annotations
 
@@ -50,10 +50,9 @@ class Checked:
     """What was found in one file or session.
 
     Attributes:
-        kind: its format, `run` for a run file, `drive` for a recording of one drive; empty where it could not be told.
-        summary: what it holds, one line; empty where it has problems.
-        problems: what makes it unusable.
-        judgements: of the runs of a session that are accepted or wait to be; empty for everything else.
+        kind: format; `run`, `drive`, or empty if unknown.
+        summary: one line; empty if there are problems.
+        judgements: of accepted and waiting runs of a session; else empty.
     """
 
     path: Path
@@ -195,7 +194,7 @@ def _run(checked: Checked) -> None:
 
 
 def _implausible(path: Path, recording: Recording) -> list[Problem]:
-    """What no recording of a bar can be, whatever plan it belongs to: a session holds more against its plan."""
+    """Return what no recording of a bar can be, whatever its plan."""
     faults = []
     usable = np.arange(len(recording)) if recording.usable is None else np.flatnonzero(recording.usable)
     if len(usable) < FEWEST_SAMPLES:
@@ -276,7 +275,7 @@ NO_SEAL = "it carries no seal (`dbbstation session seal` writes one)"
 
 
 def _judge(checked: Checked, session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]]) -> None:
-    """Say what is wrong with runs that can be read; samples that were lost, and what comes of that, are said already."""
+    """Judge readable runs; lost samples are reported already."""
     checked.judgements = judge_session(session, wanted)
     for (run, _), judgement in zip(wanted, checked.judgements, strict=True):
         lossy = any(finding.name is Name.LOST for finding in judgement.wrong)

@@ -1,4 +1,4 @@
-"""Rows of CSV text: read cell by cell, and written so that a spreadsheet takes no text for a formula."""
+"""CSV rows: read cell by cell, and written safe for a spreadsheet."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ _NONE = "-"
 
 
 def csv_text(rows: Iterable[Iterable[object]], *, exact: bool = False) -> str:
-    """Return rows as CSV text: the one writer of tables that people open in a spreadsheet.
+    """Return rows as CSV text for spreadsheets.
 
-    A text that a spreadsheet would take for a formula gets `'` before it. Numbers stay numbers, negative ones too, with `DIGITS` digits.
+    A text that looks like a formula gets `'` before it. Numbers keep `DIGITS` digits.
 
     Args:
-        exact: write numbers with as many digits as it takes to read back the same bits: of recordings that come back.
+        exact: write as many digits as read back the same bits.
     """
     out = io.StringIO(newline="")
     csv.writer(out, lineterminator="\n").writerows((_guarded(cell, exact=exact) for cell in row) for row in rows)
@@ -55,12 +55,10 @@ def csv_rows(
     """Yield the line number and the cells of each row.
 
     Args:
-        lines: of the text, with or without their ends.
-        file: as named in messages.
-        skip_spaces: leave out spaces behind separators.
+        lines: with or without their ends.
 
     Raises:
-        InputError: a cell is longer than any text of a table, as behind a quotation mark that is never closed.
+        InputError: a cell is too long, as behind an unclosed quotation mark.
     """
     reader = csv.reader(lines, delimiter=separator, skipinitialspace=skip_spaces)
     while True:

@@ -1,7 +1,7 @@
-"""The folder of a fleet's results: each whole under its key, so that work that is interrupted loses nothing.
+"""The folder of a fleet's results, each whole under its key.
 
-A result is one file under a name with its key; models and pages lie beside it and are written first. Who finds the result finds
-all of it. Two processes at once write the same content under the same name.
+A result is one file; its models and pages are written before it. Two processes write the same content under the same
+name.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class FleetFolder:
             write_text(mark, json.dumps({"format": "dbb-fleet/1"}) + "\n")
 
     def known(self, name: str, key: str) -> dict[str, object] | None:
-        """Return a result that was kept under a key; None where there is none that can be read."""
+        """Return a result kept under a key, or None."""
         path = self._file(name, key)
         try:
             data = json.loads(content_of(path))
@@ -66,7 +66,7 @@ class FleetFolder:
         return data if all((self.folder / file).is_file() for file in data.get("files", ())) else None
 
     def keep(self, name: str, key: str, data: Mapping[str, Any], files: Mapping[str, bytes]) -> dict[str, object]:
-        """Keep a result, and return it as `known` would.
+        """Keep a result and return it as `known` would.
 
         Args:
             files: further files, by their ending.
@@ -83,7 +83,7 @@ class FleetFolder:
         return whole
 
     def file_of(self, name: str, key: str) -> str:
-        """Return the path of a result, within the folder."""
+        """Return a result's path within the folder."""
         return self._file(name, key).relative_to(self.folder).as_posix()
 
     def _file(self, name: str, key: str) -> Path:

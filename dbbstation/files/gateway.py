@@ -1,8 +1,7 @@
-"""The one way in for every file that the program reads: regular files only, counted as they are read.
+"""The one way in for files: regular files only, counted while they are read.
 
-A pipe would be waited for and a device never ends; a file may grow while it is read. Whoever needs a file's bytes asks
-here, and `tests/files/test_gateway.py` finds who does not. What a file is refused for comes as an `OSError` whose
-`strerror` says it, like everything else that the system refuses.
+A pipe blocks, a device never ends, and a file may grow. `tests/files/test_gateway.py` finds code that reads elsewhere. A
+refusal is an `OSError` with its reason as `strerror`.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ BLOCK_BYTES = 1 << 20
 
 
 class NotRegularError(OSError):
-    """A pipe, a socket or a device stands where a file is needed."""
+    """A pipe, a socket or a device in place of a file."""
 
 
 class TooLargeError(OSError):
@@ -37,12 +36,12 @@ class TooLargeError(OSError):
 
 
 class Source:
-    """A regular file that is open.
+    """An open regular file.
 
     Args:
-        file: unbuffered, open for reading.
-        path: as named in messages.
-        largest: bytes that are read at the most.
+        file: unbuffered.
+        path: for messages.
+        largest: most bytes to read.
     """
 
     def __init__(self, file: FileIO, path: Path, size: int, largest: int) -> None:
@@ -53,10 +52,10 @@ class Source:
         self._largest = largest
 
     def read(self, most: int = BLOCK_BYTES) -> bytes:
-        """Return the next bytes, `most` of them at the most; none at the end.
+        """Return at most `most` bytes; none at the end.
 
         Raises:
-            TooLargeError: it goes on beyond the largest size.
+            TooLargeError: it exceeds the largest size.
             OSError: it cannot be read.
         """
         data = self._file.read(min(most, self._left + 1))
@@ -66,7 +65,7 @@ class Source:
         return data
 
     def blocks(self) -> Iterator[bytes]:
-        """Yield the file block by block.
+        """Yield the file in blocks.
 
         Raises:
             OSError: as `read`.
@@ -92,8 +91,8 @@ def opened(path: Path, largest: int = LARGEST_BYTES) -> Iterator[Source]:
 
     Raises:
         NotRegularError: it is a pipe, a socket or a device.
-        TooLargeError: it has more bytes than that.
-        OSError: there is no such file, it is a folder, or the system refuses it.
+        TooLargeError: it has more bytes.
+        OSError: it is missing, a folder, or refused by the system.
     """
     _check(path, _stat(path), largest)  # some devices do something when they are opened
     with os.fdopen(open_to_read(path), "rb", buffering=0) as file:
@@ -113,7 +112,7 @@ def content_of(path: Path, largest: int = LARGEST_BYTES) -> bytes:
 
 
 def head_of(path: Path, most: int) -> bytes:
-    """Return a file's first bytes, `most` of them at the most.
+    """Return at most the first `most` bytes of a file.
 
     Raises:
         OSError: as `opened`, and as `Source.read`.
@@ -123,7 +122,7 @@ def head_of(path: Path, most: int) -> bytes:
 
 
 def digest_of(path: Path) -> str:
-    """Return the SHA-256 of a file in hexadecimal, read block by block.
+    """Return a file's SHA-256 in hexadecimal, read in blocks.
 
     Raises:
         OSError: as `opened`, and as `Source.read`.

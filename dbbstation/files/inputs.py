@@ -1,4 +1,4 @@
-"""Which files a command has read, by SHA-256: what outputs and the log say of their inputs."""
+"""Files that a command has read, by SHA-256, for outputs and log."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _LOG = logging.getLogger(__name__)
 
 
 class InputBook:
-    """Inputs in the order in which they were first read."""
+    """Inputs in the order of their first reading."""
 
     def __init__(self) -> None:
         self._digests: dict[Path, str] = {}
         self._read: set[Path] = set()
 
     def note_read(self, path: Path) -> None:
-        """Note that a file was read, whether or not outputs name it among their inputs."""
+        """Note a reading that outputs need not name."""
         self._read.add(real_path(path))
 
     def was_read(self, path: Path) -> bool:
@@ -32,14 +32,14 @@ class InputBook:
         return real_path(path) in self._read
 
     def note(self, path: Path, digest: str) -> None:
-        """Note a file; one that is read again after a change counts as it was last."""
+        """Note a file; the last reading of a changed file counts."""
         self._digests[path.absolute()] = digest
 
     def named(self) -> dict[str, str]:
         """Return the SHA-256 of every input by name.
 
-        A name is that of the file without its folders, so that the same files give the same text on every computer. Files
-        of a session have the session's name before theirs; of two other files with one name the second is numbered.
+        Names have no folders, so that texts are equal on every computer. A session's files carry its name; equal names
+        are numbered.
         """
         sessions = {path.parent for path in self._digests if path.name == "session.yaml"}
         named: dict[str, str] = {}
@@ -56,7 +56,7 @@ _BOOK: ContextVar[InputBook | None] = ContextVar("inputs", default=None)
 
 @contextmanager
 def input_book() -> Iterator[InputBook]:
-    """Note every input that is read from here on."""
+    """Note every input read inside."""
     book = InputBook()
     token = _BOOK.set(book)
     try:
@@ -66,7 +66,7 @@ def input_book() -> Iterator[InputBook]:
 
 
 def note_input(path: Path, digest: str) -> None:
-    """Note and log a file that was read, with its SHA-256; only logged where nobody keeps a book."""
+    """Note and log a file that was read."""
     _LOG.info("read %s, sha256 %s", path, digest)
     book = _BOOK.get()
     if book is not None:
@@ -74,7 +74,7 @@ def note_input(path: Path, digest: str) -> None:
 
 
 def note_known(path: Path, digest: str) -> None:
-    """Note a file whose content is known from an earlier reading."""
+    """Note a file known from an earlier reading."""
     book = _BOOK.get()
     if book is not None:
         book.note(path, digest)
@@ -82,19 +82,19 @@ def note_known(path: Path, digest: str) -> None:
 
 
 def note_read(path: Path) -> None:
-    """Note that a file was read, so that no output takes its place."""
+    """Note a file that no output may replace."""
     book = _BOOK.get()
     if book is not None:
         book.note_read(path)
 
 
 def was_read(path: Path) -> bool:
-    """Whether this command has read a file; False where nobody keeps a book."""
+    """Return whether this command has read a file; False without a book."""
     book = _BOOK.get()
     return book is not None and book.was_read(path)
 
 
 def inputs_so_far() -> dict[str, str]:
-    """Return the SHA-256 of every input so far by name; empty where nobody keeps a book."""
+    """Return the SHA-256 of every input so far by name; empty without a book."""
     book = _BOOK.get()
     return {} if book is None else book.named()

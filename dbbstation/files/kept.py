@@ -1,8 +1,7 @@
-"""What was worked out of files, kept so that it need not be worked out again: an index in the user's cache folder.
+"""An index of computed results in the user's cache folder.
 
-It is never the only copy of anything: one that is missing, damaged, or of another version of the program is begun anew. SQLite
-without a write-ahead log, which needs memory that processes on one computer share; never on a share and never in the folder itself.
-Two processes at once write the same lines, one after the other.
+It never holds the only copy of anything. A missing, damaged or outdated index is begun anew. SQLite runs without a
+write-ahead log and never on a network share.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ SHARES = frozenset(
 
 @dataclass(frozen=True)
 class Stamp:
-    """By what a file is known not to have changed, without reading it.
+    """What shows that a file has not changed, without reading it.
 
     Attributes:
         modified_ns: when it was written [ns].
@@ -48,10 +47,10 @@ class Stamp:
 
 
 def stamp_of(path: Path, *others: Path) -> Stamp:
-    """Return the stamp of a file, or of several together: all their names, times and sizes.
+    """Return the stamp of one or several files: names, times and sizes.
 
     Raises:
-        OSError: one is not there.
+        OSError: one is missing.
     """
     stat = path.stat()
     if not others:
@@ -67,7 +66,7 @@ class NotedAnchor:
 
     Attributes:
         anchor: the link that a log ended with.
-        at: when it was noted, ISO 8601.
+        at: ISO 8601.
     """
 
     anchor: str
@@ -82,13 +81,13 @@ class _Row:
 
 
 class Kept:
-    """What is kept of the files of one folder, each written at once: work that is interrupted loses nothing. A context.
+    """What is kept of one folder's files, each written at once. A context.
 
     Args:
-        begin_anew: forget what is kept, but for anchors that were noted.
+        begin_anew: forget all but noted anchors.
 
     Attributes:
-        problem: why nothing can be kept, in words; empty where it can.
+        problem: why nothing can be kept; empty if it can.
     """
 
     def __init__(self, folder: Path, *, begin_anew: bool = False) -> None:
@@ -108,38 +107,38 @@ class Kept:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close the index; everything is written already."""
+        """Close the index."""
         self._close()
 
     def of(self, name: str, stamp: Stamp) -> str | None:
-        """Return what is kept of a file; None where it has changed, or nothing is kept."""
+        """Return what is kept of an unchanged file, or None."""
         row = self._rows.get(name)
         return row.text if row is not None and row.stamp == stamp else None
 
     def of_content(self, sha256: str) -> str | None:
-        """Return what is kept of a file with this content, whatever its name."""
+        """Return what is kept of a file with this content, or None."""
         return self._by_hash.get(sha256)
 
     def keep(self, name: str, stamp: Stamp, sha256: str, text: str) -> None:
-        """Keep what was worked out of a file."""
+        """Keep a file's result."""
         self._rows[name] = _Row(stamp, sha256, text)
         self._by_hash[sha256] = text
         row = (name, stamp.modified_ns, stamp.size, sha256, text)
         self._write("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?, ?)", [row])
 
     def drop_others(self, names: Iterable[str]) -> None:
-        """Forget files that are not there any more."""
+        """Forget missing files."""
         gone = self._rows.keys() - set(names)
         for name in gone:
             del self._rows[name]
         self._write("DELETE FROM kept WHERE name = ?", [(name,) for name in sorted(gone)])
 
     def noted(self, name: str) -> NotedAnchor | None:
-        """Return the anchor that was noted of a file, whatever became of it since; None where none was."""
+        """Return the noted anchor of a file, or None."""
         return self._noted.get(name)
 
     def note(self, name: str, noted: NotedAnchor) -> None:
-        """Note the anchor of a file. It outlasts a change of the file, and an index that is begun anew on purpose."""
+        """Note the anchor of a file; it outlasts changes and a new index."""
         self._noted[name] = noted
         self._write("INSERT OR REPLACE INTO noted VALUES (?, ?, ?)", [(name, noted.anchor, noted.at)])
 
@@ -220,7 +219,7 @@ class Kept:
 
 
 def index_file(folder: Path) -> Path:
-    """Return where the index of a folder is kept: in the user's cache folder, under a hash of the folder's path."""
+    """Return the index file of a folder: in the cache, under a hash of its path."""
     import platformdirs  # noqa: PLC0415 - only a history looks for it
 
     digest = hashlib.sha256(os.fsencode(real_path(folder))).hexdigest()[:24]
@@ -228,13 +227,13 @@ def index_file(folder: Path) -> Path:
 
 
 def _unfit(file: Path, folder: Path) -> str:
-    """Return why an index must not stand where it would; empty where it may."""
+    """Return why an index must not be there; empty if it may."""
     if real_path(file).is_relative_to(real_path(folder)):
         return "the cache folder lies in the folder of the sessions; set XDG_CACHE_HOME to another"
     return folder_problem(file)
 
 
 def folder_problem(file: Path) -> str:
-    """Return why nothing can be kept in a file, which need not be there; empty where it can."""
+    """Return why nothing can be kept in a file; empty if it can."""
     kind = file_system(real_path(file))
     return f"the cache folder lies on a share ({kind}); set XDG_CACHE_HOME to a local one" if kind in SHARES else ""

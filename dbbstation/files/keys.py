@@ -1,4 +1,4 @@
-"""By what a result that is kept is known: all that decides what it is."""
+"""Keys of kept results, over all that decides them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def key_of(request: Mapping[str, Any], inputs: Iterable[tuple[str, str]] = ()) -> str:
-    """Return the key of a result: a SHA-256 over the whole request, all files that are read for it, and the program.
+    """Return a SHA-256 over request, inputs and program.
 
     Args:
         request: task and options.
@@ -31,7 +31,7 @@ def key_of(request: Mapping[str, Any], inputs: Iterable[tuple[str, str]] = ()) -
 
 
 def digests_of(paths: Iterable[Path], folder: Path) -> list[tuple[str, str]]:
-    """Return name and SHA-256 of files; those of a folder are named within it, so that its copy has the same names.
+    """Return name and SHA-256 of files; names within a folder are relative to it.
 
     Raises:
         OSError: one cannot be read.
@@ -40,7 +40,7 @@ def digests_of(paths: Iterable[Path], folder: Path) -> list[tuple[str, str]]:
 
 
 def files_of_session(session: SessionFolder) -> list[Path]:
-    """Return the files of a session that decide its results: what it states, machine, plan, accepted runs and their programs."""
+    """Return a session's files that decide its results: statement, machine, plan, accepted runs, programs."""
     runs = [run for run in session.runs if run.state is RunState.ACCEPTED]
     programs = [run.program.path for run in runs if run.program is not None]
     return [

@@ -1,6 +1,6 @@
-"""Classes in Python files that a user names: error sources and NC dialects of one's own.
+"""Error sources and NC dialects in a user's Python files.
 
-A file is run as Python code, as any module is that one imports: name only files that you would run.
+A file is run as Python code: name only trusted files.
 """
 
 from __future__ import annotations
@@ -28,14 +28,13 @@ Base = TypeVar("Base")
 def classes_in_files(
     files: Iterable[Path], base: type[Base], contract: str, faults: list[Problem]
 ) -> list[FoundClass[Base]]:
-    """Classes that derive from `base`, each with its place.
+    """Return classes that derive from `base`, each with its place.
 
     Args:
-        files: Python files; one that is named twice is run once.
-        base: what the classes derive from. Those whose name begins with an underscore, and abstract ones that others in
-            the file derive from, do not count.
-        contract: where to read what is asked of them.
-        faults: a file that is not there, not Python or has no such class is added.
+        files: each runs once.
+        base: abstract bases of others and names with an underscore do not count.
+        contract: where to read the requirements.
+        faults: grows by files that are missing, not Python, or lack such a class.
     """
     found = []
     for path in {real_path(path): path for path in files}.values():
@@ -62,16 +61,16 @@ def own_instances(
     attributes: Iterable[str],
     fault_of: Callable[[Base], tuple[str, str] | None] = lambda _one: None,
 ) -> list[Base]:
-    """Return an instance of every class of Python files that derives from `base`, by names that differ.
+    """Return instances of all such classes, by distinct names.
 
     Args:
-        contract: where to read what is asked of them.
-        attributes: that a class must have, `name` among them.
-        fault_of: what is wrong with an instance, and what to do; it may run its code.
+        contract: where to read the requirements.
+        attributes: required, with `name`.
+        fault_of: fault and remedy of an instance; may run its code.
 
     Raises:
-        InputError: every fault of every file: not there, not Python, no such class in it, something that the contract asks for
-            and that is not there, a name that another one has, code that fails.
+        InputError: every fault: a file missing, not Python or without such a class, a missing requirement, a taken name, failing
+            code.
     """
     faults: list[Problem] = []
     found: dict[str, Base] = {}
@@ -122,7 +121,7 @@ def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:
 
 
 def _run(path: Path, tree: ast.Module, faults: list[Problem]) -> ModuleType | None:
-    """Run a file as a module of its own; None with the fault and its line added. Nothing is written beside the file."""
+    """Run a file as a module without writing beside it; None with the fault and its line added."""
     module = ModuleType(module_name(path))
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # where dataclasses look up the types of their fields

@@ -1,4 +1,4 @@
-"""An NC dialect by its name, or one of the user's own by its Python file, tried before it is used."""
+"""An NC dialect by its name or by a user's Python file, tried before use."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def dialect_given(name_or_file: str) -> Dialect:
     """Return a dialect.
 
     Args:
-        name_or_file: name of one that is known, or a file that ends in `.py`, which is run.
+        name_or_file: a known name, or a `.py` file, which is run.
 
     Raises:
         StationError: nothing has this name.
-        InputError: the file is not there, not Python, or has not one dialect; or that does not read what it wrote.
+        InputError: the file is missing, not Python, has not exactly one dialect, or fails its trial.
     """
     if not name_or_file.endswith(".py"):
         return dialect_named(name_or_file)
@@ -40,7 +40,7 @@ def dialect_given(name_or_file: str) -> Dialect:
 
 
 def _tried(found: FoundClass[Dialect]) -> Dialect:
-    """Return a dialect made from a class, after it has written and read all that a program may say.
+    """Return an instance that has written and read all that a program may hold.
 
     Raises:
         InputError: what it lacks.

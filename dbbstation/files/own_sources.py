@@ -1,4 +1,4 @@
-"""Error sources from outside the package: Python files that are named, beside the packages that are installed."""
+"""Error sources from Python files and installed packages."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ CONTRACT = "see `An error source of your own` in docs/diagnosis.md"
 
 
 def every_source(files: Sequence[Path] = ()) -> Mapping[str, ErrorSource]:
-    """All error sources by name: the package's, those of installed packages, those of Python files.
+    """Return all error sources by name: the package's, installed ones, and those of Python files.
 
     Raises:
-        InputError: every fault of every entry point, or else of every file: not there, not Python, no error source in it, a name
-            that is taken, something that the contract asks for and that is not there or not right.
+        InputError: every fault of every entry point, or else of every file: missing, not Python, no source, a taken name, a
+            missing requirement.
     """
     if not files:
         return known_sources()
@@ -34,6 +34,6 @@ def every_source(files: Sequence[Path] = ()) -> Mapping[str, ErrorSource]:
 
 
 def sources_of(files: Sequence[Path], known: Mapping[str, ErrorSource]) -> tuple[str, ...]:
-    """Names of the sources that come from these files."""
+    """Return the names of sources from these files."""
     own = {module_name(path) for path in files}
     return tuple(name for name, source in known.items() if type(source).__module__ in own)

@@ -1,4 +1,4 @@
-"""Which program works here: what results depend on beside their inputs, and by what two computers know that they run the same."""
+"""The identity of the program, on which results depend beside their inputs."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ LIBRARIES = ("numpy", "scipy", "numba", "pydantic")
 
 @cache
 def program_identity() -> dict[str, str]:
-    """Return version and content of the program, and the versions of Python and of the libraries that it computes with.
+    """Return version and content of the program, and versions of Python and numerical libraries.
 
-    The content is a SHA-256 over the files of the package: two checkouts may have one version.
+    The content is a SHA-256 over the package: two checkouts may share a version.
     """
     return {
         "dbbstation": __version__,
@@ -34,7 +34,7 @@ def program_identity() -> dict[str, str]:
 
 @cache
 def code_digest() -> str:
-    """Return a SHA-256 over all files of the package that decide what comes out, with their names."""
+    """Return a SHA-256 over all files that decide results, with their names."""
     digest = hashlib.sha256()
     with as_file(files("dbbstation")) as folder:
         for path in sorted(path for path in folder.rglob("*") if path.suffix in ENDINGS):
@@ -44,7 +44,7 @@ def code_digest() -> str:
 
 
 def differences_of(one: dict[str, str], other: dict[str, str]) -> str:
-    """Return in words what differs between two programs; empty where nothing does."""
+    """Return the differences of two programs in words, or an empty text."""
     names = [name for name in dict.fromkeys([*one, *other]) if one.get(name) != other.get(name)]
     return ", ".join(f"{name} {_short(other, name)} and not {_short(one, name)}" for name in names)
 

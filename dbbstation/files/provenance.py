@@ -1,6 +1,6 @@
-"""Where an output comes from: program, command and inputs, in the form that each kind of output takes.
+"""Provenance of outputs: program, command and inputs.
 
-There is no date: the same inputs and the same command give the same bytes.
+It has no date: the same inputs and command give the same bytes.
 """
 
 from __future__ import annotations
@@ -28,9 +28,8 @@ class Provenance:
     """Where an output comes from.
 
     Attributes:
-        program: name and version of the program.
-        command: what was asked for, without what only says where the result goes.
-        inputs: SHA-256 of every file that was read, by name.
+        command: without options that only direct the result.
+        inputs: SHA-256 of every file read, by name.
     """
 
     program: str
@@ -38,14 +37,14 @@ class Provenance:
     inputs: Mapping[str, str] = field(default_factory=dict)
 
     def data(self) -> dict[str, object]:
-        """Return it as JSON and YAML hold it."""
+        """Return it for JSON and YAML."""
         return {"program": self.program, "command": self.command, "inputs": dict(self.inputs)}
 
     def comments(self, said: Mapping[str, str]) -> dict[str, str]:
         """Return it as comments of an NC program, text by title.
 
         Args:
-            said: comments that the program has already; inputs whose hash stands there are not named again.
+            said: comments already there; inputs hashed in them are left out.
         """
         words = textwrap.wrap(self.command, _COMMENT, break_long_words=False, break_on_hyphens=False)
         comments = {"written by": self.program}
@@ -60,27 +59,27 @@ class Provenance:
 
 
 def beside_table(path: Path) -> Path:
-    """Return the file beside a table that says where it comes from."""
+    """Return the provenance file beside a table."""
     return path.parent / (path.name + BESIDE_TABLE)  # not `with_name`: an empty name is refused where it is written
 
 
 def refuse_existing_table(path: Path, *, force: bool) -> None:
-    """Refuse to overwrite a table, or the file beside it: asked before long work.
+    """Refuse to overwrite a table or its provenance, before long work.
 
     Raises:
-        OutputError: one exists and `force` is not given, or there is no folder for them.
+        OutputError: one exists without `force`, or has no folder.
     """
     for each in (path, beside_table(path)):
         refuse_existing(each, force=force)
 
 
 def write_table(path: Path, text: str, provenance: Provenance, *, force: bool = False) -> None:
-    """Write a CSV table, and beside it where it comes from; both or neither.
+    """Write a CSV table and its provenance, both or neither.
 
-    A comment in the table itself would be read as its header by pandas, spreadsheets and most programs.
+    A comment inside would be read as the table's header by most programs.
 
     Raises:
-        OutputError: one exists and `force` is not given, or cannot be written.
+        OutputError: one exists without `force`, or cannot be written.
     """
     beside = beside_table(path)
     told = json.dumps(provenance.data(), indent=1, ensure_ascii=False) + "\n"

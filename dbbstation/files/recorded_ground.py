@@ -1,4 +1,4 @@
-"""Where results must not go: into a session folder, where recordings lie. The one place for this rule, used by all that writes."""
+"""Keep results out of session folders: the one place for this rule."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _MARK, _WITHIN = b"dbb-session/", 4096
 
 
 def session_around(path: Path) -> Path | None:
-    """Return the session folder that a path lies in; None where it lies in none.
+    """Return the session folder around a path, or None.
 
-    Links are followed: what counts is where the file would come to lie. A session file that was spoilt still marks its folder.
+    Links are followed. A damaged session file still marks its folder.
     """
     return next((folder for folder in real_path(path).parents if _is_session(folder)), None)
 
 
 def refuse_recorded(path: Path) -> None:
-    """Refuse to write a result into a session folder, whether or not it would replace something there.
+    """Refuse to write a result into a session folder.
 
     Raises:
         OutputError: the path lies in a session folder.

@@ -1,4 +1,4 @@
-"""What the system says when it refuses, in words: why, and what to do about it."""
+"""Refusals of the system in words, with a remedy."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _OTHERWISE = "check that the folder exists, its permissions and the disk"
 
 
 def refusal(error: OSError) -> tuple[str, str]:
-    """Return why the system refused, such as `no space left on device`, and what to do."""
+    """Return a reason, such as `no space left on device`, and a remedy."""
     return (error.strerror or str(error)).lower(), _REMEDIES.get(error.errno or 0, _OTHERWISE)
 
 
 def in_a_sentence(error: OSError) -> str:
-    """Return the same as one sentence, for what nobody has turned into words before."""
+    """Return the same as one sentence."""
     why, remedy = refusal(error)
     return f"{error.filename or 'the output, or a file'}: {why}; {remedy}"

@@ -1,4 +1,4 @@
-"""Files that the package ships: inside it when installed from a wheel, beside it in a checkout."""
+"""Files shipped with the package: inside a wheel, or beside the package in a checkout."""
 
 from __future__ import annotations
 
@@ -8,18 +8,16 @@ from dbbstation.errors import InputError, Problem
 
 
 def checkout() -> Path | None:
-    """Return the folder of the source that this package is part of; None where it was installed from a wheel."""
+    """Return the checkout of this package; None for a wheel."""
     root = Path(__file__).resolve().parents[2]
     return root if (root / "pyproject.toml").is_file() and (root / "studies").is_dir() else None
 
 
 def shipped_folder(name: str) -> Path:
-    """Return the folder `name` (for example `protocols`) with the files that the package ships.
-
-    A wheel carries it inside the package; in a checkout, and in an editable install of one, it stands beside it.
+    """Return a shipped folder, such as `protocols`.
 
     Raises:
-        InputError: the installation has no such folder.
+        InputError: the installation lacks it.
     """
     package = Path(__file__).resolve().parent.parent
     for folder in (package / name, package.parent / name):

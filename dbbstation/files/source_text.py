@@ -1,4 +1,4 @@
-"""Reading a text file whole, with every reason why that may fail said as a `Problem`."""
+"""Read a text file whole; every failure is a `Problem`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def read_bytes(
     """Return a file's bytes, or None with the reason added to `faults`.
 
     Args:
-        is_input: outputs name it among their inputs; not so where the hash of the file stands in another input.
+        is_input: outputs name it, unless another input holds its hash.
     """
     try:
         data = content_of(path, largest)
@@ -48,7 +48,7 @@ def unreadable(path: Path, error: OSError) -> Problem:
 
 
 def first_line(path: Path) -> bytes:
-    """Return the first line of a file that holds something and is no comment; nothing where there is none.
+    """Return the first line with content that is no comment, or an empty one.
 
     Raises:
         OSError: it cannot be read.
@@ -58,15 +58,15 @@ def first_line(path: Path) -> bytes:
 
 
 def is_comment(line: bytes) -> bool:
-    """Whether a line is empty or begins with `#`, after a byte order mark or not."""
+    """Return whether a line is empty or begins with `#`, byte order mark allowed."""
     return line.lstrip(_SPACE)[:1] in {b"", b"#"}
 
 
 def lines_of(blocks: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield the lines of a text without their ends; what a file without line ends holds comes in pieces.
+    """Yield lines without their ends; text without line ends comes in pieces.
 
     Args:
-        blocks: of the text, cut anywhere.
+        blocks: cut anywhere.
     """
     left = b""
     for block in blocks:
@@ -95,7 +95,7 @@ _SPACE = b" \t\r\v\f\xef\xbb\xbf"
 
 
 def decode(data: bytes, file: str, faults: list[Problem]) -> str | None:
-    """Return the UTF-8 text of `data`, or None with the place of the first bad byte added to `faults`."""
+    """Return `data` as UTF-8 text, or None with the first bad byte's place in `faults`."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -108,7 +108,7 @@ def decode(data: bytes, file: str, faults: list[Problem]) -> str | None:
 
 
 def shortened(text: str) -> str:
-    """Text as it is quoted in a message: of a long one its beginning."""
+    """Return a text shortened for a message."""
     return text if len(text) <= LONGEST_QUOTED else f"{text[:LONGEST_QUOTED]}…"
 
 

@@ -1,4 +1,4 @@
-"""Physics of one's own on a table: classes of Python files that derive from a contract which the caller names."""
+"""Own physics on a table: classes of Python files that derive from the caller's contract."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ CONTRACT = "see `Physics of your own` in docs/mismatch.md"
 
 
 def own_table_sources(files: Sequence[Path], base: type[_Contract]) -> list[_Contract]:
-    """Instances of all classes of Python files that derive from a contract.
+    """Return instances of all classes that derive from a contract.
 
     Raises:
-        InputError: every fault of every file: not there, not Python, no such class in it, something that the contract asks for
-            and that is not there, a name that another one has.
+        InputError: every fault: a file missing, not Python or without such a class, a missing requirement, a taken name.
     """
     return own_instances(files, base, CONTRACT, ("name", "needs", "texts"))

@@ -1,1 +1,1 @@
-"""One file per format of a file that people write or exchange, each with its schema."""
+"""One file with a schema per file format."""

@@ -81,12 +81,12 @@ class BarFile(Schema):
 
     @property
     def uncertainty_mm(self) -> float:
-        """Standard uncertainty of what the bar reads less the true distance: calibrator and mean reading [mm]."""
+        """Return the standard uncertainty of reading less true distance: calibrator and mean reading [mm]."""
         return 1e-3 * math.hypot(self.calibrator.uncertainty_um, self.readings.uncertainty_um)
 
     @property
     def misread(self) -> str:
-        """What is wrong with the reading, as a sentence without a remedy; empty where it can be one of this calibrator."""
+        """Return what is wrong with the reading, a sentence; empty if plausible."""
         if 1e3 * abs(self.readings.mean_mm - self.length_mm) <= LARGEST_OFF_UM:
             return ""
         return f"the bar read {self.readings.mean_mm:g} mm on a calibrator of {self.length_mm:g} mm"
@@ -95,7 +95,7 @@ class BarFile(Schema):
         """Return the bar as a session notes it.
 
         Args:
-            stroke_mm: travel of its gauge, as the instrument file states it [mm]; None where it states none.
+            stroke_mm: travel of its gauge by the instrument file; None if not stated.
         """
         return Bar(
             serial_number=self.serial_number,
@@ -112,7 +112,7 @@ class BarFile(Schema):
 
 
 def parse_bar(path: Path, faults: list[Problem]) -> BarFile | None:
-    """Read the calibration of a bar; None with every fault added to `faults`."""
+    """Read the calibration of a bar; None with faults added to `faults`."""
     document = read_document(path, BarFile, faults)
     bar = None if document is None else validate(document, BarFile, faults)
     if document is None or bar is None:
@@ -127,7 +127,7 @@ def read_bar(path: Path) -> BarFile:
     """Read the calibration of a bar.
 
     Raises:
-        InputError: every fault of the file with its place.
+        InputError: every fault with its place.
     """
     faults: list[Problem] = []
     bar = parse_bar(path, faults)

@@ -1,4 +1,4 @@
-"""Every YAML format with its schema, and the JSON Schema that editors and other programs take."""
+"""Every YAML format with its schema and JSON Schema."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _NEW
 
 
 def json_schema(name: str) -> dict[str, object]:
-    """Return the JSON Schema of a format, units and plausible ranges included.
+    """Return the JSON Schema of a format, with units and plausible ranges.
 
     Args:
-        name: with any version that is read; a schema has the keys of all of them.
+        name: with any version that is read.
 
     Raises:
         KeyError: no format has this name.

@@ -24,7 +24,7 @@ _OF_THE_CMM = ("bore", "holder", "uncertainty_um")
 
 
 def _spaced(bores: dict[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
-    """Refuse bores closer than any ball holder is wide: coordinates in metres, or one bore under two numbers."""
+    """Refuse bores closer than any holder is wide: metres, or one bore twice."""
     names = list(bores)
     for place, bore in enumerate(names):
         for other in names[:place]:
@@ -92,7 +92,7 @@ class JigFile(Schema):
 
 
 def parse_jig(path: Path, faults: list[Problem]) -> JigFile | None:
-    """Read a jig file; None with every fault added to `faults`."""
+    """Read a jig file; None with faults added to `faults`."""
     document = read_document(path, JigFile, faults)
     if document is None:
         return None
@@ -102,11 +102,11 @@ def parse_jig(path: Path, faults: list[Problem]) -> JigFile | None:
 
 
 def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Problem]) -> None:  # noqa: ANN401
-    """Check what balls say of bores and holders, on the raw data: other faults must not hide these.
+    """Check bores and holders of balls on the raw data, so that other faults hide nothing.
 
     Args:
-        jig: the mapping with the bores; None where there is no plate.
-        holders: the mapping of holders, or their names.
+        jig: mapping with the bores; None without a plate.
+        holders: mapping, or names.
     """
     bores = _plain_bores(jig)
     for location, ball in document.entries("balls"):
@@ -138,7 +138,6 @@ def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Pro
 
 
 def _check_placed(document: YamlDocument, location: Location, ball: dict[Any, Any], faults: list[Problem]) -> None:
-    """Check that a ball says what is known of its place, and nothing that nobody can know."""
     if ball.get("placed") == UNDER_SPINDLE:
         for key in _OF_THE_CMM:
             if ball.get(key) is not None:
@@ -167,7 +166,7 @@ def read_jig(path: Path) -> JigFile:
     """Read a jig file.
 
     Raises:
-        InputError: every fault of the file with its place.
+        InputError: every fault with its place.
     """
     faults: list[Problem] = []
     jig = parse_jig(path, faults)
@@ -177,7 +176,7 @@ def read_jig(path: Path) -> JigFile:
 
 
 def jig_text(jig: JigFile) -> str:
-    """Return the text of a jig file, balls of the usual kind without saying so."""
+    """Return the text of a jig file."""
     balls = {
         name: {key: value for key, value in ball.model_dump(exclude_none=True).items() if (key, value) != _USUAL}
         for name, ball in jig.balls.items()
@@ -189,13 +188,13 @@ _USUAL = ("placed", BY_CMM)
 
 
 def checked_jig(text: str, file: str) -> JigFile:
-    """Return the jig that a text holds, checked as a file is.
+    """Return the checked jig of a text.
 
     Args:
-        file: to name in messages: what the text was made from.
+        file: source of the text, for messages.
 
     Raises:
-        InputError: everything that no jig file may say.
+        InputError: whatever a jig file must not hold.
     """
     faults: list[Problem] = []
     document = parse_yaml(text, file, faults)

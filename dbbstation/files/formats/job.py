@@ -61,7 +61,7 @@ def read_job(path: Path) -> JobFile:
     """Read a job.
 
     Raises:
-        InputError: every fault of it and of the files that it names.
+        InputError: every fault of it and its files.
     """
     faults: list[Problem] = []
     job = parse_job(path, faults)
@@ -71,7 +71,7 @@ def read_job(path: Path) -> JobFile:
 
 
 def parse_job(path: Path, faults: list[Problem]) -> JobFile | None:
-    """Read a job and the files that it names; None where it is none. Faults are added to `faults`."""
+    """Read a job and its files; None with faults added to `faults`."""
     document = read_document(path, JobFile, faults)
     job = None if document is None else validate(document, JobFile, faults)
     if document is None or job is None:

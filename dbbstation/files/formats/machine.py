@@ -25,7 +25,7 @@ _UNIT_WITHIN = 0.01
 
 
 def _direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Refuse what is no unit vector: a point in mm, or three zeros."""
+    """Refuse what is no unit vector."""
     length = math.hypot(*vector)
     if abs(length - 1.0) > _UNIT_WITHIN:
         raise PydanticCustomError(
@@ -170,7 +170,7 @@ class MachineParts(Schema):
 
 
 def machine_parts(machine: Machine) -> MachineParts:
-    """Return a machine as files hold it; the inverse of `MachineParts.to_domain`, exact to the last digit."""
+    """Return a machine as files hold it, the exact inverse of `MachineParts.to_domain`."""
 
     def points(joints: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
         return tuple(tuple(joint) for joint in joints.tolist())
@@ -204,7 +204,7 @@ def machine_text(machine: Machine) -> str:
 
 
 def machine_data(parts: MachineParts) -> dict[str, object]:
-    """Return the keys of a machine in the order of the format, those without a value left out."""
+    """Return the keys of a machine in the format's order, without empty ones."""
     return parts.model_dump(exclude_none=True, exclude={"format"})
 
 
@@ -219,7 +219,7 @@ def read_machine(path: Path) -> Machine:
     """Read a machine file.
 
     Raises:
-        InputError: every fault of the file with its place.
+        InputError: every fault with its place.
     """
     faults: list[Problem] = []
     parts = parse_machine(path, faults)
@@ -229,6 +229,6 @@ def read_machine(path: Path) -> Machine:
 
 
 def parse_machine(path: Path, faults: list[Problem]) -> MachineFile | None:
-    """Read a machine file; None with every fault added to `faults`."""
+    """Read a machine file; None with faults added to `faults`."""
     document = read_document(path, MachineFile, faults)
     return None if document is None else validate(document, MachineFile, faults)

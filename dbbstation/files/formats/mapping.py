@@ -58,7 +58,7 @@ _SEPARATORS = {name: sign for sign, name in SEPARATORS.items()}
 
 
 def in_run_units(meaning: str, unit: str) -> tuple[float, float]:
-    """Return factor and offset from a unit to that of a run file: `value * factor + offset`."""
+    """Return factor and offset to the unit of a run file: `value * factor + offset`."""
     return UNITS[meaning][unit], _OFFSETS.get(unit, 0.0)
 
 
@@ -173,7 +173,7 @@ class MappingFile(Schema):
 
     @property
     def numbers(self) -> NumberLanguage | None:
-        """How numbers are written; None where the mapping does not say."""
+        """Return how numbers are written; None if not stated."""
         if self.separator is None and self.decimal is None:
             return None
         decimal = self.decimal or PLAIN.decimal
@@ -181,7 +181,7 @@ class MappingFile(Schema):
         return NumberLanguage(decimal, usual if self.separator is None else _SEPARATORS[self.separator])
 
     def column(self, meaning: str) -> str | None:
-        """Return the name of the column with a meaning; None where there is none."""
+        """Return the column with a meaning, or None."""
         return next((name for name, column in self.columns.items() if column.means == meaning), None)
 
 
@@ -195,7 +195,7 @@ def read_mapping(path: Path) -> MappingFile:
     """Read a mapping.
 
     Raises:
-        InputError: every fault of the file with its place.
+        InputError: every fault with its place.
     """
     faults: list[Problem] = []
     mapping = parse_mapping(path, faults)

@@ -1,4 +1,4 @@
-"""Reading and writing identified models."""
+"""Read and write identified models."""
 
 from __future__ import annotations
 
@@ -46,12 +46,11 @@ def read_model(
     """Read a model.
 
     Args:
-        path: of the file.
-        sources: error sources that may stand in it. None: those of the package and of installed ones. Sources of one's own:
-            these beside them, and in place of one of the same name. A mapping by name: these alone.
+        sources: None: those of package and installed ones. A sequence: these beside them, replacing equal names. A mapping: these
+            alone.
 
     Raises:
-        InputError: every fault of the file with its place; an installed package whose sources cannot be used.
+        InputError: every fault with its place; an installed source that cannot be used.
         ModelError: two of the sources have one name.
     """
     faults: list[Problem] = []
@@ -73,7 +72,7 @@ def _by_name(sources: Mapping[str, ErrorSource] | Iterable[ErrorSource] | None) 
 
 
 def parse_model(path: Path, known: Mapping[str, ErrorSource], faults: list[Problem]) -> IdentifiedModel | None:
-    """Read a model; None with every fault added to `faults`."""
+    """Read a model; None with faults added to `faults`."""
     document = read_document(path, ModelFile, faults)
     file = None if document is None else validate(document, ModelFile, faults)
     if document is None or file is None:
@@ -172,7 +171,7 @@ class _Sources:
         return Fitted(source, values, shared)
 
     def _check_value(self, location: Location, source: ErrorSource, parameter: Parameter, value: float) -> None:
-        """Add a fault for a value that no machine has: it would be compensated."""
+        """Add a fault for a value that no machine has."""
         size = Quantity(parameter.unit, 0.0, parameter.largest, signed=True)
         if not size.fits(value):
             what = f"{source.name} {parameter.name}: {value:g} {parameter.unit} is not plausible, expected {size.range}"
@@ -214,7 +213,7 @@ def _check_lengths(document: YamlDocument, file: ModelFile, faults: list[Problem
 
 
 def covariance_fault(covariance: NDArray[np.float64]) -> str | None:
-    """Say why a matrix, shape (k, k), is no covariance; None where it is one."""
+    """Return why a matrix, shape (k, k), is no covariance, or None."""
     variance = np.diag(covariance)
     if (variance < 0).any():
         return f"the variance in row {int(np.argmax(variance < 0)) + 1} is negative"
@@ -236,18 +235,18 @@ def covariance_fault(covariance: NDArray[np.float64]) -> str | None:
 def write_model(
     path: Path, model: IdentifiedModel, *, provenance: Provenance | None = None, force: bool = False
 ) -> None:
-    """Write a model, every number exact to the last digit, with where it comes from.
+    """Write a model exactly, with its provenance.
 
     Raises:
         OutputError: the file exists and `force` is not given, or it cannot be written.
-        ValueError: the model could not be read back: its covariance is none, or does not fit its rows.
+        ValueError: its covariance is none, or does not fit its rows.
     """
     refuse_existing(path, force=force)
     write_text(path, model_text(model, provenance), force=force)
 
 
 def model_text(model: IdentifiedModel, provenance: Provenance | None = None) -> str:
-    """Return a model as the text of its file, with where it comes from.
+    """Return a model's file text, with its provenance.
 
     Raises:
         ValueError: as `write_model`.
@@ -299,7 +298,7 @@ def _source_data(fitted: Fitted, machine: Machine) -> dict[str, object]:
 
 
 def _lists(value: Any) -> Any:  # noqa: ANN401 - what fits report is theirs
-    """Return the report with lists as they were written: reading makes tuples of all sequences."""
+    """Return the report with lists as written, not tuples."""
     if isinstance(value, dict):
         return {key: _lists(item) for key, item in value.items()}
     return [_lists(item) for item in value] if isinstance(value, tuple) else value

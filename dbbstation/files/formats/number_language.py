@@ -1,4 +1,4 @@
-"""How numbers are written in tables from elsewhere: decimal sign, and what stands between columns."""
+"""How tables write numbers: decimal sign and separator of columns."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number with a dot as decimal sign; spaces may stand around it."""
+    """Return whether a text is a number with a decimal point; spaces may surround it."""
     return _NUMBER.fullmatch(text.strip(" \t")) is not None
 
 
 @dataclass(frozen=True)
 class NumberLanguage:
-    """Decimal sign and separator of columns. There is no sign between thousands: `1.000` would have two meanings.
+    """Decimal sign and separator of columns, without signs between thousands.
 
     Raises:
-        InputError: both are commas: no reader could tell them apart.
+        InputError: both are commas.
     """
 
     decimal: str = "."
@@ -41,14 +41,14 @@ class NumberLanguage:
             )
 
     def number(self, cell: str) -> float:
-        """Return the number that a cell holds; not a number where it is none, or is written with the other sign."""
+        """Return the number of a cell, or nan."""
         other = next(sign for sign in DECIMALS if sign != self.decimal)
         plain = cell.replace(self.decimal, ".")
         return math.nan if other in cell or not is_number(plain) else float(plain)
 
     @property
     def text(self) -> str:
-        """What is expected, in words."""
+        """Return the expectation in words."""
         sign = "a comma" if self.decimal == "," else "a dot"
         return f"the decimal sign is {sign}, columns are separated by a {SEPARATORS[self.separator]}"
 

@@ -137,18 +137,18 @@ class PlanFile(Schema):
 
 @dataclass(frozen=True)
 class InlinePlan:
-    """A plan with its jig inline, whatever files it came from.
+    """A plan with its jig inline.
 
     Attributes:
-        plan: as the file has it; its `jig` is no path any more.
-        jig: the plate; one without bores where the plan has none.
+        plan: as the file, without the jig's path.
+        jig: without bores if the plan has no plate.
     """
 
     plan: PlanFile
     jig: JigSchema
 
     def to_domain(self) -> Plan:
-        """Return the plan that calculations use: balls in the machine frame, every circle complete."""
+        """Return the plan for calculations: balls in the machine frame, every circle complete."""
         balls = {name: self._ball(name, ball) for name, ball in self.plan.balls.items()}
         tests = {test.name: _planned(test, balls[test.ball], self.plan.path) for test in self.plan.tests}
         limit = self.plan.largest_loss_percent
@@ -173,12 +173,12 @@ class InlinePlan:
 
 
 def plan_text(plan: InlinePlan) -> str:
-    """Return the text of a plan's file, the jig inline."""
+    """Return the text of a plan's file, jig inline."""
     return yaml_text(plan_data(plan))
 
 
 def plan_data(plan: InlinePlan) -> dict[str, object]:
-    """Return a plan as its file holds it, the jig inline."""
+    """Return a plan as its file holds it, jig inline."""
     data = plan.plan.model_dump(exclude_none=True)
     for ball in data["balls"].values():
         if ball["placed"] != UNDER_SPINDLE:
@@ -207,19 +207,19 @@ def _planned(test: TestSchema, ball: Ball, general: PathSchema) -> PlannedTest:
 
 
 def read_plan(path: Path) -> Plan:
-    """Read a test plan and the jig file that it names.
+    """Read a test plan and its jig file.
 
     Raises:
-        InputError: every fault of both files with its place.
+        InputError: every fault of both with its place.
     """
     return read_inline_plan(path).to_domain()
 
 
 def read_inline_plan(path: Path) -> InlinePlan:
-    """Read a test plan with the jig file that it names put into it.
+    """Read a test plan and put its jig file into it.
 
     Raises:
-        InputError: every fault of both files with its place.
+        InputError: every fault of both with its place.
     """
     faults: list[Problem] = []
     plan = parse_plan(path, faults)
@@ -229,7 +229,7 @@ def read_inline_plan(path: Path) -> InlinePlan:
 
 
 def parse_plan(path: Path, faults: list[Problem]) -> InlinePlan | None:
-    """Read a test plan; None with every fault added to `faults`."""
+    """Read a test plan; None with faults added to `faults`."""
     document = read_document(path, PlanFile, faults)
     if document is None:
         return None
@@ -267,7 +267,7 @@ def _merged(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) 
 
 
 def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem]) -> None:
-    """Check what tests say of balls and of each other, on the raw data: other faults must not hide these."""
+    """Check tests against balls and each other on the raw data, so that other faults hide nothing."""
     tests = document.entries("tests")
     names = [test.get("name") for _, test in tests]
     for index in twice(names):
@@ -289,9 +289,9 @@ def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem])
 
 
 def _check_under_spindle(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) -> None:
-    """Refuse a ball that is put up under the spindle at one tilt and measured at another.
+    """Refuse a ball set up under the spindle at one tilt and measured at another.
 
-    Errors of the machine lie between the two; what a micrometer reads against the spindle holds for one tilt alone.
+    A micrometer reading against the spindle holds for one tilt.
     """
     balls = document.entries("balls")
     under = {location[-1] for location, ball in balls if ball.get("placed") == UNDER_SPINDLE}
@@ -310,7 +310,7 @@ def _check_under_spindle(document: YamlDocument, jig: JigFile | None, faults: li
 
 
 def _check_tilt_unit(document: YamlDocument, faults: list[Problem]) -> None:
-    """Refuse a plan in radians: single small tilts are possible, a plan of nothing else is not."""
+    """Refuse a plan whose tilts are all in radians."""
     tilts = [
         ((*location, key), test[key])
         for location, test in document.entries("tests")

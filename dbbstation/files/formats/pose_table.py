@@ -1,4 +1,4 @@
-"""Tables of poses as CSV: `x_mm,y_mm,z_mm,a_deg,b_deg,c_deg`, further columns kept as they are."""
+"""CSV tables of poses: `x_mm,y_mm,z_mm,a_deg,b_deg,c_deg`; further columns are kept."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class PoseTable:
 
     Attributes:
         poses: shape (n, 6) [mm, deg].
-        others: texts of further columns by name, kept for the output.
+        others: texts of further columns by name.
     """
 
     poses: NDArray[np.float64]
@@ -101,16 +101,16 @@ def write_poses(
     warning: str = "",
     force: bool = False,
 ) -> None:
-    """Write poses with their standard uncertainties and further columns, and beside the table where it comes from.
+    """Write poses with uncertainties and further columns, and a provenance file beside them.
 
     Args:
         poses: shape (n, 6) [mm, deg].
-        uncertainty_mm: of X, Y and Z, shape (n, 3) [mm]; NaN, and then an empty cell, where not known.
+        uncertainty_mm: of X, Y and Z, shape (n, 3); NaN, written as an empty cell, if not known.
         others: texts of further columns by name.
-        warning: what speaks against the model; empty for nothing.
+        warning: objection to the model, or empty.
 
     Raises:
-        OutputError: the file exists and `force` is not given, or it cannot be written.
+        OutputError: the file exists without `force`, or cannot be written.
     """
     own = (*UNCERTAINTY_COLUMNS, REASON_COLUMN, *([WARNING_COLUMN] if warning else []))
     kept = {name: cells for name, cells in others.items() if name not in {*own, WARNING_COLUMN}}

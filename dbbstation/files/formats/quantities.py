@@ -1,4 +1,4 @@
-"""Numbers with a unit, as the schemas use them: a plausible range tells a number in the wrong unit from a right one."""
+"""Numbers with a unit for schemas; a plausible range detects the wrong unit."""
 
 import math
 from collections.abc import Iterable
@@ -27,9 +27,8 @@ class Quantity:
     """A number in a unit, plausible between two sizes.
 
     Attributes:
-        least: smallest plausible value, or size where `signed`.
-        most: greatest plausible value, or size where `signed`.
-        signed: the range holds for the absolute value.
+        least: smallest plausible value, absolute if `signed`.
+        most: greatest plausible value, absolute if `signed`.
     """
 
     unit: str
@@ -47,7 +46,7 @@ class Quantity:
         """Return the value.
 
         Raises:
-            PydanticCustomError: it is not plausible; says what range is, and which unit it looks like.
+            PydanticCustomError: it is not plausible; names the range and the likely unit.
         """
         if self.fits(value):
             return value
@@ -58,7 +57,7 @@ class Quantity:
         )
 
     def guess(self, value: float) -> str:
-        """Say which other unit a value looks like; empty where none."""
+        """Return the unit that a value looks like, or an empty text."""
         for unit, factor in _MISTAKEN.get(self.unit, ()):
             if self.fits(value * factor):
                 return f" (it looks like {unit})"
@@ -68,7 +67,7 @@ class Quantity:
 
     @property
     def range(self) -> str:
-        """The plausible sizes as text."""
+        """Return the plausible sizes as text."""
         sizes = f"{self.least:g} to {self.most:g}"
         if self.signed:
             sizes = f"±({sizes})" if self.least else f"-{self.most:g} to {self.most:g}"
@@ -90,7 +89,7 @@ Point = tuple[Coordinate, Coordinate, Coordinate]
 
 @dataclass(frozen=True)
 class Reach:
-    """How far from the origin a point plausibly lies: catches points in metres, whose coordinates alone say nothing."""
+    """Greatest plausible distance of a point from the origin; it detects metres."""
 
     distance: Quantity
 
@@ -113,7 +112,7 @@ class Reach:
 
 @dataclass(frozen=True)
 class Rising:
-    """A pair of limits: the second above the first, by a plausible amount."""
+    """A pair of limits, the second above the first by a plausible amount."""
 
     span: Quantity
 
@@ -143,7 +142,7 @@ ExpansionUmMK = Annotated[float, Quantity("µm/(m K)", 0.01, 50, or_zero=True)]
 
 
 def twice(values: Iterable[Any]) -> list[int]:
-    """Indices of values that stood earlier already; mappings, and lists that hold some, are not compared."""
+    """Return indices of values that occurred earlier; mappings are not compared."""
     seen: set[Any] = set()
     again = []
     for index, value in enumerate(values):

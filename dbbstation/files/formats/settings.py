@@ -1,4 +1,4 @@
-"""The shop's settings: where their files are, what they say, and which line each value comes from."""
+"""The shop's settings, each with its file and line."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Setting:
     """One value.
 
     Attributes:
-        line: in that file, from 1.
+        line: from 1.
     """
 
     value: Any
@@ -45,18 +45,18 @@ class Setting:
 
     @property
     def origin(self) -> str:
-        """File and line that it comes from, with a colon between."""
+        """Return file and line, with a colon between."""
         return f"{self.file}:{self.line}"
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What holds, from several files.
+    """Values in force, from several files.
 
     Attributes:
-        values: by key with dots, such as `limits.largest_correction_mm`; a key that no file has is absent.
-        tolerances_from: where these come from, `file:line`; empty where no file has any.
-        files: that were read, the strongest first.
+        values: by dotted key, such as `limits.largest_correction_mm`; absent if not stated.
+        tolerances_from: `file:line`; empty if no file states them.
+        files: the strongest first.
     """
 
     values: Mapping[str, Setting] = field(default_factory=dict)
@@ -66,7 +66,7 @@ class Settings:
 
 
 def settings_files(beside: Path) -> list[Path]:
-    """Return the settings files that exist, the strongest first: the one in the folder `beside`, the user's."""
+    """Return existing settings files, the strongest first: that in `beside`, then the user's."""
     import platformdirs  # noqa: PLC0415 - only commands that take settings look for them
 
     user = platformdirs.user_config_path("dbbstation", appauthor=False, roaming=True) / OF_USER
@@ -74,10 +74,10 @@ def settings_files(beside: Path) -> list[Path]:
 
 
 def read_settings(files: Iterable[Path]) -> Settings:
-    """Read settings files; a value of an earlier file holds over that of a later one.
+    """Read settings files; earlier ones override later ones.
 
     Raises:
-        InputError: every fault of every file with its place.
+        InputError: every fault with its place.
     """
     paths, faults = tuple(files), list[Problem]()
     if not paths:
@@ -116,7 +116,7 @@ def _read(path: Path, faults: list[Problem]) -> tuple[SettingsFile, YamlDocument
 
 
 def _flat(file: SettingsFile, path: Path) -> Iterable[tuple[str, Any]]:
-    """Values by key with dots; the path of a protocol file from the folder of the settings."""
+    """Return values by dotted key, with the protocol's path from the settings' folder."""
     data = file.model_dump(exclude_unset=True, exclude_none=True, exclude={"format", "tolerances"})
     for key, value in data.items():
         if isinstance(value, dict):

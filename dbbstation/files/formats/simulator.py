@@ -128,7 +128,7 @@ class SimulatorFile(Schema):
 
 
 def parse_simulator(path: Path, faults: list[Problem]) -> SimulatorFile | None:
-    """Read a simulator's file and look through its Python file, which is not executed; None with every fault added to `faults`."""
+    """Read a simulator's file and inspect, but do not run, its Python; None with faults added to `faults`."""
     document = read_document(path, SimulatorFile, faults)
     found = None if document is None else validate(document, SimulatorFile, faults)
     if document is None or found is None:
@@ -145,7 +145,7 @@ def read_simulator(path: Path) -> SimulatorFile:
     """Read a simulator's file.
 
     Raises:
-        InputError: every fault of the file and of its Python file, with its place.
+        InputError: every fault of both files with its place.
     """
     faults: list[Problem] = []
     found = parse_simulator(path, faults)
@@ -186,7 +186,7 @@ def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, pyth
 
 
 def _arguments(tree: ast.AST, source: str, faults: list[Problem]) -> list[str]:
-    """Names of the arguments of `simulate` in the only simulator of a file; none with the fault added."""
+    """Return the argument names of the only `simulate`; none with a fault added."""
     classes = [
         n for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and any(_last(base) == BASE for base in n.bases)
     ]
@@ -207,7 +207,7 @@ def _arguments(tree: ast.AST, source: str, faults: list[Problem]) -> list[str]:
 
 
 def _called(tree: ast.AST, ports: str) -> dict[str, int]:
-    """Attributes of an argument, each with the line where it first stands."""
+    """Return attributes of an argument with the lines of their first use."""
     found: dict[str, int] = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == ports:
@@ -216,7 +216,7 @@ def _called(tree: ast.AST, ports: str) -> dict[str, int]:
 
 
 def _computed(tree: ast.AST, ports: str) -> bool:
-    """Whether ports are handed on or looked up by a name that is worked out: then nobody can say which are called."""
+    """Return whether ports are passed on or looked up by computed names."""
     plain = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)}
     return any(isinstance(n, ast.Name) and n.id == ports and id(n) not in plain for n in ast.walk(tree))
 

@@ -1,4 +1,4 @@
-"""What stands where the name of a port stands, and means a virtual machine in this program."""
+"""Port names that mean a virtual machine in this program."""
 
 import re
 
@@ -10,16 +10,16 @@ _NAMED = re.compile(rf"{_NAME}(?:, ([0-9]+(?:\.[0-9]+)?) times faster)?")
 
 
 def virtual_port(time_scale: float = 1.0) -> str:
-    """Return what stands where a real session has the name of a port.
+    """Return the port name of a virtual machine.
 
     Args:
-        time_scale: how much faster than real time the virtual machine goes.
+        time_scale: speed relative to real time.
     """
     return _NAME if time_scale == 1.0 else f"{_NAME}, {time_scale:g} times faster"
 
 
 def time_scale_of(port: str) -> float | None:
-    """Return how much faster than real time the virtual machine of a port goes; None where it is the name of a real port."""
+    """Return the virtual machine's speed relative to real time; None for a real port."""
     named = _NAMED.fullmatch(port)
     if named is None:
         return None
@@ -28,5 +28,5 @@ def time_scale_of(port: str) -> float | None:
 
 
 def misspelt(port: str) -> bool:
-    """Whether a name begins like that of a virtual machine and is none: no system calls a port so."""
+    """Return whether a name begins like a virtual machine's and is none."""
     return port.strip().lower().startswith("virtual") and time_scale_of(port) is None

@@ -1,1 +1,1 @@
-"""What is recorded: run files with their journal, the session folder, recordings of one drive."""
+"""Run files with their journal, session folders, recordings of drives."""

@@ -1,4 +1,4 @@
-"""Changing on purpose what was sealed: the former file is kept, and the session says what was changed, when and why."""
+"""Change on purpose what was sealed: the former file is kept, and the session notes the change."""
 
 from __future__ import annotations
 
@@ -41,17 +41,17 @@ if TYPE_CHECKING:
 def amend(
     folder: Path, reason: str, *, made: datetime, plan: Path | None = None, machine: Path | None = None
 ) -> tuple[Amendment, ...]:
-    """Take a session as it stands now, with another plan or machine where they are given, and note why.
+    """Accept a session as it is now, with another plan or machine if given, and note why.
 
     Args:
-        made: the time of day with its zone.
-        plan: file that takes the place of the session's plan, with its jig put into it; None: the one that is there.
+        made: with its zone.
+        plan: replaces the session's plan, jig inlined; None: unchanged.
 
     Returns:
         What was changed.
 
     Raises:
-        InputError: no session, faults of the new files, runs that the new plan has not, no seal, or nothing has changed.
+        InputError: no session, faults of the new files, runs missing in the new plan, no seal, or no change.
         OutputError: another process writes into the session, or the disk refuses.
     """
     _whole(folder, plan, machine)  # no lock is left in what is no session
@@ -96,7 +96,7 @@ def amend(
 def _logged_otherwise(
     folder: Path, store: SessionStore, session: SessionFolder, reason: str, made: datetime
 ) -> list[Amendment]:
-    """Take the session file as it stands where its event log says otherwise; what either was is kept."""
+    """Accept the session file against its event log; both former states are kept."""
     log = read_event_log(folder, [])
     stands = standing(store.data, log)
     if stands.stands is not Stands.UNLIKE:
@@ -120,7 +120,7 @@ def _copied(folder: Path, name: str, sha256: str) -> str:
 
 
 def _whole(folder: Path, plan: Path | None, machine: Path | None) -> tuple[SessionFolder, Seal]:
-    """The session with the new files in place of its own, and its seal, whatever has changed since."""
+    """Return the session with the new files, and its seal."""
     faults: list[Problem] = []
     instead = {key: path for key, path in (("plan", plan), ("machine", machine)) if path is not None}
     session = parse_session(folder, faults, as_sealed=False, instead=instead)
@@ -133,7 +133,7 @@ def _whole(folder: Path, plan: Path | None, machine: Path | None) -> tuple[Sessi
 
 
 def _kept(folder: Path, name: str, seal: Seal) -> str:
-    """Where a sealed file is kept as it was; empty where it is not."""
+    """Return where a sealed file is kept in its former state; empty if nowhere."""
     stored = seal.files.get(name, "")
     copy = copy_name(name, stored)
     return copy if stored and hashes(folder, (copy,)).get(copy) == stored else ""

@@ -1,4 +1,4 @@
-"""Anchors: the link of a session's last event, noted elsewhere, tells later whether anything was changed that stood there then."""
+"""Anchors: the link of a session's last event, noted elsewhere, reveals later changes."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ SHORTEST = 16
 
 
 def anchor_of(seal: Seal | None) -> str:
-    """Return the anchor of a session; of one without an event log the end of its chain of runs, empty where it has no seal."""
+    """Return a session's anchor: its last event, else the end of its chain of runs; empty without a seal."""
     return "" if seal is None else seal.anchor or seal.chain_sha256
 
 
 def links_of(folder: Path) -> tuple[str, ...]:
-    """Return every anchor that a session has ever had, as far as its files say."""
+    """Return every anchor that a session has had, by its files."""
     log = read_event_log(folder, [])
     document = load_yaml(folder / SESSION_FILE, [])
     runs = () if document is None else document.entries("runs")
@@ -33,10 +33,10 @@ def links_of(folder: Path) -> tuple[str, ...]:
 
 
 def anchor_told(folder: Path, anchor: str) -> Problem:
-    """Return what a noted anchor says of a session; with a remedy where the session is not what it was then.
+    """Return what a noted anchor proves about a session, with a remedy if it changed.
 
     Args:
-        anchor: as it was noted, `SHORTEST` digits or more of it.
+        anchor: at least `SHORTEST` digits.
     """
     log = read_event_log(folder, [])
     events = () if log is None else log.events

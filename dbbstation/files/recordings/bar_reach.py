@@ -1,4 +1,4 @@
-"""Whether the bar that was noted can be the one that ran the plan: its length, give or take its stroke."""
+"""Check that a bar's length and stroke can run the plan."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ if TYPE_CHECKING:
 
 
 def unlike_bar(length_mm: float, stroke_mm: float | None, plan: Plan) -> tuple[str, str] | None:
-    """Return what is wrong and what to do where tests of a plan need another bar; None where all can be run with this one.
+    """Return fault and remedy if tests need another bar, or None.
 
     Args:
-        length_mm: calibrated distance between the ball centres [mm].
-        stroke_mm: travel of the gauge either way [mm]; None where not known.
-        plan: whose tests state a bar length each.
+        length_mm: calibrated distance between the ball centres.
+        stroke_mm: travel of the gauge either way; None if not known.
     """
     stroke = USUAL_STROKE_MM if stroke_mm is None else stroke_mm
     out = {

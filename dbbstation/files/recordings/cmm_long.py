@@ -1,4 +1,4 @@
-"""Sheets with a row per coordinate, as Calypso and others write them: feature, axis, actual value; turned into a row per ball."""
+"""Sheets with a row per coordinate, as Calypso writes them, turned into a row per ball."""
 
 from __future__ import annotations
 
@@ -26,27 +26,23 @@ _AXIS_CELL = re.compile(
 
 
 def is_long(table: TableFile, columns: Mapping[str, str]) -> bool:
-    """Return whether a table has a row per coordinate: no columns of axes, but one that says the axis and one with values.
-
-    Args:
-        columns: names of columns by what they are, as typed.
-    """
+    """Return whether a table has a column of axes and one of values instead of x, y, z."""
     if {"x", "y"} & set(columns):
         return False
     return _axis_column(table, columns) is not None and _named(table, columns, "value", _VALUE) is not None
 
 
 def wide(table: TableFile, columns: Mapping[str, str], unit: str) -> tuple[TableFile, dict[str, str]]:
-    """Return the same with a row per ball, and which of its columns is what.
+    """Return the sheet with a row per ball, and its columns' roles.
 
     Rows of other characteristics, such as diameters, are left out.
 
     Args:
-        columns: names of columns by what they are, as typed: `ball`, `axis`, `value`, `unit`, `u`.
-        unit: of values where no column says it of each.
+        columns: names by role: `ball`, `axis`, `value`, `unit`, `u`.
+        unit: of values without a column of units.
 
     Raises:
-        InputError: a coordinate that is missing, comes twice, is no number, or is in a unit that is none.
+        InputError: a coordinate is missing, double, no number, or in no known unit.
     """
     axis_name, value_name = _axis_column(table, columns), _named(table, columns, "value", _VALUE)
     ball_name, unit_name = _named(table, columns, "ball", _BALL, but=axis_name), _named(table, columns, "unit", _UNIT)
@@ -75,7 +71,7 @@ def wide(table: TableFile, columns: Mapping[str, str], unit: str) -> tuple[Table
 
 
 class _Coordinate(NamedTuple):
-    """One coordinate of a ball: its line, its value in the sheet's unit, its uncertainty as the sheet has it."""
+    """One coordinate of a ball: line, value and uncertainty in the sheet's unit."""
 
     line: int
     value: float
@@ -85,7 +81,7 @@ class _Coordinate(NamedTuple):
 def _gathered(
     table: TableFile, names: Mapping[str, str | None], unit: str, faults: list[Problem]
 ) -> dict[str, dict[str, _Coordinate]]:
-    """Coordinates by ball and axis; `faults` grows by what is no number, in no unit, or comes twice."""
+    """Return coordinates by ball and axis; `faults` grows by bad or double ones."""
     balls: dict[str, dict[str, _Coordinate]] = {}
     for k, line in enumerate(table.lines.tolist()):
         of = {key: "" if name is None else table.cells[name][k] for key, name in names.items()}
@@ -115,7 +111,7 @@ def _gathered(
 
 
 def _axis(cell: str) -> str | None:
-    """Axis that a cell such as `X`, `X-Value` or `xValue` says; None where it says none."""
+    """Return the axis of a cell such as `X`, `X-Value` or `xValue`, or None."""
     found = _AXIS_CELL.fullmatch(cell.strip().strip('"'))
     return found[1].lower() if found else None
 

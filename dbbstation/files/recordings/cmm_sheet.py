@@ -1,4 +1,4 @@
-"""Sheets of a coordinate measuring machine: ball centres from CSV or DMIS, and the jig file that follows."""
+"""Ball centres from sheets of a coordinate measuring machine, CSV or DMIS, and the jig file made of them."""
 
 from __future__ import annotations
 
@@ -30,15 +30,14 @@ LENGTH_UNITS = tuple(UNITS[LENGTH])
 
 @dataclass(frozen=True)
 class Measured:
-    """One ball as a sheet has it.
+    """One ball of a sheet.
 
     Attributes:
-        name: as the sheet calls it; empty where it gives bore and holder only.
-        bore: that it stands in; None where the sheet does not say it.
-        holder: that it stands on; empty where the sheet does not say it.
-        centre_mm: x, y, z [mm]; z is NaN where the sheet has none.
-        uncertainty_um: one standard deviation per axis, root mean square of those of the axes [µm]; None where the sheet has
-            none.
+        name: empty if the sheet gives only bore and holder.
+        bore: None if not stated.
+        holder: empty if not stated.
+        centre_mm: x, y, z; z is NaN if not stated.
+        uncertainty_um: standard uncertainty per axis, root mean square over the axes; None if not stated.
     """
 
     name: str
@@ -58,14 +57,14 @@ def read_sheet(
     of_one_holder: bool = False,
     u_unit: str | None = None,
 ) -> list[Measured]:
-    """Read a sheet; DMIS by the ending of its name, else a table.
+    """Read a sheet: DMIS by its extension, else a table.
 
     Args:
-        columns: names of columns by what they are: `ball`, `bore`, `holder`, `x`, `y`, `z`, `u` or `ux`, `uy`, `uz`; of a sheet
-            with a row per coordinate also `axis`, `value` and `unit`; others by name.
-        unit: of a table's coordinates; None: as the sheet says, else mm.
-        of_one_holder: a bore alone says which ball a row is.
-        u_unit: of its uncertainties; None: as the sheet says, else that of coordinates.
+        columns: names by role: `ball`, `bore`, `holder`, `x`, `y`, `z`, `u` or `ux`, `uy`, `uz`; with a row per coordinate also
+            `axis`, `value`, `unit`.
+        unit: of coordinates; None: as the sheet states, else mm.
+        of_one_holder: a bore alone identifies a ball.
+        u_unit: of uncertainties; None: as the sheet states, else that of coordinates.
 
     Raises:
         InputError: every fault of the file.
@@ -124,15 +123,14 @@ def jig_of_sheet(
     uncertainty_um: float | None,
     cmm_temp_c: float | None,
 ) -> JigFile:
-    """Return a jig whose balls are those of a sheet; plate and holders stay as they are.
+    """Return a jig with the balls of a sheet; plate and holders stay.
 
     Args:
-        uncertainty_um: standard uncertainty of balls whose sheet states none [µm]; None: they are refused.
-        cmm_temp_c: of the plate while it was measured [degC]; None where nobody knows: the jig file says nothing of it then.
+        uncertainty_um: for balls without a stated one; None: refuse them.
+        cmm_temp_c: of the plate; None if not known.
 
     Raises:
-        InputError: a ball that the jig does not know and the sheet does not place, twice the same, no uncertainty, or whatever no
-            jig file may say, such as a ball that lies at another bore.
+        InputError: an unknown or double ball, no uncertainty, or whatever a jig file must not hold.
     """
     faults: list[Problem] = []
     balls: dict[str, BallSchema] = {}
@@ -171,7 +169,7 @@ _NAMES = {
 
 
 def _usual(key: str, table: TableFile) -> str | None:
-    """Column that is this by its name: `X`, `x_mm`, `U(x) [µm]` is not guessed."""
+    """Return the column of this role by its name, such as `X` or `x_mm`; `U(x) [µm]` is not guessed."""
     wanted = _NAMES.get(key, {key})
     names = [name for name in table.names if re.split(r"[\s_\[(]", name.strip().lower())[0] in wanted]
     # `U` and `u` are different things, and so is what another program means by them: they are named, not guessed.
@@ -208,7 +206,7 @@ def _unlike_a_cmm(one: Measured, file: str, unit: str) -> Problem:
 
 
 def _said_unit(name: str, units: Mapping[str, str]) -> str:
-    """Unit of a column: below its name, in brackets, or at its end; empty where nothing says it."""
+    """Return a column's unit: below its name, in brackets, or at its end; else empty."""
     for text in (units.get(name, ""), *re.findall(r"[\[(]\s*([^\])]*?)\s*[\])]", name), name.rpartition("_")[2]):
         plain = text.strip(" []()").lower().replace("μ", "µ")
         known = {"um": "µm", "in": "inch", "uinch": "µinch", "uin": "µinch"}.get(plain, plain)
@@ -238,7 +236,7 @@ def _row(
 
 
 def _known_name(one: Measured, jig: JigFile) -> str:
-    """Name of a ball in the jig: the same but for case and underscores, or the one in this bore on this holder."""
+    """Return the ball's name in the jig, ignoring case and underscores, or that of this bore on this holder."""
     plain = {name.lower().replace("_", "-"): name for name in jig.balls}
     if one.name:
         return plain.get(one.name.lower().replace("_", "-"), one.name)

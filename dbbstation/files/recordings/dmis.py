@@ -27,7 +27,7 @@ class DmisPoint:
     """One actual feature.
 
     Attributes:
-        centre_mm: x, y, z in the frame that is set where it stands [mm].
+        centre_mm: x, y, z in the frame set there.
     """
 
     name: str
@@ -39,7 +39,7 @@ def read_dmis(path: Path) -> list[DmisPoint]:
     """Read the actual spheres and points of a DMIS output.
 
     Raises:
-        InputError: it cannot be read, has none, no unit, polar coordinates, or sets another frame between two of them.
+        InputError: it cannot be read, has no features, no unit, polar coordinates, or several frames.
     """
     faults: list[Problem] = []
     data = read_bytes(path, faults, LARGEST_SHEET)
@@ -79,7 +79,7 @@ def _of_the_whole(found: list[DmisPoint], factor: float, file: str, faults: list
 
 
 def _statements(text: str) -> Iterator[tuple[int, str]]:
-    """Statements with the number of their first line: comments left out, lines joined that end in `$`."""
+    """Return statements with their first line number, comments removed, continued lines joined."""
     first, parts = 0, list[str]()
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.partition("$$")[0].strip()

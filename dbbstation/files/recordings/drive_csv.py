@@ -1,4 +1,4 @@
-"""Recordings of one drive: CSV with `t_s,position_mm` and `force_n` or `motor_current_a`, `#` lines are comments."""
+"""Recordings of one drive: CSV with `t_s,position_mm` and `force_n` or `motor_current_a`; `#` begins a comment."""
 
 from __future__ import annotations
 
@@ -32,14 +32,13 @@ MOST_FAULTS = 20
 
 @dataclass(frozen=True, eq=False)
 class DriveFile:
-    """A recording of a drive as its file has it.
+    """A drive's recording file.
 
     Attributes:
-        file: as named in messages.
-        line: number of the line that names the columns.
-        numbers: columns that this program knows, by name, each of shape (n,), in the unit of the name.
+        line: number of the header line.
+        numbers: known columns by name, each of shape (n,), in the unit of the name.
         others: texts of further columns by name.
-        warnings: what was found that does not spoil the recording.
+        warnings: findings that do not spoil it.
     """
 
     file: str
@@ -49,13 +48,13 @@ class DriveFile:
     warnings: tuple[Problem, ...]
 
     def recording(self, force_per_ampere_n: float | None = None) -> DriveRecording:
-        """Return the recording; the force is the column's, or the current's times a factor.
+        """Return the recording; force is a column, or current times a factor.
 
         Args:
-            force_per_ampere_n: force of the drive at 1 A, positive towards greater positions [N/A].
+            force_per_ampere_n: force at 1 A, positive towards greater positions [N/A].
 
         Raises:
-            InputError: there is no force, and no factor for the current.
+            InputError: neither force nor factor is given.
         """
         force = self.numbers.get(FORCE)
         if force is None or (force_per_ampere_n is not None and CURRENT in self.numbers):
@@ -68,7 +67,7 @@ class DriveFile:
 
 
 def looks_like_drive(path: Path) -> bool:
-    """Whether the first line that is no comment names a position and no bar length: what runs have."""
+    """Return whether the header has a position and no bar length."""
     try:
         head = first_line(path)
     except OSError:
@@ -81,7 +80,7 @@ def read_drive(path: Path) -> DriveFile:
     """Read a recording of a drive.
 
     Raises:
-        InputError: every missing column, and lines that cannot be used, with their number.
+        InputError: every missing column and unusable line.
     """
     faults: list[Problem] = []
     data = read_bytes(path, faults, LARGEST_TABLE)
@@ -152,7 +151,7 @@ def _check_names(names: list[str], file: str, line: int, faults: list[Problem]) 
 def _numbers(
     rows: list[tuple[int, str]], names: list[str], known: list[str], file: str, faults: list[Problem]
 ) -> dict[str, NDArray[np.float64]]:
-    """Known columns, shape (n,) each; whole by NumPy, line by line only to name what is wrong."""
+    """Return known columns, shape (n,) each; line by line only to name faults."""
     text = io.StringIO("\n".join(line for _, line in rows))
     places = [names.index(name) for name in known]
     try:
@@ -198,7 +197,7 @@ def _check_values(numbers: dict[str, NDArray[np.float64]], lines: list[int], fil
 
 
 def compared_csv(columns: Mapping[str, NDArray[np.float64]]) -> str:
-    """Columns of one length as CSV text, six significant digits."""
+    """Return columns of one length as CSV text, six significant digits."""
     out = io.StringIO()
     out.write(",".join(columns) + "\n")
     np.savetxt(out, np.column_stack(list(columns.values())), fmt="%.6g", delimiter=",")

@@ -1,4 +1,4 @@
-"""What a session says of one run, of the bar and of a program: its entries as the rest of the program takes them."""
+"""A session's entries of runs, bar and programs, as the rest of the program takes them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class CommandedProgram:
     """An NC program that was commanded.
 
     Attributes:
-        model_sha256: of the model that it was compensated with; empty where none.
+        model_sha256: model of its compensation; empty if none.
     """
 
     path: Path
@@ -46,10 +46,9 @@ class ReadBy:
     """What read the lengths of a session or a run.
 
     Attributes:
-        name: of the instrument, or of its protocol file.
-        profile: its variant; empty: the usual one.
-        port: name or URL of the port; empty where there is none.
-        virtual: whether machine and instrument are virtual.
+        name: of the instrument or its protocol file.
+        profile: empty: the usual one.
+        port: name or URL; empty if there is none.
     """
 
     name: str
@@ -59,24 +58,22 @@ class ReadBy:
 
     @property
     def text(self) -> str:
-        """The instrument in words: `heidenhain-nd281b at /dev/ttyUSB0`."""
+        """Return the instrument in words: `heidenhain-nd281b at /dev/ttyUSB0`."""
         name = f"{self.name} ({self.profile})" if self.profile else self.name
         return f"{name} at {self.port}" if self.port else name
 
 
 def read_by(instrument: InstrumentSchema | None) -> ReadBy | None:
-    """Return an instrument as the rest of the program takes it."""
+    """Return an instrument for the rest of the program."""
     return None if instrument is None else ReadBy(**instrument.model_dump())
 
 
 @dataclass(frozen=True)
 class Counts:
-    """What came over the line during a run, and what did not.
+    """What came over the line during a run.
 
     Attributes:
-        received: samples in the run file.
-        rejected: samples of the file that no calculation uses, by what the instrument said of them; and bytes that were no
-            sample, by what was wrong with them (`unreadable checksum`).
+        rejected: unused samples by the instrument's status, and unreadable bytes by fault (`unreadable checksum`).
     """
 
     received: int
@@ -85,23 +82,23 @@ class Counts:
 
     @property
     def text(self) -> str:
-        """The counts in words: `1200 received, 3 lost, 2 rejected (overrange 2)`."""
+        """Return the counts in words: `1200 received, 3 lost, 2 rejected (overrange 2)`."""
         reasons = ", ".join(f"{reason} {count}" for reason, count in self.rejected.items())
         told = f"{self.received} received, {self.lost} lost, {sum(self.rejected.values())} rejected"
         return f"{told} ({reasons})" if reasons else told
 
     def data(self) -> dict[str, object]:
-        """The counts as plain values."""
+        """Return the counts as plain values."""
         return {"received": self.received, "lost": self.lost, "rejected": dict(self.rejected)}
 
 
 @dataclass(frozen=True)
 class Note:
-    """What somebody noted while a session was measured.
+    """A note of somebody who measured.
 
     Attributes:
-        text: in their words; empty for a temperature alone.
-        ambient_temp_c: temperature of the shop then [degC]; None where it was not read.
+        text: empty for a temperature alone.
+        ambient_temp_c: of the shop; None if not read.
     """
 
     made: datetime
@@ -110,26 +107,24 @@ class Note:
 
 
 def note_entry(note: NoteSchema) -> Note:
-    """Return a note as the rest of the program takes it."""
+    """Return a note for the rest of the program."""
     return Note(datetime.fromisoformat(note.made), note.text, note.ambient_temp_c)
 
 
 @dataclass(frozen=True)
 class RunEntry:
-    """What the session says of one run.
+    """A session's entry of one run.
 
     Attributes:
-        direction: sense of travel.
-        repeat: counts the runs of this test and direction, from 1.
-        mounting: counts how often a ball was put up; None: one mounting per test.
-        state: how far it has come.
-        reason: why it was rejected, or accepted although its recording shows no circle; empty otherwise.
-        started: when the first sample was taken; None where not noted.
+        repeat: from 1.
+        mounting: number of the ball's set-up; None: one per test.
+        reason: of a rejection, or of accepting a run without a circle; else empty.
+        started: first sample; None if not noted.
         sha256: of its file; empty while recording.
-        program: what was commanded where it was not the plan's circle.
-        centre_mm: centre of the circle as programmed, machine frame (x, y, z) [mm]; None: as planned.
-        chain_sha256: its link in the chain of sealed runs; empty where it has none.
-        counts: samples received, rejected and lost; None where not noted.
+        program: None: the plan's circle.
+        centre_mm: as programmed, machine frame (x, y, z); None: as planned.
+        chain_sha256: link in the chain of sealed runs, or empty.
+        counts: None if not noted.
     """
 
     test: str
@@ -149,12 +144,12 @@ class RunEntry:
 
     @property
     def label(self) -> str:
-        """Name of the run in messages."""
+        """Return the name of the run for messages."""
         return f"{self.test} {self.direction} {self.repeat}"
 
 
 def run_entry(run: RunSchema, folder: Path) -> RunEntry:
-    """Return the entry of a run as the rest of the program takes it."""
+    """Return the entry of a run for the rest of the program."""
     return RunEntry(
         test=run.test,
         direction=Direction(run.direction),
@@ -178,7 +173,7 @@ def _program(program: ProgramSchema, folder: Path) -> CommandedProgram:
 
 
 def counts_in(header: Mapping[str, str]) -> Counts | None:
-    """Return the counts that a run file states in its `# key: value` lines; None where it states none."""
+    """Return the counts in a run file's `# key: value` lines, or None."""
     received, lost = count_in(header.get("received", "")), count_in(header.get("lost", ""))
     if received is None or lost is None:
         return None
@@ -188,11 +183,11 @@ def counts_in(header: Mapping[str, str]) -> Counts | None:
 
 
 def count_in(text: str) -> int | None:
-    """Return the whole number that a text is; None where it is none, or one that counts nothing."""
+    """Return a text's whole number from 0, or None."""
     return int(text) if re.fullmatch(r"[0-9]{1,12}", text) else None
 
 
 def bar_entry(bar: BarSchema) -> Bar:
-    """Return the bar of a session file as the rest of the program takes it."""
+    """Return the bar of a session file for the rest of the program."""
     moment = None if bar.calibrated is None else datetime.fromisoformat(bar.calibrated)
     return Bar(**{**bar.model_dump(), "calibrated": moment})

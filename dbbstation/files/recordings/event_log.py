@@ -46,10 +46,10 @@ class LoggedEvent:
 
     Attributes:
         what: in a word or two, such as `rejected`.
-        at: when; None where a whole session was made at once, such as a simulated one.
-        set_to: keys of the session file that took a value, None for those that were taken out.
-        runs: entries that took the place of those of the same test, direction and repeat, or came behind all others.
-        all_runs: the whole list, where it was put together otherwise; None where it was not.
+        at: None for a session made at once, such as a simulated one.
+        set_to: new values of session keys; None for removed ones.
+        runs: entries that replace those of the same test, direction and repeat, or follow all others.
+        all_runs: the whole list if it was rearranged, else None.
     """
 
     what: str
@@ -65,7 +65,7 @@ class EventLog:
     """The log as it was read.
 
     Attributes:
-        events: the lines up to the first that is not as it was written.
+        events: up to the first damaged line.
         end: bytes of these lines.
         size: bytes of the file.
     """
@@ -81,7 +81,7 @@ class EventLog:
         return tuple(event.link for event in self.events)
 
     def state(self, count: int | None = None) -> dict[str, object]:
-        """Return what the session file says after the first `count` events; None: after all."""
+        """Return the session's state after `count` events; None: after all."""
         state: dict[str, object] = {}
         runs: dict[tuple[str, str, int], Mapping[str, Any]] = {}
         for event in self.events[:count]:
@@ -94,12 +94,12 @@ class EventLog:
 
 
 def run_key(run: Mapping[str, Any]) -> tuple[str, str, int]:
-    """Return what an entry of the list of runs is known by."""
+    """Return the identity of an entry in the list of runs."""
     return run["test"], run["direction"], run["repeat"]
 
 
 def change(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, object]:
-    """Return the members of an event that leads from one state to another; empty where they are the same."""
+    """Return the event members that lead from one state to another; empty if equal."""
     keys = [key for key in (*after, *(key for key in before if key not in after)) if key != "runs"]
     set_to = {key: after.get(key) for key in keys if before.get(key) != after.get(key)}
     old = {run_key(run): run for run in before.get("runs", ())}
@@ -112,7 +112,7 @@ def change(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, obj
 
 
 def read_event_log(folder: Path, faults: list[Problem]) -> EventLog | None:
-    """Return the event log of a session; None where it has none, or where it cannot be read, with the reason in `faults`."""
+    """Return a session's event log; None without one, or with the reason in `faults`."""
     path = folder / EVENTS_FILE
     if not os.path.lexists(path):
         return None
@@ -133,7 +133,7 @@ def _parsed(path: Path, data: bytes) -> EventLog:
 
 
 def _event(line: bytes, before: str) -> LoggedEvent | None:
-    """Return what a line says; None where it is not as it was written."""
+    """Return the event of a line; None if the line was altered."""
     parts = _LINE.fullmatch(line.removesuffix(b"\n"))
     if parts is None or not line.endswith(b"\n") or link(before, parts[2]) != parts[1].decode():
         return None
@@ -156,7 +156,7 @@ def _event(line: bytes, before: str) -> LoggedEvent | None:
 
 
 def link(before: str, text: bytes) -> str:
-    """Return the link of a line: the SHA-256 of the link before it and of its JSON text, each with a line feed behind it."""
+    """Return the link of a line: SHA-256 of the previous link and the JSON text, a line feed behind each."""
     return hashlib.sha256(before.encode() + b"\n" + text + b"\n").hexdigest()
 
 
@@ -164,9 +164,9 @@ def line_of(before: str, what: str, at: datetime | None, members: Mapping[str, A
     """Return a line of the log.
 
     Args:
-        before: link of the line before it; empty for the first.
-        what: happened, in a word or two.
-        at: when; None where that means nothing.
+        before: link of the previous line; empty for the first.
+        what: in a word or two.
+        at: None if that means nothing.
     """
     moment = {} if at is None else {"at": at.astimezone(UTC).isoformat().replace("+00:00", "Z")}
     text = json.dumps({**moment, "what": what, **members}, ensure_ascii=False, allow_nan=False).encode()
@@ -174,12 +174,12 @@ def line_of(before: str, what: str, at: datetime | None, members: Mapping[str, A
 
 
 def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str, Any]) -> EventLog:
-    """Append an event, on the disk when this returns; arguments as of `line_of`.
+    """Append an event, synced to disk; arguments as of `line_of`.
 
-    A last line that was never finished, because the power went, is cut off.
+    An unfinished last line is cut off.
 
     Raises:
-        OutputError: the log is not as it was read, or the disk refuses; it is as before then.
+        OutputError: the log has changed since it was read, or the disk refuses; it is restored.
     """
     line = line_of(log.links[-1] if log.events else "", what, at, members)
     event = _event(line, log.links[-1] if log.events else "")
@@ -219,13 +219,13 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
 
 
 def _parted(log: EventLog, handle: int) -> int:
-    """Part a log from the other names of its file, such as that in a backup made of links: they keep what it held.
+    """Part a log from hard links of its file, such as a backup, which keep their content.
 
     Returns:
         The file that has the log's name now, open; the former one is closed.
 
     Raises:
-        OutputError: the disk refuses; the log is as before then.
+        OutputError: the disk refuses; the log is restored.
     """
     os.close(handle)  # Windows replaces no file that is open
     try:
@@ -236,7 +236,7 @@ def _parted(log: EventLog, handle: int) -> int:
 
 
 def set_back(log: EventLog) -> list[str]:
-    """Say where an event is dated before the one that it follows: by the clock of the computer, not by what happened."""
+    """Return where an event is dated before its predecessor."""
     dated = [(number, event, event.at) for number, event in enumerate(log.events, start=1) if event.at is not None]
     told = []
     for (_, _, before), (number, event, at) in pairwise(dated):
@@ -254,7 +254,7 @@ CLOCK_S = 1.0
 
 
 def taken_back(log: EventLog) -> None:
-    """Take back what was appended behind a log, as far as the disk allows: what could not be noted did not happen."""
+    """Take back an appended event, if the disk allows."""
     with contextlib.suppress(OSError):
         handle = open_to_change(log.path)
         try:
@@ -265,7 +265,7 @@ def taken_back(log: EventLog) -> None:
 
 
 def _refuse_another(log: EventLog, handle: int) -> None:
-    """Never write behind lines that were not read.
+    """Refuse to write behind lines that were not read.
 
     Raises:
         OutputError: the file has another size, or another last line.
@@ -296,7 +296,7 @@ def _refused(log: EventLog, error: OSError) -> OutputError:
 
 
 def runs_told(event: LoggedEvent) -> str:
-    """Return which runs an event is about, in words, with the reasons of verdicts."""
+    """Return the runs of an event in words, with reasons of verdicts."""
     told = []
     for run in event.runs:
         name = f"{run['test']}-{run['direction']}-{run['repeat']}"
@@ -307,7 +307,7 @@ def runs_told(event: LoggedEvent) -> str:
 
 
 def keys_told(event: LoggedEvent) -> Sequence[str]:
-    """Return which keys beside the runs an event is about; not those that change with every run."""
+    """Return the keys of an event beside the runs, without those that change with every run."""
     return [key for key in event.set_to if key != "seal" or event.what not in _OF_RUNS]
 
 

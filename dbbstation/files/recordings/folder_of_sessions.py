@@ -1,4 +1,4 @@
-"""Which sessions and models a folder holds."""
+"""Sessions and models in a folder."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _MARK_WITHIN = 4096
 
 @dataclass(frozen=True)
 class FolderFiles:
-    """Files of a folder, by their paths in it.
+    """Files of a folder, by their relative paths.
 
     Attributes:
-        sessions: session files, with names that can be written in UTF-8.
-        closed: folders that cannot be looked into, with the reason.
+        sessions: session files with UTF-8 names.
+        closed: unreadable folders with the reason.
     """
 
     sessions: dict[str, Path]
@@ -39,7 +39,7 @@ class FolderFiles:
 
 
 def files_of(folder: Path) -> FolderFiles:
-    """Return session files, and files that may be models, in and below a folder; what lies deep in a session is its own.
+    """Return session files and possible models in and below a folder, but not below a session.
 
     Links to folders are not followed.
 
@@ -81,7 +81,7 @@ def files_of(folder: Path) -> FolderFiles:
 
 
 def reason_of(error: OSError) -> str:
-    """Return why the system refused, in words."""
+    """Return the system's reason for a refusal."""
     return (error.strerror or str(error)).lower()
 
 

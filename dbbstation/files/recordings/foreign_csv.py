@@ -1,4 +1,4 @@
-"""Tables that other programs wrote: text before the names, units below them, any separator, decimal commas, CRLF, byte order marks."""
+"""Tables of other programs: title text, units below names, any separator, decimal commas, CRLF, byte order marks."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ class ForeignTable:
     """A table made elsewhere.
 
     Attributes:
-        units: what stands below the names of columns, by name; empty where nothing does.
-        comments: `key: value` lines above the names, by key in small letters.
+        units: below the column names, by name; else empty.
+        comments: `key: value` lines above the names, keys in small letters.
         data: the whole file.
-        repeated: numbers of lines in which the names of the columns come again: each run has a head of its own.
+        repeated: lines that repeat the column names, one per run.
     """
 
     table: TableFile
@@ -71,11 +71,11 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
     """Read a table that another program wrote.
 
     Args:
-        language: how numbers are written; None: as fits best.
-        encoding: of the text where no byte order mark tells it.
+        language: None: as fits best.
+        encoding: without a byte order mark.
 
     Raises:
-        InputError: it cannot be read, has no table, or has lines of another width.
+        InputError: it cannot be read, has no table, or rows of different width.
     """
     faults: list[Problem] = []
     data = read_bytes(path, faults, LARGEST_TABLE)
@@ -119,13 +119,13 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
 
 
 def _looked_at(lines: list[str], language: NumberLanguage, file: str) -> tuple[list[list[str]], int | None]:
-    """Return the cells of the lines that tell how a table is written, and which of them begins it; None where none does."""
+    """Return cells of the lines that show the table's form, and its first line; None if there is none."""
     rows = [_cells(line, language, file, number) for number, line in enumerate(lines[:_LOOKED_AT], start=1)]
     return rows, next((k for k in range(len(rows)) if _is_row(rows[k], language) and _goes_on(rows, k, language)), None)
 
 
 def _no_table(lines: list[str], language: NumberLanguage, file: str, stated: str) -> Problem:
-    """Return that no table was found, at the line that comes nearest to a row of one: the one with the most groups of digits."""
+    """Return the fault of a missing table, at the line nearest to a row."""
     groups = [len(re.findall(r"\d+", line)) for line in lines[:_LOOKED_AT]]
     most = max(groups, default=0)
     if most < 2:  # noqa: PLR2004 - a row has two numbers
@@ -146,7 +146,7 @@ def _no_table(lines: list[str], language: NumberLanguage, file: str, stated: str
 
 
 def _heads_taken_out(body: list[str], names: int, language: NumberLanguage) -> tuple[list[str], tuple[int, ...]]:
-    """Return the lines of a table without further heads, and where those are: each run of an export may have title and names of its own."""
+    """Return a table's lines without repeated heads, and where these are."""
     head = body[names].strip()
     again = [k for k in range(names + 1, len(body)) if body[k].strip() == head]
     kept = list(body)
@@ -161,7 +161,7 @@ def _heads_taken_out(body: list[str], names: int, language: NumberLanguage) -> t
 
 
 def _without_end(lines: list[str]) -> list[str]:
-    """Lines without a last one that only says that the file ends, as Calypso writes it."""
+    """Return lines without an end mark, as Calypso writes it."""
     last = next((k for k in range(len(lines) - 1, -1, -1) if lines[k].strip()), None)
     return lines if last is None or not re.fullmatch(r"\s*(END|EOF|ENDE)\s*", lines[last]) else lines[:last]
 
@@ -187,7 +187,7 @@ def _text(data: bytes, file: str, encoding: str, faults: list[Problem]) -> str |
 
 
 def _language(lines: list[str], file: str) -> NumberLanguage:
-    """The way of writing with most numbers less cells that were not taken apart: `0,5;1,5` is `0`, `5;1`, `5` with a comma between."""
+    """Return the way of writing with most numbers, less cells that were not split."""
 
     def fit(language: NumberLanguage) -> int:
         rows = [_cells(line, language, file, k) for k, line in enumerate(lines[:_LOOKED_AT], start=1)]
@@ -208,7 +208,7 @@ def _count(row: list[str], language: NumberLanguage) -> int:
 
 
 def _whole(row: list[str], language: NumberLanguage) -> int:
-    """How many cells are no numbers and hold digits beside a separator or decimal comma."""
+    """Return how many cells hold digits beside a separator or decimal comma but are no numbers."""
     others = [cell for cell in row if any(sign in cell for sign in _SIGNS) and any(map(str.isdigit, cell))]
     return len(others) - _count(others, language)
 
@@ -218,7 +218,7 @@ def _is_row(row: list[str], language: NumberLanguage) -> bool:
 
 
 def _goes_on(rows: list[list[str]], k: int, language: NumberLanguage) -> bool:
-    """Whether the next line is a row of the same table too: a single line of numbers may be a date and a version."""
+    """Return whether the next line is a row too: a single line of numbers may be a date."""
     following = next((row for row in rows[k + 1 :] if row), None)
     return following is not None and len(following) == len(rows[k]) and _is_row(following, language)
 
@@ -228,7 +228,7 @@ def _is_comment(line: str) -> bool:
 
 
 def _comments(lines: list[str]) -> dict[str, tuple[int, str]]:
-    """Line and text of what lines `key: value`, `key = value` or `key;value` above the table say."""
+    """Return line and text of `key: value`, `key = value` or `key;value` above the table."""
     found = {}
     for number, line in enumerate(lines, start=1):
         told = re.match(r"[\ufeff# ]*([^:=;\t,]{1,40}?)\s*[:=;\t,]\s*(.+)$", line)

@@ -1,7 +1,7 @@
-"""The journal of a run: every sample reaches the file as it arrives, and the disk at least once a second.
+"""The journal of a run: samples reach the file as they arrive, and the disk once a second.
 
-Each line carries its own CRC-32, because after a power cut the pages of a file can come back mixed. While it is being
-recorded the file ends in `.csv.part`; sealing renames it. Nothing is ever overwritten.
+Each line carries its CRC-32, because a power cut may mix pages. The file ends in `.csv.part` until it is sealed. Nothing
+is ever overwritten.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ SYNC_INTERVAL_S = 0.5
 
 
 def run_name(test: str, direction: Direction, repeat: int) -> str:
-    """Return the file name of a run once it is sealed."""
+    """Return the file name of a sealed run."""
     return f"{test}-{direction}-{repeat}.csv"
 
 
 def run_header(test: str, direction: Direction, repeat: int, names: Sequence[str]) -> bytes:
-    """Return the lines that a run file starts with.
+    """Return the first lines of a run file.
 
     Raises:
-        ValueError: a column that the format does not know, or one of the required ones is missing.
+        ValueError: an unknown column, or a required one is missing.
     """
     unknown = [name for name in names if name not in columns.COLUMNS and name != columns.STATUS]
     missing = [name for name in columns.REQUIRED if name not in names]
@@ -57,9 +57,9 @@ def run_header(test: str, direction: Direction, repeat: int, names: Sequence[str
 
 
 def run_foot(counts: Counts) -> bytes:
-    """Return the lines that a sealed run file ends with: what came over the line, and what did not.
+    """Return the last lines of a sealed run file, with its counts.
 
-    They stand below the samples because nobody knows them before; a file without them is one whose recording was broken off.
+    A file without them was broken off.
     """
     lines = [f"# received: {counts.received}", f"# lost: {counts.lost}"]
     lines += [f"# rejected {reason}: {count}" for reason, count in counts.rejected.items()]
@@ -70,11 +70,11 @@ def run_line(values: Sequence[float | str], names: Sequence[str], *, exact: bool
     """Return one line of a run file with its checksum.
 
     Args:
-        names: of the columns, without the checksum.
-        exact: write as many digits as it takes to read back the same bits.
+        names: without the checksum.
+        exact: write as many digits as read back the same bits.
 
     Raises:
-        ValueError: a number that is not finite, or a text with a comma or line end in it.
+        ValueError: a number is not finite, or a text has a comma or line end.
     """
     fields = []
     for name, value in zip(names, values, strict=True):
@@ -91,13 +91,11 @@ def run_line(values: Sequence[float | str], names: Sequence[str], *, exact: bool
 
 
 class RunWriter:
-    """Appends samples to one run; a context manager that leaves the `.part` in place unless it was sealed.
+    """Appends samples to one run; a context that leaves the `.part` unless sealed.
 
     Args:
-        direction: sense of travel.
-        repeat: of this test and direction; must be free.
-        names: columns in order, without the checksum; `t_s` and `length_mm` among them.
-        clock: seconds that rise; for tests.
+        repeat: must be free.
+        names: in order, without the checksum, with `t_s` and `length_mm`.
 
     Raises:
         OutputError: the run exists already, or its file cannot be made.
@@ -134,18 +132,18 @@ class RunWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close the file; what was not sealed stays a `.part`."""
+        """Close the file; an unsealed one stays a `.part`."""
         self.close()
 
     def append(self, values: Sequence[float | str]) -> None:
-        """Write one sample, and sync when the last sync is old.
+        """Write one sample, and sync if the last sync is old.
 
         Args:
-            values: one per column, numbers in the columns' units.
+            values: one per column.
 
         Raises:
-            OutputError: the disk refuses; what was written before stays.
-            ValueError: a value that is not finite, or a time that does not rise.
+            OutputError: the disk refuses; earlier samples stay.
+            ValueError: a value is not finite, or time does not rise.
         """
         line = run_line(values, self.names)
         t_s = float(line.split(b",")[self._time_at])
@@ -158,12 +156,12 @@ class RunWriter:
         self.sync_if_due()
 
     def sync_if_due(self) -> None:
-        """Sync when the last sync is old; to be called while no samples arrive, too."""
+        """Sync if the last sync is old; call it also without samples."""
         if self._clock() - self._synced_at >= SYNC_INTERVAL_S:
             self.sync()
 
     def sync(self) -> None:
-        """Bring everything to disk; nothing is left to do once the file is closed.
+        """Sync to disk, unless the file is closed.
 
         Raises:
             OutputError: the disk refuses.
@@ -176,7 +174,7 @@ class RunWriter:
         self._synced_at = self._clock()
 
     def _put_back(self) -> None:
-        """Write the file anew where somebody has removed it: all of it can still be read through what is open."""
+        """Write a removed file anew through the open handle."""
         try:
             there = self.path.lstat()
         except FileNotFoundError:
@@ -210,10 +208,10 @@ class RunWriter:
         return b"".join(pieces)
 
     def read(self) -> RunFile:
-        """Read what was written so far.
+        """Read what was written.
 
         Raises:
-            InputError: it cannot be read, or not as it was written.
+            InputError: it cannot be read, or was altered.
         """
         try:
             data = self._content()
@@ -223,13 +221,13 @@ class RunWriter:
         return parse_run(data, str(self.path))
 
     def seal(self, counts: Counts | None = None) -> str:
-        """Finish the run: sync, hash what is on disk, give the file its final name; return its SHA-256.
+        """Sync, hash and rename the run; return its SHA-256.
 
         Args:
-            counts: written below the samples; nothing is where they are not known.
+            counts: written below the samples; None: not known.
 
         Raises:
-            OutputError: there is no sample, the final name is taken, or the disk refuses; the `.part` stays then.
+            OutputError: no sample, a taken name, or the disk refuses; the `.part` stays.
         """
         if not self.samples:
             raise OutputError("no sample was recorded", where=str(self.path), remedy="check the instrument's line")
@@ -248,7 +246,7 @@ class RunWriter:
         return digest
 
     def close(self) -> None:
-        """Close the file as it is."""
+        """Close the file."""
         self._file.close()
 
     def _write(self, line: bytes) -> None:

@@ -1,4 +1,4 @@
-"""The runs of a session as they are judged: recordings, and where their circles should lie."""
+"""Runs of a session for judging: recordings and expected circles."""
 
 from __future__ import annotations
 
@@ -42,9 +42,8 @@ def judge_session(
     """Judge runs of a session.
 
     Args:
-        wanted: its runs with their recordings, in the order in which they were recorded.
-        model: of the machine; None: only the usual sizes of what machines have are known.
-        progress: told how many of how many runs are analysed.
+        wanted: runs with recordings, in order of recording.
+        model: None: only usual sizes of machine errors are known.
     """
     runs = runs_of(session, wanted, model)
     return judge(runs, progress)
@@ -53,7 +52,7 @@ def judge_session(
 def runs_of(
     session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]], model: IdentifiedModel | None = None
 ) -> tuple[Run, ...]:
-    """Return runs of a session as they are judged; arguments as of `judge_session`."""
+    """Return runs prepared for judging; arguments as of `judge_session`."""
     planned = planned_circles(session, model)
     return tuple(run_of(session, run, recording, model, planned) for run, recording in wanted)
 
@@ -65,10 +64,10 @@ def run_of(
     model: IdentifiedModel | None,
     planned: tuple[Planned, ...],
 ) -> Run:
-    """Return one run of a session as it is judged.
+    """Return one run prepared for judging.
 
     Args:
-        model: of the machine; None: only the usual sizes of what machines have are known.
+        model: None: only usual sizes of machine errors are known.
     """
     circle, recording = session.circle(run), replace(recording, name=run.label)
     # A compensated program is there to put the circle where it is planned. That is where it is expected.
@@ -90,7 +89,7 @@ def run_of(
 
 
 def planned_circles(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:
-    """Return all circles of a session's plan as a model has them; none without a model, to which they all look alike."""
+    """Return all circles of a plan by a model; none without a model, since all are alike then."""
     if model is None:
         return ()
     found = []
@@ -117,7 +116,6 @@ def planned_circles(session: SessionFolder, model: IdentifiedModel | None) -> tu
 
 
 def _ideal(circle: Circle) -> RawCircle:
-    """The turn of a circle whose readings nobody has taken."""
     phi_deg = (np.arange(SECTORS) + 0.5) * FULL_TURN_DEG / SECTORS
     return RawCircle("", circle, phi_deg / circle.turning_deg_s, phi_deg, np.full(SECTORS, circle.bar_mm))
 
@@ -125,7 +123,7 @@ def _ideal(circle: Circle) -> RawCircle:
 def _expected(
     session: SessionFolder, run: RunEntry, recording: Recording, model: IdentifiedModel | None
 ) -> Expected | None:
-    """Where the circle should lie; None for a recording that shows none, or a circle that the machine cannot take."""
+    """Return where the circle should lie; None without a circle, or if the machine cannot take it."""
     try:
         return _expected_of(session, run, cut(recording, session.circle(run)), model)
     except (TraceError, MachineError):

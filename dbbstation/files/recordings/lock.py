@@ -1,8 +1,7 @@
-"""One writer for each session folder: a lock that its process holds and that ends with it.
+"""One writer for each session folder, by a lock of the operating system.
 
-The lock is one of the operating system on a file in the folder: it is gone when the process is, however that ends, so that
-nothing has to be cleaned up after a power cut. The file stays and says who held it last. On a network folder the lock holds as far
-as the file server passes it on; where a file system has no locks the session is written without one, and says so.
+The lock ends with its process, so that a power cut leaves nothing to clean up. The file names its last holder. Without
+locks on the file system, the session is written without one and reports so.
 """
 
 from __future__ import annotations
@@ -31,10 +30,10 @@ _PAUSE_S = 0.01
 
 
 class SessionLock:
-    """The right to write into a session, held until it is closed or the process ends.
+    """The right to write into a session, until closed or the process ends.
 
     Attributes:
-        held: whether the file system gave a lock; False where it knows none.
+        held: False if the file system has no locks.
 
     Raises:
         OutputError: another process writes into the session, or the folder cannot be written.
@@ -61,7 +60,7 @@ class SessionLock:
         self.close()
 
     def __del__(self) -> None:
-        """Let others write where nobody closed it."""
+        """Close a forgotten lock."""
         self.close()
 
     def close(self) -> None:

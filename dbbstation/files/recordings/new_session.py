@@ -1,4 +1,4 @@
-"""Making a session folder: an empty one to be recorded into, or a whole one at once, such as of a simulation."""
+"""Make a session folder: empty to record into, or whole, as of a simulation."""
 
 from __future__ import annotations
 
@@ -42,15 +42,13 @@ class FinishedRun:
     """A run that exists whole, such as a simulated one.
 
     Attributes:
-        direction: sense of travel.
         columns: by name, each of shape (n,), in the columns' units.
-        repeat: of this test and direction.
-        mounting: counts how often a ball was put up; None: one mounting per test.
-        started: when the first sample was taken; None where that means nothing.
-        program: name and bytes of the NC program that was commanded, None for the plan's circle.
-        reason: why it was rejected; empty otherwise.
-        texts: columns that are no numbers, such as `status`, n texts each.
-        exact: write as many digits as it takes to read back the same bits, not those that instruments resolve.
+        mounting: number of the ball's set-up; None: one per test.
+        started: first sample; None if that means nothing.
+        program: name and bytes of the NC program; None for the plan's circle.
+        reason: of a rejection; else empty.
+        texts: text columns such as `status`, n each.
+        exact: write as many digits as read back the same bits.
     """
 
     test: str
@@ -75,14 +73,14 @@ def write_session(
     details: SessionDetails | None = None,
     more: Mapping[str, str | bytes] | None = None,
 ) -> None:
-    """Write a whole session at once; all of it or nothing.
+    """Write a whole session at once, all or nothing.
 
     Args:
         runs: in order.
-        more: further files by path in the folder.
+        more: further files by relative path.
 
     Raises:
-        OutputError: the folder exists already, lies in another session, or cannot be written.
+        OutputError: the folder exists, lies in another session, or cannot be written.
     """
     files: dict[str, str | bytes] = dict(more or {})
     entries = []
@@ -120,16 +118,15 @@ def make_session_folder(
     files: Mapping[str, str | bytes],
     at: datetime | None = None,
 ) -> None:
-    """Make the folder of a session, sealed and with its event log; all of it or nothing.
+    """Make a sealed session folder with its event log, all or nothing.
 
     Args:
-        details: what it notes beside the runs.
-        files: content by path in the folder, of everything but machine, plan and session file.
-        at: when, for the log; None for a session that is computed: the same one has the same bytes then.
+        files: content by relative path, besides machine, plan and session file.
+        at: for the log; None for a computed session, which then has the same bytes.
 
     Raises:
         InputError: what no session may note.
-        OutputError: the folder exists already, lies in another session, or cannot be written.
+        OutputError: the folder exists, lies in another session, or cannot be written.
     """
     refuse_recorded(folder)
     if folder.exists():
@@ -149,10 +146,10 @@ def make_session_folder(
 
 
 def _check_details(text: str, folder: Path, plan: InlinePlan) -> None:
-    """Hold what a session notes against its format and plan before anything is written.
+    """Check a session's notes against format and plan before writing.
 
     Raises:
-        InputError: everything that no session may say, such as a bar's length in metres.
+        InputError: whatever a session must not note, such as a length in metres.
     """
     faults: list[Problem] = []
     document = parse_yaml(text, str(folder / SESSION_FILE), faults)

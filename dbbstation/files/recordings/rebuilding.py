@@ -1,4 +1,4 @@
-"""Writing the session file anew from its event log."""
+"""Write the session file anew from its event log."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 
 def rebuild(folder: Path) -> tuple[str, int]:
-    """Write the session file as the event log has it; what stood there is kept.
+    """Write the session file from the log; the former one is kept.
 
     Returns:
         Where the former session file is kept, empty where there was none; how many events there are.
 
     Raises:
-        InputError: there is no log, or what it says does not fit the files of the session any more.
+        InputError: there is no log, or it does not fit the session's files.
         OutputError: another process writes into the session, or the disk refuses.
     """
     faults: list[Problem] = []

@@ -1,7 +1,7 @@
 """Run files `runs/*.csv`: one circle, one direction, raw.
 
-One way leads in, block by block: bytes to lines (`run_lines`), lines to checked numbers (`run_numbers`), numbers to a recording. Of a
-file that was being recorded when the station died (`.csv.part`) the good lines are returned, the others named.
+Blocks become lines (`run_lines`), checked numbers (`run_numbers`), then a recording. Of an interrupted file (`.csv.part`)
+the good lines are returned and the others named.
 """
 
 from __future__ import annotations
@@ -33,14 +33,13 @@ PART = ".part"
 
 @dataclass(frozen=True, eq=False)
 class RunFile:
-    """A run with what its file says beside the samples.
+    """A run with the other content of its file.
 
     Attributes:
-        header: what the `# key: value` lines say, by key.
-        unknown_columns: text of columns that this program does not know, by name, one entry per sample.
-        status: what the instrument said of each sample; empty where nothing was noted.
-        warnings: what was found that does not spoil the run.
-        sha256: of the file's bytes as they were read.
+        header: `# key: value` lines, by key.
+        unknown_columns: texts by name, one per sample.
+        status: the instrument's per sample; empty if not noted.
+        warnings: findings that do not spoil the run.
     """
 
     recording: Recording
@@ -52,10 +51,10 @@ class RunFile:
 
 
 def read_run(path: Path, *, sha256: str = "") -> RunFile:
-    """Read a run file; of one that ends in `.part` the good lines.
+    """Read a run file; of a `.part` the good lines.
 
     Args:
-        sha256: what its bytes must hash to; not checked where empty.
+        sha256: expected; empty: not checked.
 
     Raises:
         InputError: every fault of the file with its line.
@@ -102,24 +101,23 @@ def sha256_of(path: Path) -> str:
 
 
 def sealed_or_part(path: Path) -> Path:
-    """Return where a run's file is: it may have been sealed and renamed just before the station died."""
+    """Return a run's file, which may have been sealed just before the station died."""
     sealed = path.with_suffix("") if path.suffix == PART else path
     return sealed if not path.exists() and sealed.exists() else path
 
 
 def changed(file: str) -> Problem:
-    """Return the problem of a file whose hash is not the one that the session noted."""
+    """Return the problem of a file with another hash than noted."""
     what = "the file was changed after it was recorded: its SHA-256 is not the one in the session"
     return Problem(file, 0, 0, what, "restore the file as recorded, or reject the run")
 
 
 def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False) -> RunFile:
-    """Parse the bytes of a run file: bytes to lines, lines to numbers, numbers to a recording, each checked.
+    """Parse the bytes of a run file into a checked recording.
 
     Args:
-        file: as named in messages.
-        sha256: of the data, passed on.
-        partial: return the good lines and name the others in a warning, instead of refusing the file.
+        sha256: passed on.
+        partial: return the good lines and warn of the others.
 
     Raises:
         InputError: every fault of the file with its line.
@@ -128,7 +126,7 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
 
 
 def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
-    """Parse a run file block by block: what is kept of a block are its numbers and its texts, equal ones once."""
+    """Parse a run file in blocks, keeping only numbers and distinct texts."""
     faults: list[Problem] = []
     warnings: list[Problem] = []
     numbers = Numbers()

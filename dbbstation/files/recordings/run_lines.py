@@ -1,4 +1,4 @@
-"""Lines of a run file, piece by piece: the header taken off, rows with their numbers, checked one by one or all at once."""
+"""Lines of a run file in pieces: header removed, rows checked."""
 
 from __future__ import annotations
 
@@ -36,14 +36,13 @@ _MOST_KNOWN = 10_000
 
 @dataclass(frozen=True)
 class Lines:
-    """A piece of a run file, or the whole, taken apart into lines.
+    """A run file, or a piece of it, as lines.
 
     Attributes:
-        file: as named in messages.
-        header: `# key: value` lines by key, as far as the file was read.
-        columns: their names in order.
-        rows: the lines below, without line ends.
-        ended: the last row ends with a line end.
+        header: `# key: value` lines read so far, by key.
+        columns: in order.
+        rows: without line ends.
+        ended: whether the last row ends with a line end.
     """
 
     file: str
@@ -57,18 +56,18 @@ class Lines:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """Columns that this program does not know."""
+        """Return columns unknown to this program."""
         return tuple(name for name in self.columns if not columns.is_known(name))
 
     def keep(self, rows: slice) -> Lines:
-        """Return the same file with only these rows."""
+        """Return the file with only these rows."""
         return replace(self, rows=self.rows[rows], numbers=self.numbers[rows], ended=True)
 
     def texts(self, name: str, known: dict[bytes, str] | None = None) -> list[str]:
         """Return one column as text.
 
         Args:
-            known: texts that came before, so that equal ones are kept once; more are added.
+            known: distinct texts so far; grows.
         """
         at = self.columns.index(name)
         cells = [row.split(b",")[at] for row in self.rows]
@@ -78,7 +77,7 @@ class Lines:
         return [seen[cell] for cell in cells]
 
     def regular(self) -> bool:
-        """Whether every row has as many fields as there are columns."""
+        """Return whether every row has as many fields as columns."""
         text = np.frombuffer(b"\n".join(self.rows) + b"\n", dtype=np.uint8)
         separators = text[(text == _COMMA) | (text == _NEWLINE)]
         count = len(self.columns)
@@ -88,7 +87,7 @@ class Lines:
         return bool((table[:, -1] == _NEWLINE).all() and (table[:, :-1] == _COMMA).all())
 
     def bad_crc(self) -> bool:
-        """Whether any row's checksum does not match it."""
+        """Return whether any row's checksum is wrong."""
         if columns.CRC not in self.columns:
             return False
         if min(map(len, self.rows), default=0) <= _CRC_LENGTH:
@@ -106,14 +105,13 @@ class Lines:
 def pieces_of(
     blocks: Iterable[bytes], file: str, faults: list[Problem], warnings: list[Problem], *, partial: bool
 ) -> Iterator[Lines]:
-    """Yield the lines of a run file that are to be read, piece by piece; nothing more once there are faults.
+    """Yield a run file's usable lines in pieces; nothing more after a fault.
 
     Args:
-        blocks: of the file, cut anywhere.
-        file: as named in messages.
-        faults: what makes the file useless is added.
-        warnings: what does not spoil it is added: unknown columns, a last line that was cut off, lines left out.
-        partial: yield the good lines of an interrupted recording only, in one piece: they may stand out of order.
+        blocks: cut anywhere.
+        faults: grows by what makes the file useless.
+        warnings: grows by unknown columns, a cut last line, lines left out.
+        partial: yield only the good lines of an interrupted recording, in one piece: they may be out of order.
     """
     pieces = split_pieces(blocks, file, faults)
     if partial:
@@ -135,7 +133,7 @@ def pieces_of(
 
 
 def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
-    """Take a whole run file apart; None, or columns that cannot be used, are reported in `faults`."""
+    """Split a whole run file; None with faults added to `faults`."""
     whole = _whole(split_pieces([data], file, faults))
     if whole is not None:
         _check_columns(whole.columns, file, whole.header_line, faults)
@@ -152,9 +150,9 @@ def _whole(pieces: Iterable[Lines]) -> Lines | None:
 
 
 def split_pieces(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterator[Lines]:
-    """Take a run file apart, piece by piece; nothing, with the reason in `faults`, where no line names columns.
+    """Split a run file in pieces; nothing, with the reason in `faults`, without a header.
 
-    The first piece may have no rows. All share one header, which has what stands below the rows when the last was taken.
+    All pieces share one header, complete after the last piece.
     """
     header: dict[str, str] = {}
     top: Lines | None = None
@@ -196,7 +194,7 @@ _LONGEST_FOOT = 1000
 
 
 def _lines(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterator[tuple[list[bytes], bool]]:
-    """Yield the lines of each block without their ends; at last the one that has no line end, with False."""
+    """Yield the lines of each block; the last may lack its end and has False."""
     left = b""
     number = 1
     for block in blocks:
@@ -227,7 +225,7 @@ def _names(line: bytes, file: str, number: int, faults: list[Problem]) -> tuple[
 
 
 def split_head(path: Path, faults: list[Problem]) -> tuple[str, ...]:
-    """Return the columns of a run file without reading its samples; none, with the reason in `faults`, where it has none."""
+    """Return a run file's columns without its samples; none, with the reason in `faults`, without a header."""
     try:
         head = first_line(path)
     except OSError as error:
@@ -238,7 +236,7 @@ def split_head(path: Path, faults: list[Problem]) -> tuple[str, ...]:
 
 
 def _said(line: bytes) -> dict[str, str]:
-    """What a line `# key: value` above or below the samples says."""
+    """Return a `# key: value` line's content."""
     key, colon, value = line.decode("utf-8", "replace").lstrip("\ufeff#").partition(":")
     return {key.strip(): value.strip()} if colon else {}
 
@@ -259,7 +257,7 @@ def _check_columns(names: tuple[str, ...], file: str, line: int, faults: list[Pr
 
 
 def _without_cut_line(lines: Lines, warnings: list[Problem]) -> Lines:
-    """Drop a last line that does not end: its last digits may be missing without a trace. Its CRC can vouch for it."""
+    """Drop a last line without end unless its CRC is right: digits may be missing."""
     if lines.ended or not lines.rows:
         return lines
     number, last = lines.numbers[-1], lines.rows[-1]
@@ -270,7 +268,7 @@ def _without_cut_line(lines: Lines, warnings: list[Problem]) -> Lines:
 
 
 def fault_of_line(row: bytes, names: tuple[str, ...]) -> tuple[str, str] | None:
-    """What is wrong with one row and what to do, None where nothing is."""
+    """Return fault and remedy of a row, or None."""
     if not row.strip():
         return "an empty line between samples", "remove it"
     fields = row.split(b",")
@@ -302,10 +300,10 @@ def _fault_of_fields(fields: list[bytes], names: tuple[str, ...]) -> tuple[str, 
 
 
 def good_lines(lines: Lines) -> tuple[Lines, list[Problem]]:
-    """Rows of an interrupted recording that can be trusted, in time order, and what is wrong with the others.
+    """Return trusted rows of an interrupted recording in time order, and faults of the others.
 
-    After a power cut pages of a file come back empty, stale or in another order. Only the checksum of each line tells
-    good rows from bad ones; without one every row that reads well counts, as far as time rises.
+    A power cut may leave pages empty, stale or in another order. The checksum decides; without one, readable rows with
+    rising time count.
     """
     kept: list[tuple[bytes, int]] = []
     problems: list[Problem] = []

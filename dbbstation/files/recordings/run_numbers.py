@@ -1,6 +1,6 @@
-"""Numbers of a run file: lines to columns, time that rises, sizes that are plausible.
+"""Numbers of a run file: columns, rising time, plausible sizes.
 
-Pieces are parsed by NumPy at once; line by line only to name what is wrong with a piece that it refused.
+NumPy parses whole pieces; lines are parsed one by one only to name faults.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Counted:
-    """Faults of a file: the first of them, and how many there are."""
+    """The first faults of a file, and their count."""
 
     def __init__(self) -> None:
         self.first: list[Problem] = []
@@ -37,7 +37,7 @@ class Counted:
 
     @property
     def enough(self) -> bool:
-        """Whether there are so many that the rest of the file need not be looked at."""
+        """Return whether the rest need not be read."""
         return self.count >= _MOST_COUNTED
 
     def told(self) -> list[Problem]:
@@ -50,7 +50,7 @@ _MOST_COUNTED = 10_000
 
 
 class Numbers:
-    """The numeric columns of a run file, gathered piece by piece into 8 bytes a number."""
+    """Numeric columns of a run file, 8 bytes a number."""
 
     def __init__(self) -> None:
         self.faults = Counted()
@@ -70,7 +70,7 @@ class Numbers:
                 self._parts.setdefault(name, []).append(values)
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
-        """Return every numeric column, shape (n,), and let go of the pieces; what is wrong is added to `faults`."""
+        """Return every numeric column, shape (n,), and release the pieces; faults are added to `faults`."""
         last = self._last
         if self.faults.count or last is None:
             return {}
@@ -89,7 +89,7 @@ class Numbers:
 
 
 def _parsed(lines: Lines) -> dict[str, NDArray[np.float64]] | None:
-    """Parse all rows of a piece at once; None where one of them is not as it should be."""
+    """Parse all rows of a piece; None if one is faulty."""
     if not lines.regular() or lines.bad_crc():
         return None
     names = [name for name in lines.columns if name in columns.COLUMNS]

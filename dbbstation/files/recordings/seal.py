@@ -1,11 +1,8 @@
 """The seal of a session: hashes of machine, plan and jig, and a chain through its runs.
 
-Every sealed run's entry carries a link: the SHA-256 of the link before it and of what the entry says of the recording. Who takes
-an entry out of the list, exchanges two or changes one breaks a link. The seal counts the runs and has the last link, so that
-runs taken out at the end are reported as well. A copy of every sealed file is kept in the folder `sealed`, so that it can be said
-which key has changed, and the file can be put back.
-
-It tells what was changed by mistake or without a note. It keeps nobody from writing a whole new seal.
+Every sealed run's entry has a link: the SHA-256 of the previous link and of what the entry says of the recording.
+Removing, exchanging or changing an entry breaks a link; the seal's count and last link reveal removed ends. Copies in the
+folder `sealed` show which key has changed. The seal reveals mistakes; it cannot prevent a whole new seal.
 """
 
 from __future__ import annotations
@@ -46,13 +43,13 @@ _MOST_NAMED = 4
 
 @dataclass(frozen=True)
 class Seal:
-    """What a session was when it was sealed.
+    """State of a session when it was sealed.
 
     Attributes:
         files: SHA-256 by path as the session file names it.
-        chain_sha256: link of the last of them; empty where there is none.
-        events: number of events in the event log; zero where the session has none.
-        anchor: link of the last of them: who noted it elsewhere can tell whether anything was changed that stood there.
+        chain_sha256: last link; empty if there is none.
+        events: number in the event log; zero without one.
+        anchor: link of the last event.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
@@ -64,13 +61,13 @@ class Seal:
 
 @dataclass(frozen=True)
 class Amendment:
-    """A change of what was sealed, made on purpose.
+    """A deliberate change of what was sealed.
 
     Attributes:
-        what: path of the file as the seal names it, or `runs`.
-        former_sha256: hash before; empty where there was none.
-        sha256: hash now; empty where there is none.
-        former: path in the session folder where the file is kept as it was; empty where it is not.
+        what: path in the seal, or `runs`.
+        former_sha256: empty if there was none.
+        sha256: empty if there is none.
+        former: path of the kept former file in the session; empty if none.
     """
 
     what: str
@@ -88,7 +85,7 @@ class Amendment:
 
 
 def seal_entry(seal: SealSchema | None) -> Seal | None:
-    """Return the seal of a session file as the rest of the program takes it."""
+    """Return the seal for the rest of the program."""
     if seal is None:
         return None
     events, anchor = (0, "") if seal.log is None else (seal.log.events, seal.log.sha256)
@@ -96,16 +93,16 @@ def seal_entry(seal: SealSchema | None) -> Seal | None:
 
 
 def amendment_entry(entry: AmendmentSchema) -> Amendment:
-    """Return an amendment of a session file as the rest of the program takes it."""
+    """Return an amendment for the rest of the program."""
     texts = (entry.what, entry.former_sha256 or "", entry.sha256 or "", entry.former or "", entry.reason)
     return Amendment(*texts, datetime.fromisoformat(entry.made))
 
 
 def sealed_names(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the files that a seal covers, by their paths: machine and plan as named, and the jig file that the plan names.
+    """Return the sealed files' paths: machine, plan and the plan's jig file.
 
     Args:
-        names: paths of machine and plan in it, in this order.
+        names: paths of machine and plan, in this order.
     """
     plan = load_yaml(folder / names[1], [])
     jig = plan.data.get("jig") if plan is not None and isinstance(plan.data, dict) else None
@@ -114,20 +111,20 @@ def sealed_names(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def hashes(folder: Path, names: Sequence[str]) -> dict[str, str]:
-    """Return the SHA-256 of files by their names; without those that cannot be read."""
+    """Return the SHA-256 of readable files by name."""
     read = {name: read_bytes(folder / name, [], is_input=False) for name in names}
     return {name: hashlib.sha256(data).hexdigest() for name, data in read.items() if data is not None}
 
 
 def copy_name(name: str, sha256: str) -> str:
-    """Return where a sealed file is kept in the session folder."""
+    """Return the path of a sealed file's copy."""
     stem, dot, ending = name.rpartition("/")[2].rpartition(".")
     part = sha256[:_NAMED_DIGITS]
     return f"{SEALED}/{stem}-{part}{dot}{ending}" if dot else f"{SEALED}/{ending}-{part}"
 
 
 def keep_copies(folder: Path, sealed: Mapping[str, str]) -> None:
-    """Keep a copy of every sealed file in the session, so that nothing of it is lost when it changes; put a spoilt one right.
+    """Keep a copy of every sealed file, and repair damaged copies.
 
     Args:
         sealed: SHA-256 by path in the folder.
@@ -146,15 +143,15 @@ def keep_copies(folder: Path, sealed: Mapping[str, str]) -> None:
 
 
 def is_copy(name: str) -> bool:
-    """Whether a path in a session is that of a kept copy."""
+    """Return whether a path is that of a kept copy."""
     return name.startswith(f"{SEALED}/")
 
 
 def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> Iterator[Problem]:
-    """Yield what is wrong with the copies that are kept: spoilt, gone, or under a name that is none of theirs.
+    """Yield faults of kept copies: damaged, missing, or unknown.
 
     Args:
-        amendments: by which further copies are known.
+        amendments: name further copies.
     """
     if (folder / SEALED).is_symlink():  # it may lead to a whole disk
         what = f"{SEALED} is a link: the copies of what was sealed are part of the session"
@@ -182,7 +179,7 @@ def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> It
 
 
 def fits_name(name: str, digest: str) -> bool:
-    """Whether a kept copy is the one that its name says."""
+    """Return whether a kept copy has the hash of its name."""
     stem = name.rpartition("/")[2].partition(".")[0]
     return stem.endswith(f"-{digest[:_NAMED_DIGITS]}")
 
@@ -190,9 +187,9 @@ def fits_name(name: str, digest: str) -> bool:
 def link(before: str, run: RunEntry) -> str:
     """Return the link of a sealed run in the chain.
 
-    The SHA-256 of these lines in UTF-8, each with a line end, empty where there is nothing: link of the sealed run before it in
-    the list, test, direction, repeat, mounting, start in UTC (ISO 8601), SHA-256 of the run file, of the program and of its
-    model, x, y and z of the centre as programmed [mm].
+    The SHA-256 of these lines in UTF-8, each with a line end, empty if there is nothing: link of the previous sealed run,
+    test, direction, repeat, mounting, start in UTC (ISO 8601), SHA-256 of run file, program and its model, x, y and z of
+    the centre as programmed [mm].
     """
     program = ("", "") if run.program is None else (run.program.sha256, run.program.model_sha256)
     started = "" if run.started is None else run.started.astimezone(UTC).isoformat()
@@ -202,10 +199,10 @@ def link(before: str, run: RunEntry) -> str:
 
 
 def chained(runs: Sequence[RunEntry]) -> tuple[RunEntry, ...]:
-    """Return runs with a link for every sealed one that has none yet; it stands behind all that have one.
+    """Return runs with links added for new sealed ones, behind all that have one.
 
     Args:
-        runs: in the order of the list; links that are there stay as they are.
+        runs: in the order of the list.
     """
     done = [run for run in runs if run.chain_sha256]
     behind = runs.index(done[-1]) if done else -1
@@ -219,17 +216,16 @@ def chained(runs: Sequence[RunEntry]) -> tuple[RunEntry, ...]:
 
 
 def sealed_over(files: Mapping[str, str], runs: Sequence[RunEntry]) -> Seal:
-    """Return the seal over files with their hashes, and over runs with their links."""
+    """Return the seal over files and linked runs."""
     links = [run.chain_sha256 for run in runs if run.chain_sha256]
     return Seal(dict(files), len(links), links[-1] if links else "")
 
 
 def seal_faults(folder: Path, file: Path, seal: Seal, names: Sequence[str], runs: Sequence[RunEntry]) -> list[Problem]:
-    """Return what is not as it was sealed: which file and which of its keys, which run.
+    """Return changes since sealing: files with their keys, and runs.
 
     Args:
-        names: paths of machine and plan in the folder, in this order.
-        runs: as the session lists them.
+        names: paths of machine and plan, in this order.
     """
     faults = [*_file_faults(folder, file, seal, names)]
     faults += [Problem(str(file), 0, 0, what, remedy) for what, remedy in chain_faults(folder, seal, runs)]
@@ -259,7 +255,7 @@ def _from(folder: Path, name: str, stored: str) -> str:
 
 
 def _changed_keys(before: Path, after: Path) -> str:
-    """Which keys of a file have changed; empty where that cannot be told."""
+    """Return the changed keys of a file; empty if unknown."""
     documents = load_yaml(before, []), load_yaml(after, [])
     if documents[0] is None or documents[1] is None:
         return ""
@@ -269,7 +265,7 @@ def _changed_keys(before: Path, after: Path) -> str:
 
 
 def chain_faults(folder: Path, seal: Seal, runs: Sequence[RunEntry]) -> Iterator[tuple[str, str]]:
-    """Yield what is wrong with the chain of runs, and what to do; arguments as of `seal_faults`."""
+    """Yield faults of the chain of runs with remedies; arguments as of `seal_faults`."""
     sealed = [run for run in runs if run.sha256]
     linked = [run for run in sealed if run.chain_sha256]
     remedy = AMEND.format(folder=folder).replace("restore it", "restore the list of runs").replace("it was", "that was")

@@ -1,4 +1,4 @@
-"""Sealing recordings that were made elsewhere: hashes and chain are written into the session file as it stands."""
+"""Seal recordings made elsewhere: hashes and chain go into the existing session file."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class Sealing:
     """What sealing a session would do.
 
     Attributes:
-        chained: its text with all hashes and the chain, its seal as it was.
-        files: run files that got a hash, as the session file names them.
-        linked: runs that came into the chain.
-        before: text of the session file as it is.
+        chained: text with hashes and chain, and the old seal.
+        files: run files that get a hash.
+        linked: runs that join the chain.
+        before: text of the session file now.
         logged: whether the session has an event log.
-        copies: kept copies of what is sealed that are spoilt or gone.
+        copies: damaged or missing copies.
     """
 
     path: Path
@@ -66,24 +66,24 @@ class Sealing:
 
     @property
     def text(self) -> str:
-        """Text of the session file with all hashes, the chain and the seal."""
+        """Return the session file's text with hashes, chain and seal."""
         return _with_seal(self.chained, self.seal)
 
     @property
     def anything(self) -> bool:
-        """Whether the session lacks something."""
+        """Return whether the session lacks something."""
         return self.text != self.before or not self.logged or bool(self.copies)
 
 
 def seal_session(folder: Path) -> Sealing:
-    """Seal a session: the session file with all hashes, its event log, and copies of what is sealed.
+    """Seal a session: hashes, event log and copies.
 
     Returns:
         What was done.
 
     Raises:
         InputError: as of `sealing`.
-        OutputError: another process writes into the session, or the disk refuses; the session file is as before then.
+        OutputError: another process writes into the session, or the disk refuses; the session file is restored.
     """
     found = sealing(folder)  # no lock is left in what is no session
     with SessionLock(found.path.parent, PATIENCE_S):
@@ -98,19 +98,18 @@ def seal_session(folder: Path) -> Sealing:
 
 
 def _marked(seal: Seal, said: Mapping[str, Any]) -> Seal:
-    """The seal with the end of the event log as the session file is to say it."""
+    """Return the seal with the event log's end as the session file states it."""
     mark = mark_of(said)
     return seal if mark is None else replace(seal, events=mark[0], anchor=mark[1])
 
 
 def sealing(folder: Path) -> Sealing:
-    """Find what a session file lacks of its seal, and the text that has it all; nothing is written.
+    """Find what a session file lacks of its seal, and its complete text, without writing.
 
-    Comments, order and spelling of the file stay: each hash stands behind the run's `file`, each link behind the hash, the seal
-    above the list of runs. Runs that are being recorded have none.
+    Comments, order and spelling stay. Runs being recorded get no hash.
 
     Raises:
-        InputError: no session file, no list of runs in it, a file that is missing, or what was sealed before has changed.
+        InputError: no session file, no list of runs, a missing file, or a change of what was sealed.
     """
     path = folder if folder.is_file() else folder / SESSION_FILE
     faults: list[Problem] = []
@@ -130,7 +129,7 @@ def _copies(seal: Seal) -> dict[str, str]:
 
 
 def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
-    """The text with a hash for every run that has none, and the files that got one."""
+    """Return the text with missing hashes added, and the files that got one."""
     faults: list[Problem] = []
     additions: list[tuple[int, str]] = []
     named = []
@@ -196,7 +195,7 @@ def _with_links(text: str, path: Path, runs: Sequence[RunEntry]) -> tuple[str, t
 
 
 def _with_seal(text: str, seal: Seal) -> str:
-    """The text with the seal before the list of runs, in the oldest version of the format that has all its keys."""
+    """Return the text with the seal above the runs, in the oldest version with all keys."""
     yaml = YAML(typ="safe", pure=True)
     root = yaml.compose(text)
     starts = {name.value: name.start_mark.index for name, _ in root.value}
@@ -239,7 +238,7 @@ def _added(text: str, additions: Sequence[tuple[int, str]]) -> str:
 
 
 def _entry(node: Node | None, key: str) -> Node | None:
-    """Value of a key of a mapping; None where there is none."""
+    """Return a mapping's value, or None."""
     if not isinstance(node, MappingNode):
         return None
     return next((value for name, value in node.value if name.value == key), None)

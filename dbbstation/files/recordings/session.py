@@ -1,4 +1,4 @@
-"""Reading a session folder: what was done, with which machine and plan, and each run when it is asked for."""
+"""Read a session folder; runs are read on demand."""
 
 from __future__ import annotations
 
@@ -67,11 +67,11 @@ _SLOWEST, _FASTEST = 50.0, 0.05
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SessionFolder(SessionDetails):
-    """A session with its machine and plan, and what it notes; runs are read when asked for.
+    """A session with machine, plan and notes; runs are read on demand.
 
     Attributes:
-        machine: the nominal model that the controller had.
-        runs: in the order they were started, of every state.
+        machine: nominal, as the controller had it.
+        runs: in starting order, of every state.
     """
 
     name: str
@@ -85,27 +85,27 @@ class SessionFolder(SessionDetails):
 
     @property
     def names(self) -> tuple[str, str]:
-        """Paths of machine and plan within the folder, with forward slashes."""
+        """Return the relative paths of machine and plan, with forward slashes."""
         paths = (self.machine_path, self.plan_path)
         return tuple(path.relative_to(self.folder).as_posix() for path in paths)  # type: ignore[return-value]  # two of them
 
     @property
     def virtual(self) -> bool | None:
-        """Whether its runs come from a virtual machine; None where nothing says so or otherwise."""
+        """Return whether its runs come from a virtual machine; None if unknown."""
         stated = [one.virtual for one in (self.instrument, *(run.instrument for run in self.runs)) if one is not None]
         return any(stated) if stated else None
 
     def in_state(self, *states: RunState) -> tuple[RunEntry, ...]:
-        """Return the runs in one of these states; repeats of a circle as they are counted."""
+        """Return the runs in these states, repeats in counting order."""
         return repeats_in_order(run for run in self.runs if run.state in states)
 
     def circle(self, run: RunEntry) -> Circle:
-        """Return the circle that a run was commanded, its centre as programmed."""
+        """Return a run's commanded circle, its centre as programmed."""
         circle = self.plan.tests[run.test].run(run.direction)
         return circle if run.centre_mm is None else replace(circle, centre_mm=run.centre_mm)
 
     def bar_temp_c(self, logged: Mapping[str, NDArray[np.float64]]) -> float | None:
-        """Return the temperature of the bar in a run: as its thermometer logged it, else that of the shop; None where not known.
+        """Return the bar's temperature by its thermometer, else the shop's; None if unknown.
 
         Args:
             logged: temperatures by sensor, shape (n,) each [degC].
@@ -113,10 +113,10 @@ class SessionFolder(SessionDetails):
         return float(np.mean(logged["bar"])) if "bar" in logged else self.ambient_temp_c
 
     def setup(self, run: RunEntry, logged: Mapping[str, NDArray[np.float64]] = MappingProxyType({})) -> Setup:
-        """Return ball, mounting and bar of a run, named so that no other session has the same names.
+        """Return ball, mounting and bar of a run under names unique among sessions.
 
         Args:
-            logged: temperatures of the run by sensor, shape (n,) each [degC].
+            logged: temperatures by sensor, shape (n,) each [degC].
         """
         ball = self.plan.tests[run.test].ball
         mounted = mounted_name(self.plan, run.test, run.mounting)
@@ -142,24 +142,24 @@ class SessionFolder(SessionDetails):
         )
 
     def started_s(self, run: RunEntry) -> float | None:
-        """Start of a run after that of the session's first [s]; None where not noted."""
+        """Return a run's start after the first one's [s]; None if not noted."""
         moments = [other.started for other in self.runs if other.started is not None]
         return None if run.started is None else (run.started - min(moments)).total_seconds()
 
     @cached_property
     def moving_s(self) -> tuple[tuple[float, float], ...]:
-        """Beginning and end of every run whose start is noted, kept or not, on the clock of `started_s` [s].
+        """Return begin and end of every run with a noted start, on the clock of `started_s` [s].
 
-        It ends when its circle is through at the plan's feed: a second or two do not count here.
+        A run ends with its circle at the plan's feed.
         """
         circles = [(began, self.circle(run)) for run in self.runs if (began := self.started_s(run)) is not None]
         return tuple(sorted((began, began + circle.swept_deg / circle.turning_deg_s) for began, circle in circles))
 
     def load(self, run: RunEntry) -> RunFile:
-        """Read a run and hold it against what session and plan say of it.
+        """Read a run and check it against session and plan.
 
         Raises:
-            InputError: the file was changed, is damaged, or holds another run; every fault with its line.
+            InputError: the file was changed, is damaged, or holds another run.
         """
         read = read_run(run.path, sha256=run.sha256)
         faults = [*_header_faults(run, read.header), *self._implausible(run, read.recording)]
@@ -172,11 +172,8 @@ class SessionFolder(SessionDetails):
     ) -> list[RunFile]:
         """Read several runs.
 
-        Args:
-            progress: told how many of how many are read.
-
         Raises:
-            InputError: every fault of all their files.
+            InputError: every fault of all files.
         """
         read: list[RunFile] = []
         faults: list[Problem] = []
@@ -192,14 +189,14 @@ class SessionFolder(SessionDetails):
         return read
 
     def loss(self, run: RunEntry, recording: Recording) -> list[Problem]:
-        """Return what is to be said of samples that a run lost, where they are more than the plan allows."""
+        """Return a note about lost samples beyond the plan's limit."""
         lost, kept = lost_on_turn(recording, self.circle(run))
         unusable = unusable_on_turn(recording, self.circle(run))
         what = too_many_lost(lost, kept, self.plan.largest_loss_percent, unusable)
         return [Problem(str(run.path), 0, 0, what, AFTER_LOSS)] if what else []
 
     def unusable(self, run: RunEntry) -> str:
-        """Return why no figures of a run can be worked out, by its file alone; empty where they can."""
+        """Return why a run's file gives no figures; empty if it does."""
         try:
             recording = self.load(run).recording
             if lost := self.loss(run, recording):
@@ -212,7 +209,7 @@ class SessionFolder(SessionDetails):
         return ""
 
     def _implausible(self, run: RunEntry, recording: Recording) -> list[Problem]:
-        """Units that the file itself cannot tell: only the planned circle says how long and how far."""
+        """Check units that only the planned circle reveals."""
         circle, file = self.circle(run), str(run.path)
         faults = []
         bar = circle.bar_mm
@@ -239,9 +236,9 @@ class SessionFolder(SessionDetails):
 
 
 def read_session(path: Path) -> SessionFolder:
-    """Read a session: its folder, or the session file in it.
+    """Read a session from its folder or session file.
 
-    Hashes of all files are checked here; the runs' content when they are loaded.
+    Hashes of all files are checked here; runs when they are loaded.
 
     Raises:
         InputError: every fault of session, machine and plan, every missing or changed file.
@@ -254,7 +251,7 @@ def read_session(path: Path) -> SessionFolder:
 
 
 def no_session(folder: Path) -> Problem:
-    """What is wrong with a folder that is no session, with the sessions that stand in it, around it or beside it."""
+    """Return what is wrong with a folder without a session, with sessions nearby."""
     if (folder / EVENTS_FILE).is_file():
         what = f"the session file {SESSION_FILE} is gone, its event log is there"
         return Problem(str(folder), 0, 0, what, REBUILD.format(folder=folder))
@@ -267,7 +264,7 @@ def no_session(folder: Path) -> Problem:
 
 
 def _other_than_session(path: Path) -> Problem | None:
-    """What is wrong with a path that can be told to be no session without reading it."""
+    """Return why a path is evidently no session."""
     if path.is_dir():
         return None if (path / SESSION_FILE).exists() else no_session(path)
     if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:  # such as the log beside them, by `shop/*`
@@ -283,12 +280,11 @@ MOST_NAMED = 4
 def parse_session(
     path: Path, faults: list[Problem], *, as_sealed: bool = True, instead: Mapping[str, Path] | None = None
 ) -> SessionFolder | None:
-    """Read a session; None with every fault added to `faults`.
+    """Read a session; None with faults added to `faults`.
 
     Args:
-        path: of the folder, or of the session file in it.
-        faults: take what is wrong.
-        instead: files that are read as if they stood in the folder, by `machine` and `plan`.
+        path: of the folder or the session file.
+        instead: files that replace `machine` and `plan`.
     """
     wrong = _other_than_session(path)
     if wrong is not None:
@@ -348,7 +344,7 @@ def parse_session(
 
 
 def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Problem]) -> list[RunEntry]:
-    """Runs that were being recorded when the station died before it could note them."""
+    """Return runs that were recording when the station died before noting them."""
     listed = {run.path.name for run in entries}
     found = []
     for path in sorted(folder.glob(f"runs/*.csv{PART}"), key=lambda one: natural(one.name)):
@@ -365,14 +361,14 @@ def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Pr
 
 
 def unlisted_sealed(session: SessionFolder) -> tuple[Path, ...]:
-    """Return the sealed runs in a session's folder that its session file does not list."""
+    """Return sealed runs that the session file does not list."""
     listed = {run.path.name for run in session.runs}
     inside = sorted((session.folder / "runs").glob("*.csv"), key=lambda one: natural(one.name))
     return tuple(path for path in inside if path.name not in listed)
 
 
 def part_entry(path: Path) -> RunEntry | None:
-    """Return what the file of a run says of itself; None where it does not say which run it is."""
+    """Return a run file's own statement of its run, or None."""
     data = read_bytes(path, [])
     lines = None if data is None else split_file(data, str(path), [])
     header = {} if lines is None else lines.header

@@ -1,4 +1,4 @@
-"""What a session file says, held against its plan and the disk."""
+"""Check a session file against its plan and the disk."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _RECORDING = "recording"
 
 
 def check_runs(document: YamlDocument, plan: Plan | None, folder: Path, faults: list[Problem]) -> None:
-    """Check runs against each other, the plan and the disk, on the raw data: other faults must not hide these."""
+    """Check runs against each other, plan and disk on the raw data, so that other faults hide nothing."""
     runs = document.entries("runs")
     for key, what in ((("test", "direction", "repeat"), "this run"), (("file",), "this file")):
         values = [tuple(map(str, map(run.get, key))) for _, run in runs]

@@ -17,13 +17,12 @@ class SessionDetails:
     """What a session notes beside its runs; everything optional.
 
     Attributes:
-        bar_waiver: why it is measured without a fresh calibration of the bar; empty where there is one.
-        set_up_errors: micrometer readings of balls that were put up under the spindle.
-        seal: hashes of machine, plan and jig, and the end of the chain of runs.
-        amendments: what was changed on purpose after it was sealed.
-        notes: what was noted while it was measured, oldest first.
-        job: job or order number, what it is measured for.
-        instrument: what it was begun with; None: not noted.
+        bar_waiver: why the bar has no fresh calibration; empty if it has.
+        set_up_errors: micrometer readings of balls under the spindle.
+        amendments: oldest first.
+        notes: oldest first.
+        job: job or order number.
+        instrument: at the beginning; None: not noted.
     """
 
     serial_number: str = ""
@@ -40,5 +39,5 @@ class SessionDetails:
 
     @property
     def noted(self) -> bool:
-        """Whether anything is."""
+        """Return whether anything is noted."""
         return any(getattr(self, each.name) != each.default for each in fields(SessionDetails))

@@ -1,4 +1,4 @@
-"""Micrometer readings of balls that were put up under the spindle, as a session keeps them, one entry per mounting."""
+"""Micrometer readings of balls under the spindle, one entry per mounting."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ Readings: TypeAlias = tuple[float | None, float | None, float | None]
 
 @dataclass(frozen=True)
 class SetUpReadings:
-    """What a micrometer read at one mounting, in the file's unit, so that it is written again as it was.
+    """A micrometer's readings at one mounting, in the file's unit to be written back unchanged.
 
     Attributes:
-        mounting: number of the mounting; None: the one of that test's runs without a number.
-        fixed_ball_um: fixed ball less tool tip while the machine stood at the ball's commanded place, machine frame [µm].
-        moving_ball_um: moving ball less tool tip, platform frame [µm].
+        mounting: None: that of the test's runs without a number.
+        fixed_ball_um: fixed ball less tool tip at the ball's commanded place, machine frame.
+        moving_ball_um: moving ball less tool tip, platform frame.
     """
 
     test: str
@@ -44,17 +44,17 @@ class SetUpReadings:
     uncertainty_um: float
 
     def to_domain(self) -> SetUpErrors:
-        """Return the readings as calculations use them."""
+        """Return the readings for calculations."""
         return SetUpErrors(_mm(self.fixed_ball_um), _mm(self.moving_ball_um), self.uncertainty_um / 1e3)
 
 
 def set_up_readings(entry: SetUpErrorsSchema) -> SetUpReadings:
-    """Return an entry of a session file as the rest of the program takes it."""
+    """Return an entry of a session file for the rest of the program."""
     return SetUpReadings(entry.test, entry.mounting, entry.fixed_ball_um, entry.moving_ball_um, entry.uncertainty_um)
 
 
 def readings_in(file: Path, plan: Plan) -> tuple[SetUpReadings, ...]:
-    """Return the readings that a session file holds now, whatever its runs are.
+    """Return the current readings of a session file, whatever its runs.
 
     Raises:
         InputError: every fault of the file's text and of its readings.
@@ -70,12 +70,12 @@ def readings_in(file: Path, plan: Plan) -> tuple[SetUpReadings, ...]:
 
 
 def mounted_name(plan: Plan, test: str, mounting: int | None) -> str:
-    """Name of one putting-up of a ball within its session: runs of one number share it, without numbers those of a test."""
+    """Return a mounting's name in its session: by number, else by test."""
     return f"{plan.tests[test].ball.name}, {f'test {test}' if mounting is None else f'mounting {mounting}'}"
 
 
 def check_set_up_errors(document: YamlDocument, plan: Plan | None, faults: list[Problem]) -> None:
-    """Check readings against runs, plan and each other, on the raw data: other faults must not hide these."""
+    """Check readings against runs, plan and each other on the raw data, so that other faults hide nothing."""
     mountings: dict[str, list[Any]] = {}
     for _, run in document.entries("runs"):
         test = run.get("test")

@@ -1,4 +1,4 @@
-"""What a session file says as one state, held against its event log: which of the two is ahead, and what differs."""
+"""Compare a session file with its event log: which is ahead, and what differs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MOST_NAMED = 6
 
 
 def session_state(data: Mapping[str, Any]) -> dict[str, object]:
-    """Return what the data of a session file say, one way of writing it: lists, no empty values, no format, no mark of the log."""
+    """Return a session file's data in normal form: lists, no empty values, format or log mark."""
     seal = data.get("seal")
     plain = {key: value for key, value in data.items() if key != "format"}
     if isinstance(seal, dict):
@@ -40,14 +40,14 @@ def _plain(value: object) -> Any:  # noqa: ANN401 - as plain as it came
 
 
 def mark_of(data: Mapping[str, Any]) -> tuple[int, str] | None:
-    """Return how far the log went by the data of a session file: number of events, link of the last; None where it has no log."""
+    """Return the log's position by the session file: event count and last link; None without a log."""
     seal = data.get("seal")
     mark = seal.get("log") if isinstance(seal, dict) else None
     return (mark["events"], mark["sha256"]) if isinstance(mark, dict) and {"events", "sha256"} <= mark.keys() else None
 
 
 class Stands(Enum):
-    """How a session file and its event log stand to one another."""
+    """Relation of a session file to its event log."""
 
     ALONE = auto()
     """There is no log: a session of an older program, or one without a seal."""
@@ -61,10 +61,10 @@ class Stands(Enum):
 
 @dataclass(frozen=True)
 class Standing:
-    """How a session file and its event log stand to one another.
+    """Relation of a session file to its event log.
 
     Attributes:
-        differences: what is not as the log has it, in words, where they are unlike.
+        differences: in words, if they are unlike.
     """
 
     stands: Stands
@@ -73,11 +73,11 @@ class Standing:
 
 
 def standing(data: Mapping[str, Any], log: EventLog | None, *, but_runs: bool = False) -> Standing:
-    """Hold a session file against its event log.
+    """Compare a session file with its event log.
 
     Args:
-        log: as it was read; None where there is none.
-        but_runs: leave the list of runs out, whose own chain has told already what is wrong with it.
+        log: None if there is none.
+        but_runs: skip the list of runs, whose chain is checked already.
     """
     mark, state = mark_of(data), session_state(data)
     events = () if log is None else log.events
@@ -101,7 +101,7 @@ def _log_fault(count: int, log: EventLog | None) -> str:
 
 
 def _unmarked(state: Mapping[str, Any], log: EventLog) -> Standing:
-    """A log beside a file that does not know of it: it was begun and the writer died, or the seal was taken out."""
+    """Judge a log unknown to its file: the writer died at the start, or the seal was removed."""
     first = log.state(1)
     if len(log.events) == 1 and log.events[0].what == BEGUN and not differences(first, state):
         return Standing(Stands.BEHIND)
@@ -120,7 +120,7 @@ def _unsealed(state: Mapping[str, Any]) -> dict[str, object]:
 
 
 def differences(before: Mapping[str, Any], after: Mapping[str, Any], *, but_runs: bool = False) -> tuple[str, ...]:
-    """Return what a session file says otherwise than the log, in words; readings that were added are nothing."""
+    """Return differences of session file and log in words; added readings do not count."""
     old, new = _by_run(before), _by_run(after)
     for state in (old, new):
         state.pop(READINGS, None)
@@ -136,7 +136,7 @@ def differences(before: Mapping[str, Any], after: Mapping[str, Any], *, but_runs
 
 
 def _by_run(state: Mapping[str, Any]) -> dict[str, object]:
-    """The state with runs by their names, so that a change is told of the run that it is of."""
+    """Return the state with runs by name, for messages."""
     runs = state.get("runs", ())
     if not runs:
         return dict(state)
@@ -145,7 +145,7 @@ def _by_run(state: Mapping[str, Any]) -> dict[str, object]:
 
 
 def with_readings(state: Mapping[str, Any], data: Mapping[str, Any]) -> dict[str, object]:
-    """Return a state with the readings that a session file has."""
+    """Return a state with the readings of a session file."""
     readings = session_state(data).get(READINGS)
     bare = {key: value for key, value in state.items() if key != READINGS}
     return {**bare, READINGS: readings} if readings else bare

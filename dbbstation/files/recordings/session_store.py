@@ -1,8 +1,7 @@
-"""The session file and its event log, read and written together; every writer of a session file goes this way.
+"""Read and write a session file and its event log together, under the session's lock.
 
-Whoever writes holds the lock of the session first, then reads, then writes. An event is on the disk before the session file says
-what it says: a writer that died in between left the file behind its log, and it is put forward from there. The file is written only
-where it is the one that was read.
+An event reaches the disk before the session file. If a writer died in between, the file is brought up to its log. A file
+is replaced only if it is the one that was read.
 """
 
 from __future__ import annotations
@@ -57,23 +56,23 @@ REBUILD = "`dbbstation session rebuild {folder}` writes it as the event log has 
 
 
 def now() -> datetime:
-    """Return the time of day with its zone, to the second."""
+    """Return the time with its zone, to the second."""
     return datetime.now(UTC).replace(microsecond=0)
 
 
 def marked(state: Mapping[str, Any], log: EventLog) -> dict[str, object]:
-    """Return a state with the mark of how far its log goes, as the session file has it."""
+    """Return a state with the log's position."""
     if not log.events or not isinstance(state.get("seal"), dict):
         return dict(state)
     return {"runs": [], **_with_mark(state, state, len(log.events), log.links[-1])}
 
 
 def first_log(data: Mapping[str, Any], at: datetime | None) -> tuple[bytes, dict[str, object]]:
-    """Return the log of a session that is made, and what its session file says.
+    """Return the log of a new session and its session file's content.
 
     Args:
-        data: what the session file says, without the mark of the log.
-        at: when; None where that means nothing.
+        data: without the log's position.
+        at: None if that means nothing.
     """
     state: Mapping[str, Any] = session_state(data)
     line = line_of("", "created", at, change({}, state))
@@ -81,14 +80,14 @@ def first_log(data: Mapping[str, Any], at: datetime | None) -> tuple[bytes, dict
 
 
 def _with_mark(data: Mapping[str, Any], state: Mapping[str, Any], events: int, sha256: str) -> dict[str, object]:
-    """Return data with the seal of a state, and in it how far the log goes: number of events, link of the last."""
+    """Return data with the state's seal and the log's position: event count and last link."""
     return {**data, "seal": {**state["seal"], "log": {"events": events, "sha256": sha256}}}
 
 
 def document_in_force(file: Path, faults: list[Problem]) -> tuple[YamlDocument | None, EventLog | None]:
-    """Read a session file and its event log; no document, with every fault added to `faults`, where it cannot be read.
+    """Read a session file and its log; no document, with faults added to `faults`, if unreadable.
 
-    Of a file that its writer left behind the log, what the log has comes back: nobody needs to do anything.
+    A file behind its log is brought up to it.
     """
     found: list[Problem] = []
     document = read_document(file, SessionFile, found)
@@ -107,11 +106,11 @@ def document_in_force(file: Path, faults: list[Problem]) -> tuple[YamlDocument |
 
 
 def log_faults(file: Path, data: Mapping[str, Any], log: EventLog | None, *, but_runs: bool) -> list[Problem]:
-    """Return what a session file says otherwise than its event log.
+    """Return differences of a session file and its event log.
 
     Args:
-        log: as it was read; None where there is none.
-        but_runs: leave the list of runs out, whose own chain has told already what is wrong with it.
+        log: None if there is none.
+        but_runs: skip the list of runs, whose chain is checked already.
     """
     stands = standing(data, log, but_runs=but_runs)
     remedy = AMEND.format(folder=file.parent)
@@ -126,23 +125,21 @@ def _rebuild(file: Path) -> str:
 
 
 class SessionStore:
-    """Reads and writes one session file with its log, for whoever holds the lock of the session.
+    """Reads and writes a session file with its log, under the session's lock.
 
-    A session file that cannot be read, or is gone, is written anew from the log; what stood there is kept. One that its writer left
-    behind the log is put forward.
+    A damaged, missing or outdated session file is written anew from the log; what was there is kept.
 
     Args:
-        clock: the time of day with its zone, for the log.
-        anew: write the session file as the log has it, whatever it says.
+        clock: time with its zone, for the log.
+        anew: write the session file from the log in any case.
 
     Attributes:
-        log: the event log, without events where the session has none yet.
-        sha256: of the session file as it was read or written last.
-        state: what it says, as the log goes on from it.
-        put_aside: where the file is kept that took the place of the session file; empty where it was gone, None where none did.
+        log: empty if the session has none yet.
+        sha256: of the session file at the last reading or writing.
+        put_aside: where a replaced session file is kept; empty if it was missing, None if none was replaced.
 
     Raises:
-        InputError: there is no session, or neither its file nor its log can be read.
+        InputError: there is no session, or neither file nor log is readable.
         OutputError: the disk refuses.
     """
 
@@ -172,12 +169,11 @@ class SessionStore:
         """Log what has changed, then write the session file.
 
         Args:
-            data: what the session file is to say, without the mark of the log.
-            what: happened, in a word or two.
-            text: makes the text of the session file of what it says.
+            data: without the log's position.
+            what: in a word or two.
 
         Raises:
-            OutputError: somebody else has written the file since it was read, or the disk refuses; both are as before then.
+            OutputError: the file has changed since it was read, or the disk refuses; both are restored.
         """
         state = session_state(data)
         if not self.log.events and "seal" in self.state and what != SEALED:
@@ -216,25 +212,25 @@ class SessionStore:
         self.state = state
 
     def text_by_log(self) -> bytes:
-        """Return the text that the session file has by its log."""
+        """Return the session file's text by its log."""
         return text_of(marked(self.log.state(), self.log)).encode()
 
     def go_on_from_log(self) -> None:
-        """Take what is written next for a change of what the log says, not of what the session file said."""
+        """Count the next writing as a change of the log's state, not of the file's."""
         self.state = self.log.state()
 
     def begin_anew(self) -> None:
-        """Take away a log that cannot be relied on; whoever calls this has kept it under another name."""
+        """Remove an unreliable log, which the caller has kept elsewhere."""
         (self._file.parent / EVENTS_FILE).unlink(missing_ok=True)
         self.log = EventLog(self._file.parent / EVENTS_FILE)
 
     def changed_meanwhile(self) -> dict[str, object] | None:
-        """Return what the session file says where somebody has written it since; None where nobody has.
+        """Return the content of a session file that somebody has changed since, or None.
 
-        One that cannot be read, or is gone, is put aside: the next writing puts the right one there.
+        An unreadable or missing file is put aside; the next writing restores it.
 
         Raises:
-            InputError: it is there and cannot be read.
+            InputError: it exists and cannot be read.
             OutputError: the disk refuses.
         """
         found, data = self._on_disk([])
@@ -246,13 +242,13 @@ class SessionStore:
         return data
 
     def accept_readings(self, data: Mapping[str, Any]) -> None:
-        """Go on from a session file into which somebody wrote readings, and nothing else.
+        """Accept a session file into which somebody wrote readings only.
 
         Args:
-            data: what it says, as `changed_meanwhile` returned it.
+            data: from `changed_meanwhile`.
 
         Raises:
-            OutputError: something else was changed in it, too.
+            OutputError: something else was changed too.
         """
         # Whoever opened the file in an editor some runs ago saves what it said then.
         known, mark = self.state, mark_of(data)
@@ -272,10 +268,10 @@ class SessionStore:
         )
 
     def _on_disk(self, faults: list[Problem]) -> tuple[bytes | None, dict[str, object] | None]:
-        """Return bytes and data of the session file; no data, with the reason in `faults`, where it is none or is gone.
+        """Return bytes and data of the session file; no data, with the reason in `faults`, if damaged or missing.
 
         Raises:
-            InputError: it is there and cannot be read.
+            InputError: it exists and cannot be read.
         """
         found = read_bytes(self._file, faults, is_input=False)
         text = None if found is None else decode(found, str(self._file), faults)
@@ -296,7 +292,6 @@ class SessionStore:
         self._put(text_of(self.data))
 
     def _kept(self, found: bytes | None) -> str:
-        """Keep what stands in the place of the session file, and return where."""
         if not found:
             return ""
         name = copy_name(SESSION_FILE, hashlib.sha256(found).hexdigest())

@@ -1,4 +1,4 @@
-"""What a session file says as plain data, and its text, in the oldest version of the format that has it all."""
+"""A session file's data and text, in the oldest version that has all keys."""
 
 from __future__ import annotations
 
@@ -22,11 +22,10 @@ if TYPE_CHECKING:
 def session_data(
     folder: Path, names: Sequence[str], details: SessionDetails, runs: Sequence[RunEntry]
 ) -> dict[str, object]:
-    """Return what a session file says, without its format.
+    """Return a session file's content without its format.
 
     Args:
-        names: paths of machine and plan in it, in this order.
-        details: what it notes beside its runs.
+        names: paths of machine and plan, in this order.
         runs: in the order of the list.
     """
     bar, seal = details.bar, details.seal
@@ -51,13 +50,13 @@ def session_data(
 
 
 def text_of(data: Mapping[str, object]) -> str:
-    """Return the text of a session file that says `data`, its keys in their usual order."""
+    """Return the text of a session file, keys in their usual order."""
     ordered = {key: data[key] for key in SessionFile.model_fields if key in data}
     return yaml_text({"format": format_for(SessionFile, ordered), **ordered})
 
 
 def seal_data(seal: Seal) -> dict[str, object]:
-    """Return a seal as its file holds it."""
+    """Return a seal for its file."""
     log = {"events": seal.events, "sha256": seal.anchor} if seal.anchor else None
     data = {"files": dict(seal.files), "runs": seal.runs, "chain_sha256": seal.chain_sha256 or None, "log": log}
     return {key: value for key, value in data.items() if value is not None}

@@ -1,4 +1,4 @@
-"""Keeping the session file of a session true while runs come in and are judged."""
+"""Keep a session file true while runs are recorded and judged."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 class SessionWriter:
     """Keeps one session folder while runs are recorded.
 
-    The order of writing makes every moment survivable: the `.part` exists before the session file names it, and is
-    sealed before the session file calls it complete. Micrometer readings that a person saves in the session file meanwhile
-    are taken over; where they are wrong, the next step raises InputError and leaves the file as it is.
+    Every step survives a crash: the `.part` exists before the session file names it, and is sealed before it is called
+    complete. Readings that somebody saves meanwhile are taken over. If they are wrong, the next step raises InputError
+    and leaves the file.
     """
 
     def __init__(self, folder: Path, lock: SessionLock, clock: Callable[[], datetime]) -> None:
@@ -55,12 +55,12 @@ class SessionWriter:
         self.close()
 
     def close(self) -> None:
-        """Let others write into the session; may be called twice."""
+        """Let others write; may be called twice."""
         self._lock.close()
 
     @property
     def locked(self) -> bool:
-        """Whether no other process can write into the session; False on a file system that knows no locks."""
+        """Return whether others cannot write; False on a file system without locks."""
         return self._lock.held
 
     @classmethod
@@ -72,21 +72,21 @@ class SessionWriter:
         details: SessionDetails | None = None,
         clock: Callable[[], datetime] = now,
     ) -> Self:
-        """Make a session folder with machine and plan in it and no runs.
+        """Make a session folder with machine and plan and no runs.
 
         Args:
-            clock: the time of day with its zone, for the event log.
+            clock: time with its zone, for the log.
 
         Raises:
             InputError: what no session may note.
-            OutputError: the folder exists already, lies in another session, or cannot be written.
+            OutputError: the folder exists, lies in another session, or cannot be written.
         """
         make_session_folder(folder, machine, plan, details or SessionDetails(), (), {}, clock())
         return cls._locked(folder, 0.0, clock)
 
     @classmethod
     def _locked(cls, folder: Path, patience_s: float, clock: Callable[[], datetime]) -> Self:
-        """Lock first, then read: what another process wrote until then is read."""
+        """Lock, then read."""
         lock = SessionLock(folder, patience_s)
         try:
             writer = cls(folder, lock, clock)
@@ -98,24 +98,24 @@ class SessionWriter:
 
     @classmethod
     def open(cls, folder: Path, patience_s: float = 0.0, clock: Callable[[], datetime] = now) -> Self:
-        """Go on with a session: half-recorded runs are kept and listed as `recording`.
+        """Continue a session; interrupted runs are kept and listed as `recording`.
 
-        A session file that was spoilt is written anew from the event log.
+        A damaged session file is written anew from the log.
 
         Args:
-            patience_s: how long another process may go on writing into it [s].
-            clock: the time of day with its zone, for the event log.
+            patience_s: how long to wait for another writer.
+            clock: time with its zone, for the log.
 
         Raises:
             InputError: every fault of the session.
-            OutputError: another process writes into it, or the session file cannot be written.
+            OutputError: another process writes into it, or it cannot be written.
         """
         if not any((folder / name).is_file() for name in (SESSION_FILE, EVENTS_FILE)):
             raise InputError([no_session(folder)])  # no lock is left in what is no session
         return cls._locked(folder, patience_s, clock)
 
     def _take_over(self) -> None:
-        """Put right what a process left that died."""
+        """Repair what a dead process left."""
         folder = self._session.folder
         for inner in (folder, folder / RUNS, folder / PROGRAMS):
             remove_leftovers(inner)
@@ -130,16 +130,16 @@ class SessionWriter:
 
     @property
     def session(self) -> SessionFolder:
-        """The session as it stands on disk."""
+        """Return the session as on disk."""
         return self._session
 
     @property
     def runs(self) -> tuple[RunEntry, ...]:
-        """Runs in the order they were started."""
+        """Return runs in starting order."""
         return self._session.runs
 
     def next_repeat(self, test: str, direction: Direction) -> int:
-        """Return the first repeat of a test and direction after every one that exists."""
+        """Return the repeat after every existing one."""
         taken = [run.repeat for run in self.runs if (run.test, run.direction) == (test, direction)]
         repeat = max(taken, default=0) + 1
         while any(self._session.folder.glob(f"{RUNS}/{run_name(test, direction, repeat)}*")):
@@ -158,17 +158,15 @@ class SessionWriter:
         centre_mm: tuple[float, float, float] | None = None,
         instrument: ReadBy | None = None,
     ) -> RunWriter:
-        """Start the next repeat of a test: its `.part` is made and noted as `recording`.
+        """Start a test's next repeat: make its `.part` and note it as `recording`.
 
         Args:
-            test: name of the test in the plan.
-            direction: sense of travel.
             columns: as `RunWriter` takes them.
-            started: time of the first sample, with its zone.
-            mounting: counts how often the ball was put up.
-            program: from `add_program`, where the plan's circle is not what is commanded.
-            centre_mm: centre of the circle as programmed where it differs from the plan [mm].
-            instrument: what reads it; None: not noted.
+            started: first sample, with its zone.
+            mounting: number of the ball's set-up.
+            program: from `add_program`; None: the plan's circle.
+            centre_mm: as programmed; None: as planned.
+            instrument: None: not noted.
 
         Raises:
             InputError: the plan has no such run.
@@ -203,10 +201,10 @@ class SessionWriter:
         """Seal a run and note it as `complete`.
 
         Args:
-            counts: what came over the line and what did not, where that is known.
+            counts: None: not known.
 
         Raises:
-            OutputError: it has no sample, or the disk refuses; it stays `recording` then.
+            OutputError: it has no sample, or the disk refuses; it stays `recording`.
         """
         entry = next(run for run in self.runs if run.path == writer.path)
         digest = writer.seal(counts)
@@ -218,7 +216,7 @@ class SessionWriter:
         """Note a sealed run as `accepted` or `rejected`.
 
         Args:
-            reason: why; empty where a usable run is accepted.
+            reason: empty for an accepted usable run.
 
         Raises:
             OutputError: the run is not complete, or the disk refuses.
@@ -231,7 +229,7 @@ class SessionWriter:
         return judged
 
     def note(self, note: Note) -> None:
-        """Note something while it is measured.
+        """Add a note.
 
         Raises:
             OutputError: the disk refuses.
@@ -240,10 +238,10 @@ class SessionWriter:
         self._write("noted")
 
     def take_in(self, path: Path) -> RunEntry:
-        """List a sealed run that lies in the folder and is in no list, as `complete`: it is still to be judged.
+        """List an unlisted sealed run as `complete`, to be judged.
 
         Raises:
-            InputError: it does not say which run of the plan it is, is damaged, or that run is listed already.
+            InputError: it names no run of the plan, is damaged, or is listed already.
             OutputError: the disk refuses.
         """
         found, file = part_entry(path), str(path)
@@ -265,7 +263,7 @@ class SessionWriter:
         return taken
 
     def add_program(self, name: str, content: bytes, *, model_sha256: str = "") -> CommandedProgram:
-        """Keep an NC program in the session; one of the same name and content is taken as it is.
+        """Keep an NC program; an equal one is reused.
 
         Raises:
             OutputError: another program has that name, or the disk refuses.
@@ -277,7 +275,7 @@ class SessionWriter:
         return CommandedProgram(path, digest, model_sha256)
 
     def _seal(self) -> None:
-        """Seal a session of an older program before more is recorded into it."""
+        """Seal a session of an older program before recording more."""
         session = self._session
         found = hashes(session.folder, sealed_names(session.folder, session.names))
         keep_copies(session.folder, found)
@@ -285,7 +283,7 @@ class SessionWriter:
         self._session = replace(session, runs=runs, seal=sealed_over(found, runs))
 
     def _put(self, entry: RunEntry) -> RunEntry:
-        """Put an entry into the list, at its place or at the end, and return it as it stands there."""
+        """Put an entry at its place or at the end and return it."""
         key = (entry.test, entry.direction, entry.repeat)
         runs = tuple(({(run.test, run.direction, run.repeat): run for run in self.runs} | {key: entry}).values())
         seal = self._session.seal
@@ -296,7 +294,7 @@ class SessionWriter:
         return next(run for run in runs if (run.test, run.direction, run.repeat) == key)
 
     def _write(self, what: str) -> None:
-        """Log and write what the session is now; where that fails it is as it was written last."""
+        """Log and write the session; on failure restore the last state."""
         try:
             self._take_readings()
             session = self._session
@@ -310,7 +308,7 @@ class SessionWriter:
         self._session = self._kept = replace(session, sha256=self._store.sha256, seal=seal)
 
     def _take_readings(self) -> None:
-        """Take over micrometer readings that somebody wrote into the session file while runs come in; nothing else."""
+        """Take over micrometer readings that somebody wrote meanwhile."""
         other = self._store.changed_meanwhile()
         if other is not None:
             readings = readings_in(self._session.folder / SESSION_FILE, self._session.plan)

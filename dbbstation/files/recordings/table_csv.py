@@ -1,4 +1,4 @@
-"""Tables of any columns: CSV with one line of names, `#` lines are comments; commas, semicolons or tabs between columns."""
+"""Tables of any columns: CSV with a header line; `#` begins a comment; commas, semicolons or tabs."""
 
 from __future__ import annotations
 
@@ -30,12 +30,11 @@ class TableFile:
     """One file of columns.
 
     Attributes:
-        file: as named in messages.
-        header: number of the line that names the columns.
-        names: of the columns, in order.
-        lines: number of the line of each row, shape (n,).
-        cells: texts by column, n each, with a dot as decimal sign.
-        values: numbers by column, shape (n,): NaN where a cell says that there is none, and where it is no number.
+        header: number of the header line.
+        names: in order.
+        lines: number of each row's line, shape (n,).
+        cells: texts by column, n each, with a decimal point.
+        values: numbers by column, shape (n,); NaN for empty cells and texts.
     """
 
     file: str
@@ -49,7 +48,7 @@ class TableFile:
         return len(self.lines)
 
     def faults_of(self, name: str) -> list[Problem]:
-        """Cells of a column that are neither a number nor say that there is none, with their lines."""
+        """Return cells of a column that are neither number nor empty, with lines."""
         found = []
         for line, cell, value in zip(self.lines.tolist(), self.cells[name], self.values[name], strict=True):
             if not np.isfinite(value) and cell.lower() not in NO_NUMBER:
@@ -58,7 +57,7 @@ class TableFile:
         return found
 
     def is_text(self, name: str) -> bool:
-        """Whether a column has no number at all."""
+        """Return whether a column has no number."""
         return not np.isfinite(self.values[name]).any()
 
 
@@ -66,11 +65,10 @@ def read_table(path: Path, needed: Iterable[str] = (), numbers: NumberLanguage |
     """Read a table.
 
     Args:
-        needed: columns that must be there.
-        numbers: how they are written; None: a dot in numbers, and the separator that the header has most of.
+        numbers: None: decimal point and the header's most frequent separator.
 
     Raises:
-        InputError: it cannot be read, has no rows, lacks a column (and which it may be instead), or has lines of another width.
+        InputError: it cannot be read, has no rows, lacks a column (with likely ones), or rows of different width.
     """
     faults: list[Problem] = []
     data = read_bytes(path, faults, LARGEST_TABLE)
@@ -120,14 +118,14 @@ def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: Numbe
 
 
 def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Problem:
-    """Fault of a column that is not there: which it may be, or which there are."""
+    """Return the fault of a missing column, with likely ones."""
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     remedy = f"did you mean `{near[0]}`?" if near else f"columns here: {', '.join(names)}"
     return Problem(file, line, 0, f"there is no column `{name}`", remedy)
 
 
 def table_csv(names: Sequence[str], columns: Sequence[Sequence[object]]) -> str:
-    """CSV text of columns of one length; numbers with nine significant digits, texts as they are."""
+    """Return columns as CSV text; numbers with nine significant digits."""
     rows = ([f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row] for row in zip(*columns, strict=True))
     return csv_text([names, *rows])
 
@@ -144,7 +142,7 @@ def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: i
 
 
 def _plain(cells: Sequence[str], values: NDArray[np.float64], language: NumberLanguage) -> tuple[str, ...]:
-    """Cells with the decimal sign of this program's own files; texts as they are."""
+    """Return cells with a decimal point; texts unchanged."""
     return tuple(
         cell.replace(language.decimal, PLAIN.decimal) if np.isfinite(value) else cell
         for cell, value in zip(cells, values, strict=True)
@@ -152,7 +150,7 @@ def _plain(cells: Sequence[str], values: NDArray[np.float64], language: NumberLa
 
 
 def _numbers(cells: Sequence[str], language: NumberLanguage) -> NDArray[np.float64]:
-    """Numbers of cells; NaN for those that are none."""
+    """Return numbers of cells; NaN for others."""
     plain: Sequence[str] = cells
     if language.decimal != PLAIN.decimal and not any(PLAIN.decimal in cell for cell in cells):
         plain = [cell.replace(language.decimal, PLAIN.decimal) for cell in cells]

@@ -1,4 +1,4 @@
-"""Files that are no tables by what they begin with, and tables whose columns are parted by spaces."""
+"""Recognise files that are no tables, and columns separated by spaces."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LOOKED_AT = 4_000
 
 
 def kind_of(data: bytes) -> tuple[str, str] | None:
-    """Return what a file is that is no text with a table, and what to do; None where it may be one."""
+    """Return kind and remedy of a file that is no table, or None."""
     for beginning, what, remedy in _BEGINNINGS:
         if data.startswith(beginning):
             return what, remedy
@@ -55,10 +55,9 @@ def _is_utf_16(start: bytes) -> bool:
 
 
 def with_tabs(lines: list[str]) -> list[str] | None:
-    """Return the lines of a table whose columns are parted by spaces with tabs in their place; None where no such table begins.
+    """Return lines with tabs for the spaces between columns; None if no such table begins.
 
-    Names may hold single spaces where two or more part them: a line that has as many parts by two spaces as rows have numbers is
-    parted so, every other line with digits by single ones.
+    Names may hold single spaces if two or more separate them.
     """
     parts = [line.split() for line in lines]
     numbers = [one for one in parts if one and all(map(_digits, one))]

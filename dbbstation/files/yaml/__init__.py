@@ -1,1 +1,1 @@
-"""YAML text read with the line and column of every node, checked against a schema, and written."""
+"""YAML with the line and column of every node: read, checked, written."""

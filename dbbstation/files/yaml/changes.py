@@ -1,4 +1,4 @@
-"""What differs between two documents of plain data, key by key, in words."""
+"""Differences of two plain documents, key by key, in words."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ if TYPE_CHECKING:
 
 
 def changes(before: object, after: object, at: Location = ()) -> list[str]:
-    """Return what has changed, one text per key such as `base_joints_mm[0][1] is 12.2, was 12.0`; empty where nothing has.
+    """Return changes, one text per key such as `base_joints_mm[0][1] is 12.2, was 12.0`.
 
     Args:
-        before: mappings, sequences, texts, numbers, booleans and None. Entries of a list that all have a `name` are matched by
-            it, so that one that was taken out is named.
-        at: where both stand in their documents.
+        before: lists whose entries all have a `name` are matched by it.
+        at: place of both in their documents.
     """
     if isinstance(before, Mapping) and isinstance(after, Mapping):
         gone = [f"{dotted((*at, str(key)))} is gone" for key in before if key not in after]
@@ -41,7 +40,7 @@ def _is_list(value: object) -> TypeGuard[Sequence[object]]:
 
 
 def _by_name(entries: Sequence[object]) -> dict[str, object] | None:
-    """Entries by their names; None where some have none or two have the same."""
+    """Return entries by name; None if names lack or repeat."""
     named: dict[str, object] = {
         str(entry["name"]): entry for entry in entries if isinstance(entry, Mapping) and "name" in entry
     }

@@ -1,4 +1,4 @@
-"""Plain data to YAML text that a person likes to read: small things on one line, numbers exact to the last digit."""
+"""Write plain data as readable YAML with exact numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NEEDS_ESCAPE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
 def yaml_text(data: Mapping[str, object]) -> str:
-    """Return a document of mappings, sequences, text, numbers, booleans and None as YAML."""
+    """Return a document of plain data as YAML."""
     return "\n".join(_block(data, "")) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""What all schemas share: strict, nothing unknown, frozen; and how their complaints become placed problems."""
+"""Common base of schemas, strict and frozen; complaints become placed problems."""
 
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
@@ -100,7 +100,7 @@ S = TypeVar("S", bound=Schema)
 
 
 def read_document(path: Path, schema: type[Schema], faults: list[Problem]) -> YamlDocument | None:
-    """Read a YAML file of the format that `schema` describes; None where it is no such file."""
+    """Read a YAML file by `schema`; None with faults added."""
     document = load_yaml(path, faults)
     if document is None:
         return None
@@ -112,7 +112,7 @@ def read_document(path: Path, schema: type[Schema], faults: list[Problem]) -> Ya
 
 
 def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> S | None:
-    """Return a document's data as its schema has it; None with every fault added to `faults`."""
+    """Return a document by its schema; None with faults added to `faults`."""
     newer = _newer_keys(document, schema)
     if newer:
         faults.extend(newer)
@@ -127,17 +127,17 @@ def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> 
 
 
 def format_of(schema: type[Schema]) -> str:
-    """Return the format's name with its newest version, such as `dbb-plan/2`."""
+    """Return the newest format name, such as `dbb-plan/2`."""
     return versions_of(schema)[-1]
 
 
 def versions_of(schema: type[Schema]) -> tuple[str, ...]:
-    """Return the format's name with every version that is read, oldest first."""
+    """Return the format names that are read, oldest first."""
     return tuple(map(str, schema.model_fields["format"].annotation.__args__))  # type: ignore[union-attr]  # a Literal
 
 
 def format_for(schema: type[Schema], data: Mapping[str, Any]) -> str:
-    """Return the format's name with the oldest version that has all keys of some data, so that older programs read it."""
+    """Return the oldest format name with all keys of some data."""
     versions = versions_of(schema)
     since = SINCE.get(versions[0].partition("/")[0], {})
     return versions[max((since[key] for key in _keys(data) if key in since), default=1) - 1]
@@ -154,7 +154,7 @@ def _keys(data: object) -> Iterator[str]:
 
 
 def _newer_keys(document: YamlDocument, schema: type[Schema]) -> list[Problem]:
-    """Faults of keys that the version of the file has not yet."""
+    """Return faults of keys newer than the file's version."""
     given = document.data.get("format") if isinstance(document.data, dict) else None
     if "format" not in schema.model_fields or given not in versions_of(schema):
         return []
@@ -194,7 +194,7 @@ def _has_format(document: YamlDocument, known: Sequence[str], faults: list[Probl
 
 
 def _problem(document: YamlDocument, schema: type[Schema], detail: ErrorDetails) -> Problem:
-    """Put one complaint of pydantic into plain words at its place."""
+    """Put a pydantic complaint into plain words at its place."""
     location = _known_part(document, detail["loc"])
     kind, given, context = detail["type"], detail["input"], detail.get("ctx", {})
     if kind == "missing":
@@ -232,13 +232,13 @@ def _in_words(kind: str, given: object, context: dict[str, Any], message: str) -
 
 
 def _place(document: YamlDocument, detail: ErrorDetails) -> tuple[int, int]:
-    """Where a complaint of pydantic belongs, as a line and a column."""
+    """Return line and column of a pydantic complaint."""
     location = _known_part(document, detail["loc"])
     return document.key_places.get(location) or document.value_places.get(location, (0, 0))
 
 
 def dotted(location: Location) -> str:
-    """Write a location as people do: `tests[3].ball`."""
+    """Return a location as people write it: `tests[3].ball`."""
     text = ""
     for step in location:
         text += f"[{step}]" if isinstance(step, int) else f".{shortened(step)}" if text else shortened(step)
@@ -260,7 +260,7 @@ def _shown(value: object) -> str:
 
 
 def _known_part(document: YamlDocument, location: tuple[int | str, ...]) -> Location:
-    """Drop what pydantic puts into a location beside keys and indices: names of union members, `[key]`."""
+    """Drop union members and `[key]` from a pydantic location."""
     known: Location = ()
     for step in location:
         if (*known, step) in document.value_places:
@@ -269,7 +269,7 @@ def _known_part(document: YamlDocument, location: tuple[int | str, ...]) -> Loca
 
 
 def keys_at(schema: type[Schema], location: Location) -> Iterator[str]:
-    """Keys that a schema knows for the mapping at a location."""
+    """Return the keys that a schema knows at a location."""
     root = schema.model_json_schema()
     definitions = root.get("$defs", {})
 

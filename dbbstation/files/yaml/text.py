@@ -1,7 +1,7 @@
-"""YAML text to plain data that knows the line and column of every key and value.
+"""YAML text to plain data with the line and column of every key and value.
 
-Composed by ruamel.yaml into nodes and turned into data here, so that nothing is guessed: YAML 1.2 scalars only, no
-tags, no merge keys, no key twice. Sequences become tuples, times stay text: the schemas say what they want.
+ruamel.yaml composes nodes; only YAML 1.2 scalars are accepted, without tags, merge keys or double keys. Sequences become
+tuples, times stay text.
 """
 
 from __future__ import annotations
@@ -35,13 +35,12 @@ _PLAIN_TEXT = {"str", "timestamp", "value"}
 
 @dataclass(frozen=True)
 class YamlDocument:
-    """Data of one YAML file with the place of everything in it.
+    """A YAML file's data with their places.
 
     Attributes:
-        file: as named in messages.
         data: mappings, tuples, text, numbers, booleans and None.
-        value_places: (line, column), from 1, where each value starts.
-        key_places: (line, column), from 1, where the key of each mapping entry starts.
+        value_places: (line, column), from 1, of each value's start.
+        key_places: (line, column), from 1, of each key's start.
     """
 
     file: str
@@ -50,7 +49,7 @@ class YamlDocument:
     key_places: dict[Location, tuple[int, int]] = field(repr=False)
 
     def problem(self, location: Location, what: str, remedy: str = "", *, at_key: bool = False) -> Problem:
-        """Return a problem placed at a value (or its key), or at the nearest thing around it that exists."""
+        """Return a problem at a value or its key, or at the nearest existing parent."""
         if at_key and location in self.key_places:
             return Problem(self.file, *self.key_places[location], what, remedy)
         around = location
@@ -59,9 +58,9 @@ class YamlDocument:
         return Problem(self.file, *self.value_places.get(around, (1, 1)), what, remedy)
 
     def entries(self, *location: str | int) -> list[tuple[Location, dict[Any, Any]]]:
-        """Mappings that stand in the sequence or mapping at a location; nothing where it is something else.
+        """Return the mappings in a sequence or mapping; nothing for other types.
 
-        Checks across entries use this, so that they work on a file that has other faults as well.
+        Checks across entries thus work on files with other faults.
         """
         within = self.data
         for step in location:
@@ -94,14 +93,14 @@ LONGEST_S = 60.0
 
 
 def load_yaml(path: Path, faults: list[Problem]) -> YamlDocument | None:
-    """Read a YAML file; None with the reasons added to `faults` where that is impossible."""
+    """Read a YAML file; None with reasons added to `faults`."""
     data = read_bytes(path, faults, LARGEST_BYTES)
     text = None if data is None else decode(data, str(path), faults)
     return None if text is None else parse_yaml(text, str(path), faults)
 
 
 def parse_yaml(text: str, file: str, faults: list[Problem]) -> YamlDocument | None:
-    """Parse YAML text; None with the reasons added to `faults` where that is impossible."""
+    """Parse YAML text; None with reasons added to `faults`."""
     document, found = (_of_many if len(text) <= SHORT else _of_the_last)(text)
     faults += [replace(fault, file=file) for fault in found]
     return None if document is None else replace(document, file=file)
@@ -144,7 +143,7 @@ def _composed(text: str, file: str, faults: list[Problem]) -> YamlDocument | Non
 
 
 class _OverBudgetError(Exception):
-    """A document is beyond a budget at a line and column, counted from 1."""
+    """A document exceeds a budget at a line and column, from 1."""
 
     def __init__(self, what: str, mark: StreamMark) -> None:
         super().__init__(what)
@@ -153,7 +152,7 @@ class _OverBudgetError(Exception):
 
 
 class _BoundedScanner(Scanner):
-    """Refuses tags longer than anybody writes: the time that ruamel.yaml takes for one grows with its square."""
+    """Refuses overlong tags, for which ruamel.yaml takes quadratic time."""
 
     def scan_tag(self) -> Any:  # noqa: ANN401 - as in ruamel.yaml
         if not self.reader.prefix(LONGEST_TAG).split(maxsplit=1)[0][LONGEST_TAG - 1 :]:
@@ -162,7 +161,7 @@ class _BoundedScanner(Scanner):
 
 
 class _Counting(Composer):
-    """Composes nodes and counts them, their depth and the time while it does so: before they fill the memory."""
+    """Counts nodes, depth and time while composing, before memory fills."""
 
     def __init__(self, loader: Any = None) -> None:  # noqa: ANN401 - a class of ruamel.yaml without a name of its own
         super().__init__(loader)

@@ -1,1 +1,1 @@
-"""Figures of a machine over its sessions: trends, and changes beyond uncertainty."""
+"""Figures of a machine over its sessions: trends and significant changes."""

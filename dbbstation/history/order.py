@@ -1,4 +1,4 @@
-"""Whether the dates of sessions can be right."""
+"""Check the dates of sessions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ the order. Names that were given at random agree on about 2 / sqrt(n) of n [Loga
 
 
 def date_faults(sessions: Sequence[SessionFigures], now: datetime) -> list[str]:
-    """Say which sessions have dates that cannot be right, or that another session has too."""
+    """Return sessions with impossible or repeated dates."""
     faults = []
     by_date = sorted(sessions, key=_dated)
     for one, other in pairwise(by_date):
@@ -52,7 +52,7 @@ def moment_words(moment: datetime | None) -> str:
 
 
 def by_time(session: SessionFigures) -> tuple[float, tuple[tuple[int, int, str], ...]]:
-    """Return a key that sorts sessions by date, those of one date by name."""
+    """Return a sort key by date, then name."""
     return _dated(session), natural(session.name)
 
 

@@ -1,4 +1,4 @@
-"""What a history knows of one session and of one model: figures with their uncertainties, and what may explain a change."""
+"""A history's facts of a session and a model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Figure:
 
     Attributes:
         name: such as `G` or `X`.
-        u_um: its standard uncertainty [µm]; None where it is not known.
+        u_um: standard uncertainty; None if not known.
     """
 
     name: str
@@ -22,7 +22,7 @@ class Figure:
 
     @property
     def stated_u_um(self) -> float:
-        """Its standard uncertainty; not a number where it is not known [µm]."""
+        """Return the standard uncertainty [µm]; nan if not known."""
         return nan if self.u_um is None else self.u_um
 
 
@@ -32,7 +32,7 @@ class RunFigures:
 
     Attributes:
         direction: `ccw` or `cw`.
-        circle: its commanded circle in words: runs of one test are comparable where these are the same.
+        circle: in words; runs of a test with equal words are comparable.
     """
 
     test: str
@@ -46,13 +46,13 @@ class SessionFigures:
     """One session.
 
     Attributes:
-        name: of its folder, from the folder of the history.
-        machine: serial number of the machine, or the name in its machine file.
-        started: start of the first accepted run; None where no run has one noted.
-        runs: accepted runs that show a circle.
-        bar: serial number of the bar; empty where not noted.
-        programs: NC programs that were run instead of the plan's circles, as a hash over theirs; empty for none.
-        anchor: link of the last event of its log; of a session without a log the end of its chain of runs; empty without a seal.
+        name: folder relative to the history's.
+        machine: serial number, or the name in its file.
+        started: first accepted run; None if not noted.
+        runs: accepted, with a circle.
+        bar: serial number; empty if not noted.
+        programs: hash over NC programs run instead of the plan's circles, or empty.
+        anchor: link of the log's last event, else end of the chain of runs; empty without a seal.
     """
 
     name: str
@@ -71,8 +71,7 @@ class ModelParameter:
     """One parameter of the machine in a model.
 
     Attributes:
-        source: name of its error source.
-        u: its standard uncertainty; None where it was held or is not known.
+        u: standard uncertainty; None if held or not known.
     """
 
     source: str
@@ -87,9 +86,9 @@ class ModelFigures:
     """One identified model.
 
     Attributes:
-        file: its path, from the folder of the history.
-        sessions: SHA-256 of the session files that it comes from, by name.
-        warnings: what has to be said of it wherever its numbers are shown.
+        file: relative to the history's folder.
+        sessions: SHA-256 of its session files, by name.
+        warnings: shown wherever its numbers are.
     """
 
     file: str
@@ -100,5 +99,5 @@ class ModelFigures:
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Names of its error sources: a parameter is comparable with that of a model that has the same ones."""
+        """Return its error sources: parameters are comparable between models with the same ones."""
         return tuple(dict.fromkeys(parameter.source for parameter in self.parameters))

@@ -35,10 +35,10 @@ before it widens the scatter that it is held against."""
 
 @dataclass(frozen=True)
 class Chart:
-    """Limits of a two-sided chart, all in standard deviations of one value.
+    """Limits of a two-sided chart, in standard deviations of one value.
 
     Attributes:
-        reference: k, taken off every value.
+        reference: k, subtracted from every value.
         interval: h, beyond which a sum signals.
         single: c, beyond which one value signals.
     """
@@ -49,7 +49,7 @@ class Chart:
 
 
 def transitions(chart: Chart, mean: float = 0.0) -> NDArray[np.float64]:
-    """Return probabilities of the upward sum's next state by its state, shape (STATES, STATES); what lacks to one signals."""
+    """Return transition probabilities of the upward sum, shape (STATES, STATES); the rest to one signals."""
     width = 2.0 * chart.interval / (2.0 * STATES - 1.0)  # the last state's upper edge is h
     state = np.arange(STATES)
     edges = (state[None, :] - state[:, None] + 0.5) * width + chart.reference
@@ -58,7 +58,7 @@ def transitions(chart: Chart, mean: float = 0.0) -> NDArray[np.float64]:
 
 
 def average_run_length(chart: Chart, mean: float = 0.0) -> float:
-    """Return the mean number of values until the two-sided chart signals, its sums at zero before the first.
+    """Return the mean number of values until the two-sided chart signals, from zero sums.
 
     The rates of both directions add up [Kemp 1961, J. R. Stat. Soc. B 23, 149].
     """
@@ -75,7 +75,7 @@ def signalled_within(chart: Chart, means: Iterable[float]) -> NDArray[np.float64
     """Return the probability that the upward chart has signalled by each value, shape (n,).
 
     Args:
-        means: of each value, in standard deviations; the n values in their order.
+        means: of each value, in standard deviations, in order.
     """
     state = np.zeros(STATES)
     state[0] = 1.0
@@ -91,11 +91,11 @@ def signalled_within(chart: Chart, means: Iterable[float]) -> NDArray[np.float64
 
 @cache
 def chart_for(false_alarms: float, reference: float = REFERENCE, single_share: float = SINGLE_SHARE) -> Chart:
-    """Return the chart that signals so often where nothing changes.
+    """Return the chart with this rate of false alarms.
 
     Args:
-        false_alarms: signals per value, both directions together: one over the average run length.
-        single_share: share of them that single values may make; 0 for a plain CUSUM.
+        false_alarms: per value, both directions: one over the average run length.
+        single_share: share of them from single values; 0 for a plain CUSUM.
     """
     single = -float(ndtri(false_alarms * single_share / 2.0)) if single_share else np.inf
 

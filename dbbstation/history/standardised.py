@@ -1,10 +1,8 @@
-"""Values of one quantity, each held against those before it: independent standard normal numbers where nothing changes.
+"""Values of one quantity against those before it, as independent standard normal numbers.
 
-The level is estimated from the values before, and from some number of values on so is their scatter beyond the stated
-uncertainties. Both estimates are uncertain, and are taken for that: a residual from the level before is independent of all
-residuals before it [Brown, Durbin and Evans 1975, J. R. Stat. Soc. B 37, 149], and over their scatter it follows Student's t, which
-its probability turns into a standard normal number [Hawkins 1987, The Statistician 36, 299]. Before that the stated uncertainty
-is the scale: the residual over it is the number.
+Level and, later, scatter are estimated from the values before. Recursive residuals are independent [Brown, Durbin and
+Evans 1975, J. R. Stat. Soc. B 37, 149]. Over their scatter they follow Student's t, and its probability gives a standard
+normal number [Hawkins 1987, The Statistician 36, 299]. Early residuals are scaled by the stated uncertainty.
 """
 
 from __future__ import annotations
@@ -36,7 +34,7 @@ class ScatterRatio:
     """Scatter of values about their level, in stated uncertainties.
 
     Attributes:
-        freedom: degrees of freedom; one fewer than values for each level.
+        freedom: degrees of freedom, one fewer than values for each level.
     """
 
     freedom: int = 0
@@ -44,16 +42,16 @@ class ScatterRatio:
 
     @property
     def size(self) -> float:
-        """Standard deviation; NaN where nothing is known of it."""
+        """Return the standard deviation; NaN if not known."""
         return sqrt(self.square / self.freedom) if self.freedom else nan
 
     @property
     def more_than_stated(self) -> bool:
-        """Whether it contradicts the stated uncertainties."""
+        """Return whether it contradicts the stated uncertainties."""
         return self.freedom > 0 and bool(chdtrc(self.freedom, self.square) < CONTRADICTS)
 
     def with_residuals(self, residual: NDArray[np.float64]) -> ScatterRatio:
-        """Return it with further residuals, each from the level before it, in their standard uncertainties."""
+        """Return it with further recursive residuals, in their standard uncertainties."""
         return ScatterRatio(self.freedom + len(residual), self.square + float(residual @ residual))
 
 
@@ -62,12 +60,12 @@ class Standardised:
     """Values held against those before them; arrays have shape (n,).
 
     Attributes:
-        z: standard normal where nothing changes; NaN for the first.
-        by_stated: where z rests on the stated uncertainties alone.
+        z: standard normal without change; NaN for the first.
+        by_stated: whether z rests on stated uncertainties alone.
         residual: from the level before, in stated uncertainties; NaN for the first.
         level: weighted mean of the values before; NaN for the first.
         u_level: its standard uncertainty by the stated ones alone; NaN for the first.
-        scatter: standard deviation of the values before, in stated uncertainties; NaN where nothing is known of it.
+        scatter: standard deviation of the values before, in stated uncertainties; NaN if not known.
     """
 
     z: NDArray[np.float64]
@@ -85,17 +83,17 @@ def standardised(
     before: ScatterRatio = ScatterRatio(),
     hindsight: ScatterRatio | None = None,
 ) -> Standardised:
-    """Hold each value against those before it, weighted by their stated uncertainties.
+    """Compare each value with those before it, weighted by stated uncertainties.
 
-    The scatter is a factor common to all uncertainties. It may be below one: what is stated for every session may hold parts
-    that are the same in all of them, such as the calibrated length of the bar.
+    The scatter is a common factor of all uncertainties. It may be below one, since sessions share parts such as the bar's
+    length.
 
     Args:
         values: in time order, shape (n,).
         u: standard uncertainty of each, positive, in the same unit, shape (n,).
-        baseline: values from which their scatter takes the place of the stated uncertainty, at least 3.
-        before: scatter of earlier values about other levels.
-        hindsight: scatter that is to be taken where that of the values before is not known yet; None for the stated uncertainties.
+        baseline: number of values from which scatter replaces stated uncertainty, at least 3.
+        before: scatter about earlier levels.
+        hindsight: scatter to use while unknown; None: the stated uncertainties.
     """
     count = len(values)
     level, u_level, residual, z = (np.full(count, np.nan) for _ in range(4))

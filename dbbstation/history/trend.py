@@ -1,4 +1,4 @@
-"""Figures of all sessions of a folder as trends: one for each machine, quantity and circle."""
+"""Figures of all sessions as trends: one for each machine, quantity and circle."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ class Subject:
     """What a trend is of.
 
     Attributes:
-        figure: such as `G`; name of the parameter.
-        test: name of the test; empty for a parameter.
+        figure: such as `G`, or a parameter.
+        test: empty for a parameter.
         direction: `ccw` or `cw`; empty for a parameter.
-        of: circle in words; of a parameter its error source.
-        beside: of a parameter the other sources of its models, since it is comparable only beside the same ones.
+        of: circle in words, or a parameter's error source.
+        beside: other sources of a parameter's models, since only like models compare.
     """
 
     figure: str
@@ -64,7 +64,7 @@ class Subject:
 
     @property
     def is_parameter(self) -> bool:
-        """Whether it comes from models."""
+        """Return whether it comes from models."""
         return not self.test
 
 
@@ -73,12 +73,12 @@ class Trend:
     """One quantity of one machine over its sessions; arrays have shape (n,).
 
     Attributes:
-        label: in words, no other of this machine has the same.
+        label: unique words within the machine.
         values: mean over the runs of each session.
-        u: standard uncertainty of each; NaN where not known.
-        limit: greatest size by the shop's tolerances; None where there is none.
-        watched: what changed; None where it is not watched.
-        why_not: why it is not; empty where it is.
+        u: standard uncertainty; NaN if not known.
+        limit: greatest size by the shop's tolerances, or None.
+        watched: None if not watched.
+        why_not: empty if watched.
     """
 
     subject: Subject
@@ -103,9 +103,9 @@ class MachineHistory:
     Attributes:
         machine: serial number or name.
         sessions: in time order.
-        trends: circles first, in the order of tests, then parameters.
+        trends: circles by test, then parameters.
         chart: limits that each quantity is watched with; None where none is.
-        expected: false alarms to be expected over this history if nothing changed.
+        expected: false alarms expected over this history.
     """
 
     machine: str
@@ -124,12 +124,11 @@ class _Series:
 
 @dataclass(frozen=True)
 class TrendOptions:
-    """How trends are worked out.
+    """Options of trends.
 
     Attributes:
         false_alarms: per session, over all quantities of a machine.
-        tests: names of those to take; empty for all.
-        exclude: names of those to leave out.
+        tests: empty for all.
     """
 
     coverage_factor: float
@@ -147,11 +146,11 @@ class TrendOptions:
 def histories(
     sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures], asked: TrendOptions
 ) -> tuple[MachineHistory, ...]:
-    """Return the history of every machine, in the order of their names.
+    """Return the history of every machine, by name.
 
     Args:
-        sessions: each with its date, each counted once.
-        models: by the SHA-256 of the one session that each comes from.
+        sessions: dated, each once.
+        models: by the SHA-256 of their one session.
     """
     machines = sorted({one.machine for one in sessions})
     return tuple(
@@ -181,7 +180,7 @@ def _history(
 
 
 def _why_not(subject: Subject, u: NDArray[np.float64]) -> str:
-    """Return why a quantity cannot be watched; empty where it can."""
+    """Return why a quantity cannot be watched, or an empty text."""
     if subject.figure in NOT_WATCHED and not subject.is_parameter:
         return "watched by X and Y"
     if not np.all(u > 0.0):
@@ -226,7 +225,7 @@ def _parameter_series(sessions: Sequence[SessionFigures], models: Mapping[str, M
 
 
 def _labels(subjects: Sequence[Subject]) -> dict[Subject, str]:
-    """Return names that tell quantities apart: with the circle, or with the other sources, only where that is needed."""
+    """Return distinct names, with circle or sources only if needed."""
     short = {s: f"{s.of} {s.figure}" if s.is_parameter else f"{s.figure} {s.test} {s.direction}" for s in subjects}
     count = Counter(short.values())
     return {s: name if count[name] == 1 else f"{name} ({_apart(s)})" for s, name in short.items()}
@@ -239,7 +238,7 @@ def _apart(subject: Subject) -> str:
 
 
 def _limit(subject: Subject, tolerances: Sequence[Tolerance]) -> float | None:
-    """Return the smallest limit of the shop's tolerances that holds for a quantity."""
+    """Return the smallest applicable limit of the shop's tolerances."""
     figure = None if subject.is_parameter else LIMITED.get(subject.figure)
     held = [t.largest_um for t in tolerances if t.figure is figure and t.holds_for(subject.test, subject.direction)]
     return min(held, default=None)

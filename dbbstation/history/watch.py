@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class TrendVerdict(StrEnum):
-    """What a history says of one quantity."""
+    """Verdict of a history on one quantity."""
 
     STEADY = "steady"
     """No change beyond scatter and uncertainty."""
@@ -36,9 +36,8 @@ class TrendEvent:
 
     Attributes:
         verdict: `STANDS_OUT` or `CHANGED`.
-        difference: values from `since` to `found` less the level before; of a change that is a baseline's length ago: the level
-            after it less the level before.
-        by_stated: whether only the stated uncertainties say so: the scatter of the sessions is not known yet.
+        difference: values from `since` to `found` less the level before; after a whole baseline: level after less level before.
+        by_stated: whether only stated uncertainties show it, since scatter is not known yet.
     """
 
     verdict: TrendVerdict
@@ -55,14 +54,14 @@ class Watched:
 
     Attributes:
         events: in time order.
-        z: standard normal where nothing changes; NaN where a value was not held against others.
+        z: standard normal without change; NaN if not compared.
         high: CUSUM upwards, NaN as above.
         low: CUSUM downwards, not negative.
-        level: level from a change to the next, the latest known one of each stretch.
-        u_level: its standard uncertainty, by the larger of stated uncertainty and scatter.
-        scatter: of the last stretch, in stated uncertainties; NaN where too few values.
-        lacking: values that the last stretch needs until the next one can be held against it: one just after a change, else none.
-        by_stated: whether what is said of the last value rests on the stated uncertainties alone.
+        level: from a change to the next, by each stretch's latest value.
+        u_level: standard uncertainty by the larger of stated and scatter.
+        scatter: of the last stretch, in stated uncertainties; NaN for too few values.
+        lacking: values missing before the next comparison: one just after a change, else none.
+        by_stated: whether the last statement rests on stated uncertainties alone.
     """
 
     events: tuple[TrendEvent, ...]
@@ -77,7 +76,7 @@ class Watched:
 
     @property
     def watched(self) -> int:
-        """How many values were held against others."""
+        """Return how many values were compared."""
         return int(np.isfinite(self.z).sum())
 
     @property
@@ -96,16 +95,14 @@ def watch(
     coverage_factor: float,
     baseline: int = BASELINE,
 ) -> Watched:
-    """Look for changes beyond scatter and beyond stated uncertainty.
+    """Find changes beyond scatter and beyond stated uncertainty.
 
-    A change is reported where the chart signals and the difference is more than k u besides. After a change a new level begins
-    with the next value: those that showed the change were chosen by it, and would make the new level look off. A single value
-    beyond its limit counts for a change where the next one lies beyond on the same side; otherwise it stands out, and is left out of
-    the level.
+    A change needs the chart's signal and a difference of more than k u. The new level begins with the next value, since
+    the signalling ones were selected. A single value beyond its limit is a change if the next one is too; else it stands
+    out and leaves the level.
 
-    The chart's scale is the stated uncertainty until the scatter of as many values as a baseline has is known, and that scatter from
-    there on. Where the values about their levels scatter by more than stated, beyond chance, the first ones are held against that
-    scatter too.
+    The chart's scale is the stated uncertainty until a baseline gives the scatter. If values scatter more than stated,
+    beyond chance, early ones are compared with that scatter too.
 
     Args:
         values: in time order, shape (n,).
@@ -134,7 +131,7 @@ def _look(
     baseline: int,
     hindsight: ScatterRatio | None,
 ) -> tuple[Watched, ScatterRatio]:
-    """Look once, with the scatter that early values are held against, or their stated uncertainties; and return that found."""
+    """Look once, with early values scaled by hindsight or stated uncertainty."""
     count = len(values)
     z, high, low, level, u_level = (np.full(count, np.nan) for _ in range(5))
     by_stated = np.zeros(count, dtype=bool)
@@ -185,16 +182,16 @@ def _look(
 
 
 def _settled(event: TrendEvent, level: NDArray[np.float64], u_level: NDArray[np.float64], start: int) -> TrendEvent:
-    """Return a change with the difference of the levels about it: that of the values which showed it was chosen for being large."""
+    """Return a change with the difference of levels: the signalling values were selected for being large."""
     before = event.since - 1
     difference, u = float(level[start] - level[before]), float(np.hypot(u_level[start], u_level[before]))
     return replace(event, difference=difference, u_difference=u)
 
 
 def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[TrendEvent]:
-    """Return the single values that stood out on the same side where a change begins: they belong to it.
+    """Return outstanding values that belong to a change that follows on the same side.
 
-    Of a value that stands out itself only the one just before it: a change is what goes on.
+    Before a value that stands out itself, only the adjacent one counts.
     """
     first = found.since - 1
     return [
@@ -209,10 +206,10 @@ def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[T
 def _change(
     since: int, found: int, at: NDArray[np.intp], values: NDArray[np.float64], u: NDArray[np.float64]
 ) -> TrendEvent:
-    """Return a change with all its values, those that stood out among them.
+    """Return a change with all its values.
 
     Args:
-        at: numbers of the values that the level before is taken from, as far as they are before it.
+        at: values of the level before, as far as they precede it.
     """
     before, these = at[at < since], slice(since, found + 1)
     level, u_level = _mean(values[before], u[before])
@@ -222,7 +219,7 @@ def _change(
 
 
 def _scatter(values: NDArray[np.float64], u: NDArray[np.float64]) -> float:
-    """Return the standard deviation of values in stated uncertainties; NaN for fewer than two."""
+    """Return the standard deviation in stated uncertainties; NaN for fewer than two values."""
     if len(values) < 2:  # noqa: PLR2004 - one value does not scatter
         return np.nan
     mean = np.average(values, weights=1.0 / u**2)
@@ -231,7 +228,7 @@ def _scatter(values: NDArray[np.float64], u: NDArray[np.float64]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
-    """Values from the beginning or a change on, without those that stand out."""
+    """Values since a change, without those that stand out."""
 
     at: NDArray[np.intp]
     of: Standardised
@@ -252,7 +249,7 @@ class _Stretch:
         return out
 
     def first_event(self) -> TrendEvent | None:
-        """Return the first value beyond a limit whose difference is beyond the stated uncertainty too."""
+        """Return the first value beyond a limit whose difference exceeds the stated uncertainty."""
         sums = self.sums
         high, low = (np.nan_to_num(one) for one in sums)
         single = np.abs(np.nan_to_num(self.of.z)) > self.chart.single
@@ -268,10 +265,9 @@ class _Stretch:
         return None
 
     def _since(self, k: int, side: float) -> int:
-        """Return the most probable first value of a change that value k showed, behind the sum's last zero.
+        """Return the most probable first value of the change that value k showed.
 
-        Of normal values that one whose sum up to k is the largest, over the root of how many they are [Hinkley 1970,
-        Biometrika 57, 1].
+        Its sum up to k over the root of their number is largest [Hinkley 1970, Biometrika 57, 1].
         """
         sums = np.nan_to_num(self._sum(side))
         first = int(np.flatnonzero(sums[:k] <= 0.0)[-1]) + 1  # that of the first value is zero
@@ -279,7 +275,7 @@ class _Stretch:
         return first + int(np.argmax(behind / np.sqrt(np.arange(len(behind), 0, -1))))
 
     def final(self, count: int) -> tuple[float, float]:
-        """Return the level of the first values and its standard uncertainty; NaN for none."""
+        """Return the first values' level and standard uncertainty; NaN for none."""
         if not count:
             return np.nan, np.nan
         level, u_level = _mean(self.values[:count], self.u[:count])

@@ -1,1 +1,1 @@
-"""The sequence of a measurement without a screen: states and transitions in a table, events for storage and screens."""
+"""The sequence of a measurement without a screen: a table of states, and events."""

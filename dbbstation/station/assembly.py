@@ -1,4 +1,4 @@
-"""Putting a station together: plan, session folder, storage and sequencer about one instrument."""
+"""Assemble a station: plan, session folder, storage and sequencer about one instrument."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ class Job:
     """What is measured, on what, into what.
 
     Attributes:
-        plan: with its jig inline, as it goes into the session.
-        folder: of the session; made, or gone on with.
-        details: noted when the session is made; a session that exists keeps what it has.
-        programs: what commands each test and direction; empty: plain nominal circles.
-        patience: how long is waited for the machine.
-        clock: machine time, that of the instrument's readings [s].
-        time_scale: how much faster than real time that goes; other than 1 for a virtual machine only.
-        rate_hz: readings per second that the instrument brings; None: not known.
+        plan: jig inlined.
+        folder: made, or continued.
+        details: for a new session; an existing one keeps its own.
+        programs: by test and direction; empty: plain nominal circles.
+        patience: how long to wait for the machine.
+        clock: machine time of the readings [s].
+        time_scale: speed of that time; other than 1 only for a virtual machine.
+        rate_hz: readings per second; None: not known.
         range_mm: lowest and highest length that it reads; None: not known.
-        model: of the machine, which says where circles are expected; None: its nominal geometry does.
-        instrument: what reads the lengths, as session and runs note it; None: not known.
+        model: decides where circles are expected; None: the nominal geometry does.
+        instrument: for the session's record; None: not known.
     """
 
     machine: Machine
@@ -66,10 +66,10 @@ class Job:
     instrument: ReadBy | None = None
 
     def check(self, plan_file: str) -> None:
-        """Dry-run the plan; to be done before an instrument is opened.
+        """Dry-run the plan before an instrument is opened.
 
         Raises:
-            InputError: a test that readings cannot follow, or that bar or instrument cannot reach.
+            InputError: readings cannot follow a test, or bar or instrument cannot reach it.
             ModelError: the model is of another machine.
             TravelError: a circle leaves the machine's travel.
         """
@@ -87,13 +87,7 @@ class Job:
 
 @dataclass(frozen=True, eq=False)
 class Workplace:
-    """A station ready to run, with what others want to see of it; close it whatever happens.
-
-    Attributes:
-        station: subscribe to it, send it commands, run it.
-        schedule: what is done and left.
-        judge: knows the figures and findings of every run that counts.
-    """
+    """A station ready to run; close it in any case."""
 
     station: Station
     schedule: Schedule
@@ -102,7 +96,7 @@ class Workplace:
     _storage: Storage
 
     def close(self) -> None:
-        """Bring everything to disk, and let others write into the session."""
+        """Sync everything to disk and let others write."""
         try:
             self._storage.close()
         finally:
@@ -115,8 +109,8 @@ def assemble(
     """Open the session and build the station; storage is its first observer.
 
     Args:
-        source: started instrument.
-        unreadable: what its driver rejected so far, by what was wrong with it.
+        source: started.
+        unreadable: rejected bytes so far, by fault.
 
     Raises:
         InputError: the folder holds another session, or one with faults.

@@ -1,4 +1,4 @@
-"""Does what a person would: mounts, starts each circle, accepts what is complete. For virtual machines and tests."""
+"""Mount, start and accept runs in place of a person, for virtual machines and tests."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Hands(Protocol):
     """What moves the machine."""
 
     def stands_since_s(self) -> float:
-        """Return the machine time at which a machine that waits stands; minus infinity for one that does not wait [s]."""
+        """Return the machine time since which it stands [s]; minus infinity if it does not wait."""
 
     def standing(self) -> str | None:
         """Return the name of the ball that stands on the table."""
@@ -36,11 +36,7 @@ class Hands(Protocol):
 
 
 class Autopilot:
-    """Drives a sequence to its end; an observer of the station.
-
-    Args:
-        hands: moves the machine.
-    """
+    """Drives a sequence to its end; an observer of the station."""
 
     def __init__(self, send: Callable[[Command], None], hands: Hands) -> None:
         self._send = send
@@ -53,7 +49,7 @@ class Autopilot:
         """Act on the event.
 
         Raises:
-            TraceError: a run fails again and again, or the machine does not come.
+            TraceError: a run keeps failing, or the machine does not come.
             StationError: the machine refuses.
         """
         match event:

@@ -1,4 +1,4 @@
-"""Whether the length of the bar is known well enough for the plan: places on a plate need an absolute length."""
+"""Check that the bar's length is known well enough: places on a plate need an absolute length."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ _REMEDY = (
 
 
 def check_bar_known(bar: Bar | None, plan: Plan, now: datetime, largest_age_h: float = USUAL_AGE_H) -> None:
-    """Refuse a plan with balls at known places to a bar of unknown or stale length.
+    """Refuse a plan with balls at known places if the bar's length is unknown or stale.
 
-    The size of a circle about a ball is the length of the bar: an error of it is one of the machine's scale. Balls that are put up
-    under the spindle tell nothing of the machine's place, and circularity alone needs no length.
+    An error of the bar's length is an error of the machine's scale. Balls under the spindle and circularity alone need no
+    length.
 
     Args:
-        bar: as the session is to note it; None where nothing is known.
-        now: the time of day with its zone.
-        largest_age_h: age of a calibration beyond which it is stale [h].
+        bar: None if nothing is known.
+        now: with its zone.
+        largest_age_h: beyond which a calibration is stale.
 
     Raises:
         InputError: what is wrong with the bar, and what to do.

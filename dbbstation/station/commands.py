@@ -1,4 +1,4 @@
-"""What a person, or a program in their place, tells the sequencer. Put into its queue from any thread."""
+"""Commands to the sequencer, queued from any thread."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Start:
-    """The ball stands, the bar is in: wait for the machine to feed in.
+    """The ball stands and the bar is in: wait for the feed-in.
 
     Attributes:
-        remounted: the holder was touched although the announcement did not ask for it, so this run gets a new mounting.
-        after_s: readings up to this machine time belong to what was before, also where they are read later [s].
+        remounted: the holder was touched without being asked for, so the run gets a new mounting.
+        after_s: earlier readings, by machine time, do not count.
     """
 
     remounted: bool = False
@@ -25,10 +25,10 @@ class Start:
 
 @dataclass(frozen=True)
 class Accept:
-    """The complete run counts; go on to the next.
+    """Accept the complete run and go on.
 
     Attributes:
-        reason: why, where something was found wrong with it; empty: what was found is kept.
+        reason: why, despite a finding; empty: the findings are kept.
     """
 
     reason: str = ""
@@ -36,10 +36,10 @@ class Accept:
 
 @dataclass(frozen=True)
 class Repeat:
-    """The run does not count, neither when complete nor while it goes on: measure it again.
+    """Measure the run again; it does not count.
 
     Attributes:
-        reason: kept with the recording; empty: what was found wrong with it, else that the operator wanted it.
+        reason: empty: the finding, else the operator's wish.
     """
 
     reason: str = ""
@@ -47,7 +47,7 @@ class Repeat:
 
 @dataclass(frozen=True)
 class Reject:
-    """The run does not count; go on to the next. What lacks an accepted run is named at the end."""
+    """Reject the run and go on. The end names tests without an accepted run."""
 
     reason: str = ""
 
@@ -59,15 +59,15 @@ class Skip:
 
 @dataclass(frozen=True)
 class Quit:
-    """Stop here; a run that goes on is kept as far as it came. The session can be continued later."""
+    """Stop here; a running recording is kept, and the session can be continued."""
 
 
 @dataclass(frozen=True)
 class GoTo:
-    """Measure another test next, also one that was left out or has its runs already; then go on from there.
+    """Measure another test next, also one skipped or done; then go on from there.
 
     Attributes:
-        direction: sense of travel; None: whichever is left to do.
+        direction: None: whichever is left.
     """
 
     test: str
@@ -76,12 +76,11 @@ class GoTo:
 
 @dataclass(frozen=True)
 class Judge:
-    """Give a run another verdict, at any time after it was recorded: a wrong one is taken back so.
+    """Change the verdict on a recorded run at any time.
 
     Attributes:
-        direction: sense of travel.
-        repeat: of this test and direction, from 1.
-        reason: why it does not; kept with the recording.
+        repeat: from 1.
+        reason: of a rejection.
     """
 
     test: str
@@ -93,11 +92,11 @@ class Judge:
 
 @dataclass(frozen=True)
 class AddNote:
-    """Keep a remark or the temperature of the shop with the session; at any time.
+    """Add a remark or the shop's temperature to the session at any time.
 
     Attributes:
-        text: the remark; empty for a temperature alone.
-        ambient_temp_c: temperature of the shop now [degC]; None where it was not read.
+        text: empty for a temperature alone.
+        ambient_temp_c: None if not read.
     """
 
     text: str = ""
@@ -106,7 +105,7 @@ class AddNote:
 
 @dataclass(frozen=True)
 class Pause:
-    """Leave the machine alone for a while: nothing is waited for."""
+    """Wait for nothing."""
 
 
 @dataclass(frozen=True)

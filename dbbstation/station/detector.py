@@ -1,4 +1,4 @@
-"""Begin and end of a circle, seen in the readings themselves: no control tells a ball bar when it moves."""
+"""Begin and end of a circle in the readings, since no control tells a ball bar when it moves."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ DWELL_BEHIND_S = 0.5
 
 
 def feed_out_due_s(circle: Circle) -> float:
-    """Time from the feed-in edge to the feed-out edge at the plan's feed, with the tolerance that cutting has [s]."""
+    """Return the time between feed-in and feed-out edges at the plan's feed, with the tolerance of cutting [s]."""
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     return (1.0 + FEED_TOLERANCE) * circle.swept_deg / circle.turning_deg_s + feeding_s + 2.0 * CORNER_DWELL_S
 
 
 @dataclass(frozen=True)
 class Patience:
-    """How long is waited, in machine time.
+    """Longest waiting times, in machine time.
 
     Attributes:
-        for_machine_s: for the bar at the feed-in point, and there for the feed-in [s].
-        turn_factor: as many times the time that the circle takes at its feed.
+        for_machine_s: for the bar at the feed-in point, and there for the feed-in.
+        turn_factor: in units of the circle's time at its feed.
     """
 
     for_machine_s: float = 600.0
@@ -43,7 +43,7 @@ class Patience:
     turn_extra_s: float = 20.0
 
     def for_turn_s(self, circle: Circle) -> float:
-        """Longest time between feed-in and feed-out [s]."""
+        """Return the longest time between feed-in and feed-out [s]."""
         return self.turn_factor * circle.swept_deg / circle.turning_deg_s + self.turn_extra_s
 
 
@@ -52,10 +52,10 @@ SETTLED_S = 2.0
 
 
 class CircleWatch:
-    """Tells when the machine is on the circle though nothing is recorded, from readings in time order.
+    """Detects the machine on an unrecorded circle, from readings in time order.
 
     Args:
-        waits_for_feed_in: whether a bar that stands at the circle's length is on it only after it came from outside.
+        waits_for_feed_in: whether a bar at the circle's length must have come from outside.
     """
 
     def __init__(self, circle: Circle, *, waits_for_feed_in: bool) -> None:
@@ -89,10 +89,10 @@ class CircleWatch:
 
 
 class EdgeDetector:
-    """Tells on which side of the feed-in's middle the bar is, from readings in time order.
+    """Detects on which side of the feed-in's middle the bar is, from readings in time order.
 
     Args:
-        circle: as commanded; its feed-in must not be 0.
+        circle: its feed-in must not be 0.
     """
 
     def __init__(self, circle: Circle) -> None:
@@ -103,7 +103,7 @@ class EdgeDetector:
         self._agreeing = 0
 
     def outside(self, length_mm: float) -> bool | None:
-        """Return True once the last readings say outside, False once they say inside, None while they disagree."""
+        """Return True for outside, False for inside, None while the last readings disagree."""
         side = None
         if length_mm > self._outside_mm:
             side = True
@@ -115,9 +115,9 @@ class EdgeDetector:
 
 
 def live_phi_deg(circle: Circle, since_feed_in_s: float) -> float:
-    """Progress along the turn at a time after the feed-in edge was seen, good to a degree or two [deg].
+    """Return the progress after the feed-in edge, within a degree or two [deg].
 
-    The recording is cut better: its angles are anchored midway between both edges, which live is not known yet.
+    The recording is cut better, between both edges.
     """
     feed_in_rest_s = circle.feed_in_mm / 2.0 / (circle.feed_mm_min / 60.0)
     on_arc_s = max(since_feed_in_s - feed_in_rest_s - CORNER_DWELL_S, 0.0)

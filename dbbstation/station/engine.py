@@ -1,4 +1,4 @@
-"""The engine: one loop that carries readings and commands to the sequencer and its events to whoever subscribed."""
+"""The loop that carries readings and commands to the sequencer, and events to subscribers."""
 
 from __future__ import annotations
 
@@ -22,25 +22,21 @@ _TICK_S = 0.005
 
 
 class ReadingSource(Protocol):
-    """What the engine needs of an instrument; the driver is one."""
+    """An instrument; the driver is one."""
 
     def drain(self) -> Sequence[Reading]:
-        """Return what has come since the last call, without waiting.
+        """Return new readings without waiting.
 
         Raises:
-            StationError: the line failed, after everything before it was returned.
+            StationError: the line failed, after all earlier readings were returned.
         """
 
 
 class Station:
     """Runs a sequence to its end.
 
-    `send` may be called from any thread. Observers are called one after the other, in the order they subscribed, in the
-    thread of `run`; storage subscribes first, so that nobody is told of what is not kept.
-
-    Args:
-        sequencer: not yet begun.
-        source: started instrument.
+    `send` works from any thread. Observers run in the thread of `run`, in subscription order; storage is first, so that
+    others see only what is kept.
     """
 
     def __init__(self, sequencer: Sequencer, source: ReadingSource) -> None:
@@ -60,18 +56,18 @@ class Station:
         self._observers.append(observer)
 
     def regularly(self, duty: Callable[[], None]) -> None:
-        """Call `duty` many times a second from now on, whether readings come or not."""
+        """Call `duty` many times a second, with or without readings."""
         self._regular.append(duty)
 
     def send(self, command: Command) -> None:
-        """Put a command into the queue; from any thread and from signal handlers, for which this queue is made."""
+        """Queue a command, from any thread or signal handler."""
         self._commands.put(command)
 
     def run(self) -> State:
-        """Run until the sequence is finished or stopped; return the state it ended in.
+        """Run to the end or a stop and return the final state.
 
         Raises:
-            StationError: instrument or storage failed; observers were told of it with a `Fault` before.
+            StationError: instrument or storage failed; observers got a `Fault` first.
         """
         try:
             self._publish(self._sequencer.begin())
@@ -104,7 +100,7 @@ class Station:
                 observer(event)
 
     def _tell_of(self, error: StationError) -> None:
-        """Tell everybody of a failure, also when an observer was its cause; what fails now only adds to it."""
+        """Tell all observers of a failure, even if one of them caused it."""
         for event in self._sequencer.fail(error):
             for observer in self._observers:
                 try:

@@ -1,4 +1,4 @@
-"""What the sequencer tells whoever listens: storage, screens, the command line. Data only, in the order it happened."""
+"""Events of the sequencer for storage, screens and command line: data, in order."""
 
 from __future__ import annotations
 
@@ -24,12 +24,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunId:
-    """Which run of the session.
+    """Identity of a run in its session.
 
     Attributes:
-        direction: sense of travel.
-        repeat: counts the runs of this test and direction in the session, from 1.
-        mounting: counts how often a ball was put up in the session, from 1.
+        repeat: from 1.
+        mounting: number of the ball's set-up in the session, from 1.
     """
 
     test: str
@@ -39,22 +38,21 @@ class RunId:
 
     @property
     def label(self) -> str:
-        """Name of the run in messages and of its file, such as `a-ccw-1`."""
+        """Return the name for messages and file, such as `a-ccw-1`."""
         return f"{self.test}-{self.direction}-{self.repeat}"
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One reading, as seen by the sequencer.
+    """One reading, as the sequencer sees it.
 
     Attributes:
-        t_s: machine time; since the run's first sample while a run is recorded, of the driver's clock before [s].
-        length_mm: distance between the ball centres [mm]; None where the instrument gave no number.
+        t_s: machine time; since the first sample while recording, else of the driver's clock.
+        length_mm: distance between the ball centres; None without a number.
         status: `ok`, `doubtful`, `overrange` or `fault`.
-        said: what the instrument said where the status is not `ok`; why it is doubted where it is `doubtful`.
-        phi_deg: progress along the turn as far as it can be told live, 0 to 360 on the full turn, negative on the overshoot
-            before it, above 360 behind it [deg]; None off the circle.
-        t_uncertainty_s: standard uncertainty of `t_s` [s]; None where the instrument sends by itself.
+        said: the instrument's words, or the reason for doubt; if not `ok`.
+        phi_deg: live progress: 0 to 360 on the full turn, negative before, above 360 behind; None off the circle.
+        t_uncertainty_s: standard uncertainty of `t_s`; None if the instrument sends by itself.
     """
 
     t_s: float
@@ -71,7 +69,7 @@ class StateChanged:
     """The sequencer is in another state.
 
     Attributes:
-        commands: what it takes now.
+        commands: accepted in this state.
     """
 
     state: State
@@ -80,16 +78,15 @@ class StateChanged:
 
 @dataclass(frozen=True)
 class RunAnnounced:
-    """What is measured next, and what a person has to do for it.
+    """The next run and its set-up.
 
     Attributes:
-        ball: the ball on the table with its bore (None: it stands in none) and holder, or put up under the spindle.
-        circle: the circle: bar length, tilt, elevation, feed, centre.
-        put_up: the ball has to be put up; otherwise it stands there already and is not touched.
-        program: NC program that commands the run; empty: the plain nominal circle.
-        number: of the run in the sequence, from 1.
-        instructions: the same in words, one step per entry.
-        sampling: what the instrument sees of the circle at its feed; None where its rate is not known.
+        ball: with bore (None: in none) and holder, or under the spindle.
+        put_up: whether the ball must be put up; otherwise it stays untouched.
+        program: empty: the plain nominal circle.
+        number: in the sequence, from 1.
+        instructions: one step per entry.
+        sampling: what the instrument sees at this feed; None if its rate is not known.
     """
 
     run: RunId
@@ -105,17 +102,17 @@ class RunAnnounced:
 
 @dataclass(frozen=True)
 class ReadingsSeen:
-    """Readings in time order, while no run is recorded: for a live display only."""
+    """Readings outside a run, in time order, for a live display."""
 
     samples: tuple[Sample, ...]
 
 
 @dataclass(frozen=True)
 class RunStarted:
-    """The bar stands outside the circle: from now on every sample belongs to the run.
+    """The bar is outside the circle; from now on every sample belongs to the run.
 
     Attributes:
-        program: NC program that commands it; empty: the plain nominal circle.
+        program: empty: the plain nominal circle.
     """
 
     run: RunId
@@ -124,7 +121,7 @@ class RunStarted:
 
 @dataclass(frozen=True)
 class SamplesRecorded:
-    """Samples of the run that goes on, in time order."""
+    """Samples of the current run, in time order."""
 
     run: RunId
     samples: tuple[Sample, ...]
@@ -135,7 +132,7 @@ class FeedInSeen:
     """The bar came onto the circle.
 
     Attributes:
-        t_s: since the run's first sample [s].
+        t_s: since the run's first sample.
     """
 
     run: RunId
@@ -144,11 +141,11 @@ class FeedInSeen:
 
 @dataclass(frozen=True)
 class RunProgress:
-    """How far the run is; sent once per degree at most.
+    """Progress of the run, at most once per degree.
 
     Attributes:
-        swept_deg: travelled since the feed-in [deg].
-        of_deg: from feed-in to feed-out, both overshoots included [deg].
+        swept_deg: since the feed-in.
+        of_deg: from feed-in to feed-out, with both overshoots.
     """
 
     run: RunId
@@ -158,13 +155,13 @@ class RunProgress:
 
 @dataclass(frozen=True)
 class RunCompleted:
-    """The recording has ended, nothing is added to it any more.
+    """The recording has ended.
 
     Attributes:
-        lost: samples that the line lost during it.
-        problem: why it cannot be used; empty where it can.
-        findings: all that was looked for in its circle; empty where it has none.
-        doubtful: samples that may have been damaged on the line; they are kept, and in no figure.
+        lost: samples lost by the line.
+        problem: why it is unusable; empty if usable.
+        findings: of its circle; empty without one.
+        doubtful: possibly damaged samples, kept but unused.
     """
 
     run: RunId
@@ -177,21 +174,21 @@ class RunCompleted:
 
     @property
     def answer(self) -> RunAssessment:
-        """The run in one word, and what caused it."""
+        """Return the run's word and its cause."""
         return answer(self.findings, "" if self.figures is not None else self.problem or "no circle")
 
     @property
     def wrong(self) -> tuple[Finding, ...]:
-        """Findings that pass their limit: reasons to measure the run again."""
+        """Return findings beyond their limit."""
         return tuple(finding for finding in self.findings if finding.wrong)
 
 
 @dataclass(frozen=True)
 class RunRestored:
-    """A run that was recorded before waits for its verdict still; its figures follow as those of any completed run.
+    """An older run still awaits its verdict.
 
     Attributes:
-        samples: of its turn, in time order, thinned; empty where it has none.
+        samples: of its turn, in time order, thinned; may be empty.
     """
 
     run: RunId
@@ -211,8 +208,8 @@ class Noted:
     """Somebody noted something.
 
     Attributes:
-        text: the remark; empty for a temperature alone.
-        ambient_temp_c: temperature of the shop now [degC]; None where it was not read.
+        text: empty for a temperature alone.
+        ambient_temp_c: None if not read.
     """
 
     text: str
@@ -224,7 +221,7 @@ class RunAccepted:
     """The run counts.
 
     Attributes:
-        reason: why, although something was found wrong with it; empty where nothing was.
+        reason: despite a finding; empty without one.
     """
 
     run: RunId
@@ -241,10 +238,10 @@ class RunRejected:
 
 @dataclass(frozen=True)
 class RunLate:
-    """The machine did not come: no recording was begun, the run is announced again.
+    """The machine did not come; the run is announced again.
 
     Attributes:
-        problem: what was waited for and how long.
+        problem: what was waited for, and how long.
     """
 
     run: RunId
@@ -256,7 +253,7 @@ class CommandRefused:
     """A command that the state does not take; nothing happened.
 
     Attributes:
-        why: in words, with what can be done instead.
+        why: with an alternative.
     """
 
     command: Command
@@ -269,8 +266,8 @@ class SessionFinished:
     """The sequence is through.
 
     Attributes:
-        accepted: runs that count, of the whole session.
-        missing: test and direction of every planned run that has no accepted recording.
+        accepted: in the whole session.
+        missing: test and direction without an accepted run.
     """
 
     accepted: int
@@ -282,9 +279,9 @@ class SessionStopped:
     """Somebody quit.
 
     Attributes:
-        accepted: runs that count, of the whole session.
-        left_to_do: planned runs that have no accepted recording.
-        interrupted: the run that went on, kept as far as it came; None where none did.
+        accepted: in the whole session.
+        left_to_do: planned runs without an accepted one.
+        interrupted: kept as far as recorded; None if none.
     """
 
     accepted: int
@@ -294,10 +291,10 @@ class SessionStopped:
 
 @dataclass(frozen=True)
 class Fault:
-    """Instrument or storage failed; the sequence ends here. What was recorded is kept.
+    """Instrument or storage failed and the sequence ends; recordings are kept.
 
     Attributes:
-        interrupted: the run that went on, kept as far as it came; None where none did.
+        interrupted: kept as far as recorded; None if none.
     """
 
     error: StationError

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def instructions(
     ball: Ball, circle: Circle, *, put_up: bool, program: str, sampling: Sampling | None = None
 ) -> tuple[str, ...]:
-    """Return the steps, in their order, and what the instrument is too slow for."""
+    """Return the steps in order, and what the instrument is too slow for."""
     raised = f", raised by {circle.elevation_deg:g}°" if circle.elevation_deg else ", level"
     what = f"NC program {program}" if program else f"{circle.direction} circle"
     return (
@@ -25,7 +25,7 @@ def instructions(
 
 
 def too_slow(sampling: Sampling) -> str:
-    """Say what is not seen with so few points."""
+    """Return what is not seen with so few points."""
     points = f"The instrument brings {sampling.points_per_turn:.0f} points per turn"
     if not sampling.is_circle:
         return f"{points}, which is no circle: take a lower feed"
@@ -38,7 +38,7 @@ def _mounted(ball: Ball, circle: Circle, *, put_up: bool) -> tuple[str, ...]:
 
 
 def _under_spindle(ball: Ball, circle: Circle, *, put_up: bool) -> tuple[str, ...]:
-    """The standard circular test [CAL III-A]: the machine stands at the circle's centre and tilt first."""
+    """Return the steps of the standard circular test [CAL III-A]: first to the circle's centre and tilt."""
     if not put_up:
         return (f"Leave the ball {ball.name} and the moving ball as they stand, do not touch them", _tilt(circle))
     a, b, c = circle.tilt_deg

@@ -1,4 +1,4 @@
-"""Making the session folder, or going on with the one that is there."""
+"""Make a session folder, or continue an existing one."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def check_session(
     with_programs: bool,
     session: SessionFolder,
 ) -> None:
-    """Refuse to go on with a session of another machine, another plan, another way to command the circles, or of the other world.
+    """Refuse to continue a session with another machine, plan, way of command, or virtual instead of real.
 
     Raises:
         InputError: everything that differs.
@@ -56,7 +56,6 @@ def check_session(
 
 
 def _mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> list[Problem]:
-    """Say that virtual and real circles would be mixed; a session of an older program does not tell which it has."""
     if instrument is None or (not session.runs and session.virtual is None):
         return []
     if session.virtual is None and not instrument.virtual:
@@ -69,7 +68,7 @@ def _mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> l
 
 
 def check_not_mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> None:
-    """Refuse to measure virtual circles into a session of real ones, or the other way round.
+    """Refuse to mix virtual and real circles in a session.
 
     Raises:
         InputError: they would be mixed.
@@ -82,7 +81,7 @@ def check_not_mixed(folder: Path, session: SessionFolder, instrument: ReadBy | N
 def open_session(
     folder: Path, machine: Machine, plan: InlinePlan, details: SessionDetails, *, with_programs: bool
 ) -> SessionWriter:
-    """Make a session folder; where it exists with the same machine and plan, go on with it as it is.
+    """Make a session folder, or continue it with the same machine and plan.
 
     Raises:
         InputError: the folder holds another session, or one with faults.
@@ -100,7 +99,7 @@ def open_session(
 
 
 def last_end(session: SessionFolder) -> datetime | None:
-    """Return when the last run of a session ended at the latest, None where there is none."""
+    """Return when the last run ended at the latest, or None."""
     ends = [
         run.started + timedelta(seconds=2.0 * _turn_s(session, run.test, run.direction))
         for run in session.runs

@@ -1,4 +1,4 @@
-"""What can be known to go wrong is found before anything starts: travel, feed-in, range of the instrument."""
+"""Check travel, feed-in and the instrument's range before anything starts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def check_plan(plan: Plan, machine: Machine, *, file: str) -> None:
     """Dry-run a plan.
 
     Raises:
-        InputError: a test whose begin and end the readings cannot show; every such test is named.
+        InputError: readings cannot show a test's begin and end; names every such test.
         TravelError: a circle leaves the machine's travel; names test, direction, pose and limit.
     """
     faults = [
@@ -35,10 +35,10 @@ def check_plan(plan: Plan, machine: Machine, *, file: str) -> None:
 
 
 def check_range(plan: Plan, range_mm: tuple[float, float], *, file: str) -> None:
-    """Hold the lengths of a plan's circles against what an instrument reads.
+    """Check the lengths of a plan's circles against the instrument's range.
 
     Raises:
-        InputError: a circle or its feed-in lies outside; every such test is named.
+        InputError: a circle or feed-in lies outside; names every such test.
     """
     low_mm, high_mm = range_mm
     faults = []

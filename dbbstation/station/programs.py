@@ -1,4 +1,4 @@
-"""NC programs that command the circles of a plan, where these are not the plain nominal ones."""
+"""NC programs that command the circles of a plan."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class RunProgram:
     """A program that commands one run.
 
     Attributes:
-        model_sha256: of the model file that it was compensated with; empty where none.
+        model_sha256: model of its compensation; empty if none.
     """
 
     name: str

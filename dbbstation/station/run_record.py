@@ -1,6 +1,6 @@
-"""The run that goes on: how many samples it has, whether its edges were seen, what its circle says in the end.
+"""The current run: sample count, edges, and its circle in the end.
 
-Samples are not kept here: the memory of a run must not grow with its length. Whoever records them gives them back in the end.
+Samples are not kept here, so that memory does not grow; their recorder returns them.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ _STEP_S = 2e-6
 
 
 class RunRecall(Protocol):
-    """Gives back what was recorded of the run that goes on."""
+    """Returns the recording of the current run."""
 
     def __call__(self, run: RunId, behind: Sequence[Sample], /) -> Recording:
         """Return the whole run.
 
         Args:
-            behind: its last samples, which observers have not been told of yet.
+            behind: last samples, unknown to observers.
 
         Raises:
             StationError: it cannot be read.
@@ -66,13 +66,13 @@ class RunRecord:
     """One run while it is recorded.
 
     Attributes:
-        started_s: time of the first sample on the driver's clock [s].
-        fed_in_s: of the feed-in edge, since the first sample [s]; None before.
-        fed_out_s: of the feed-out edge, likewise.
-        lost: samples that the line counted as lost, wherever in the run.
-        lost_on_turn: those from feed-in to feed-out, and doubtful ones there: both are missing in the circle.
-        doubtful: samples that may have been damaged on the line, wherever in the run.
-        held: how long the length has stood still on the turn; knows the noise of the runs before.
+        started_s: first sample on the driver's clock.
+        fed_in_s: feed-in edge since the first sample; None before.
+        fed_out_s: likewise.
+        lost: anywhere in the run.
+        lost_on_turn: from feed-in to feed-out, with doubtful ones.
+        doubtful: possibly damaged samples anywhere.
+        held: time that the length has stood still on the turn; knows the noise of earlier runs.
     """
 
     run: RunId
@@ -92,10 +92,9 @@ class RunRecord:
         return self.samples
 
     def add(self, reading: Reading) -> Sample:
-        """Take a reading into the run.
+        """Add a reading.
 
-        A reading without a number repeats the last one, so that the file keeps what the instrument said and when;
-        its status keeps it out of every calculation.
+        A reading without a number repeats the last one; its status excludes it from calculations.
         """
         t_s = reading.t_s - self.started_s
         if self.samples:
@@ -114,21 +113,21 @@ class RunRecord:
         return Sample(t_s, length_mm, reading.status, reading.said, reading.lost, phi, reading.t_uncertainty_s)
 
     def phi_deg(self, t_s: float) -> float | None:
-        """Progress along the turn at a time since the first sample, as far as it can be told live [deg]; None off the circle."""
+        """Return the live progress at a time since the first sample [deg]; None off the circle."""
         if self.fed_in_s is None or self.fed_out_s is not None:
             return None
         return live_phi_deg(self.circle, t_s - self.fed_in_s)
 
     def swept_deg(self) -> float:
-        """Travelled since the feed-in, as far as it can be told live [deg]."""
+        """Return the way since the feed-in [deg]."""
         if self.fed_in_s is None or not self.samples:
             return 0.0
         return live_phi_deg(self.circle, self._last_s - self.fed_in_s) + self.circle.overshoot_deg
 
     def stands(self, sample: Sample) -> bool:
-        """Take a sample between feed-in and feed-out; return whether the gauge does not follow the machine.
+        """Add a sample on the turn and return whether the gauge does not follow the machine.
 
-        The length stands still on the turn though noise would move it, or at its end though the feed-out must have.
+        The length then stands still despite noise, or despite a due feed-out.
         """
         if self.fed_in_s is None or sample.phi_deg is None or sample.length_mm is None or sample.status != OK:
             return False
@@ -144,36 +143,29 @@ class RunRecord:
 
     @property
     def standing(self) -> str:
-        """What to say of a gauge that does not follow."""
+        """Return the words for a gauge that does not follow."""
         stands = f"the length has stood at {self._last_mm:.4f} mm for {self.held.held_s:.1f} s"
         return f"{stands} while the machine moved; {AFTER_HELD}"
 
     def left(self, t_s: float) -> bool:
-        """Whether at a time since the first sample enough lies behind the feed-out."""
+        """Return whether enough lies behind the feed-out at a time since the first sample."""
         rest_s = self.circle.feed_in_mm / 2.0 / (self.circle.feed_mm_min / 60.0)
         return self.fed_out_s is not None and t_s >= self.fed_out_s + rest_s + DWELL_BEHIND_S
 
     def circle_figures(self, recording: Recording, largest_loss_percent: float) -> tuple[CircleFigures | None, str]:
-        """Return the figures of the circle, or None and why there is none.
-
-        Args:
-            recording: the whole run.
-            largest_loss_percent: share of the samples that may be lost [%].
-        """
+        """Return the circle's figures, or None and the reason."""
         return circle_figures(recording, self.circle, self.lost, self.lost_on_turn, largest_loss_percent)
 
 
 def circle_figures(
     recording: Recording, circle: Circle, lost: int, lost_on_turn: int, largest_loss_percent: float
 ) -> tuple[CircleFigures | None, str]:
-    """Return the figures of a recorded circle, or None and why there is none.
+    """Return the figures of a recorded circle, or None and the reason.
 
     Args:
-        recording: of the whole run.
-        circle: as commanded.
-        lost: samples that the line counted as lost, wherever in the run; 0 where nobody counted.
-        lost_on_turn: those from feed-in to feed-out.
-        largest_loss_percent: share of the samples that may be lost [%].
+        lost: anywhere in the run; 0 if not counted.
+        lost_on_turn: from feed-in to feed-out.
+        largest_loss_percent: share of samples that may be lost.
     """
     shown, kept = shown_lost(recording, circle)
     unusable = unusable_on_turn(recording, circle)
@@ -186,5 +178,5 @@ def circle_figures(
 
 
 def unrecorded(reading: Reading) -> Sample:
-    """Return a reading that belongs to no run as a sample."""
+    """Return a reading outside runs as a sample."""
     return Sample(reading.t_s, reading.length_mm, reading.status, reading.said, reading.lost)

@@ -1,4 +1,4 @@
-"""Which run comes next: the plan's order from where somebody stands, less what is accepted, and which mounting it belongs to."""
+"""Which run comes next, by plan order and accepted runs, and its mounting."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ class Task:
     """One run that the plan asks for.
 
     Attributes:
-        direction: sense of travel.
-        occurrence: 1, or 2 where the plan repeats the test at its end.
+        occurrence: 1, or 2 if the plan repeats the test at its end.
     """
 
     test: str
@@ -36,7 +35,7 @@ class Task:
 
 @dataclass(frozen=True)
 class NextRun:
-    """A task with the numbers that its recording gets.
+    """A task with the numbers of its recording.
 
     Attributes:
         number: of the task in the sequence, from 1.
@@ -48,11 +47,11 @@ class NextRun:
 
 
 class Schedule:
-    """Keeps count of runs and mountings.
+    """Counts runs and mountings.
 
     Args:
-        next_repeat: which repeat of a test and direction is free; the session folder knows.
-        recorded: runs of the session so far, in the order they were started, of every state.
+        next_repeat: the free repeat of a test and direction.
+        recorded: earlier runs of the session in starting order, of every state.
     """
 
     def __init__(
@@ -83,16 +82,16 @@ class Schedule:
 
     @property
     def open(self) -> tuple[Task, ...]:
-        """Tasks without an accepted recording, passed over or not; more accepted ones than planned do no harm."""
+        """Return tasks without an accepted run, skipped or not."""
         runs = [(test, direction) for (test, direction, _), accepted in self._accepted.items() if accepted]
         return tuple(task for task in self.tasks if task.occurrence > runs.count((task.test, task.direction)))
 
     def number_of(self, run: RunId) -> int:
-        """Number, from 1, of the task that a run was or is measured for."""
+        """Return a run's task number, from 1."""
         return self._place_of(run.test, run.direction) + 1
 
     def next(self) -> NextRun | None:
-        """Return the first task, from the last one on, that is neither done nor passed over; None where all are."""
+        """Return the next open task after the last one that was not skipped, or None."""
         task = self._current()
         if task is None:
             return None
@@ -103,7 +102,7 @@ class Schedule:
         return NextRun(run, put_up=not stands, number=self.tasks.index(task) + 1)
 
     def mounted(self, run: RunId, *, remounted: bool) -> RunId:
-        """Note that the ball of a run stands now; with `remounted` its holder was touched, which makes a new mounting.
+        """Note that a run's ball stands; `remounted` makes a new mounting.
 
         Returns:
             The run with its mounting.
@@ -115,13 +114,13 @@ class Schedule:
         return run
 
     def accept(self, run: RunId) -> None:
-        """Note that a run counts, and go on from there."""
+        """Note an accepted run and go on from there."""
         place = self._place_of(run.test, run.direction)
         self._accepted[run.test, run.direction, run.repeat] = True
         self._place, self._again = place, None
 
     def recorded(self, run: RunId) -> None:
-        """Note a run that has been recorded and has no verdict yet."""
+        """Note a recorded run without verdict."""
         self._accepted[run.test, run.direction, run.repeat] = False
 
     def judge(self, test: str, direction: Direction, repeat: int, *, accepted: bool) -> None:
@@ -135,12 +134,12 @@ class Schedule:
         self._accepted[test, direction, repeat] = accepted
 
     def pass_over(self, run: RunId) -> None:
-        """Leave the task of a run for another time."""
+        """Skip a run's task."""
         self._place, self._again = self._place_of(run.test, run.direction), None
         self._passed.add(self.tasks[self._place])
 
     def go_to(self, test: str, direction: Direction | None = None) -> None:
-        """Let a test be next, also one that was passed over; where all of it is done, once more.
+        """Make a test next, even if skipped or done.
 
         Raises:
             KeyError: the plan has no such run.
@@ -161,7 +160,7 @@ class Schedule:
         return self.tasks[following[0]] if following else None
 
     def _place_of(self, test: str, direction: Direction) -> int:
-        """Place of the first task of a test and direction that is left to do; of one passed over or done where none is."""
+        """Return the place of the first open task of a test and direction, else of a skipped or done one."""
         mine = [k for k, task in enumerate(self.tasks) if (task.test, task.direction) == (test, direction)]
         still = [k for k in mine if self.tasks[k] in self.open]
         return next((k for k in still if self.tasks[k] not in self._passed), (still or mine)[-1])

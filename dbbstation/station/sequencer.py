@@ -1,4 +1,4 @@
-"""The sequencer: commands and readings in, events out. It knows no port, file, clock or thread."""
+"""Commands and readings in, events out, without port, file, clock or thread."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Waiting:
-    """A run that was recorded before and has no verdict.
+    """A recorded run without verdict.
 
     Attributes:
-        samples: of its turn, in time order, thinned; empty where it has none.
+        samples: of its turn, in time order, thinned; may be empty.
     """
 
     completed: events.RunCompleted
@@ -77,18 +77,18 @@ LOOK_AFTER_LINE = "look after bar, balls and cable"
 
 
 class Sequencer:
-    """Walks through a plan, run by run; every state change stands in the table of `states.py`.
+    """Walks through a plan by the table of `states.py`.
 
-    Time is that of the readings, so a recording played back, a scaled virtual machine and a test all look alike.
-    Each method returns what happened, in order.
+    Time is that of the readings, so that playback, virtual machines and tests are alike. Each method returns events in
+    order.
 
     Args:
-        recorded: gives back the run that goes on, once it is complete.
-        programs: name of the NC program that commands a test and direction; the plan's nominal circle where absent.
-        patience: how long is waited for the machine.
-        waiting: runs that were recorded before and have no verdict, oldest first; they are judged before anything is measured.
-        judge: finds out what is wrong with a run that holds a circle; None: nothing is looked for.
-        rate_hz: readings per second that the instrument brings; None: not known.
+        recorded: returns the complete current run.
+        programs: by test and direction; absent: the nominal circle.
+        patience: how long to wait for the machine.
+        waiting: recorded runs without verdict, oldest first; judged before measuring.
+        judge: judges a run with a circle; None: no judging.
+        rate_hz: readings per second; None: not known.
     """
 
     def __init__(
@@ -128,12 +128,12 @@ class Sequencer:
         self._wrong = ""
 
     def begin(self) -> list[Event]:
-        """Announce the first run, or one that waits for its verdict."""
+        """Announce the first run, or one that awaits its verdict."""
         self._announce_next()
         return self._told()
 
     def command(self, command: Command) -> list[Event]:
-        """Obey a command where the state takes it, refuse it otherwise."""
+        """Obey a command, or refuse it in this state."""
         cause = COMMAND_CAUSES[type(command)]
         if cause not in TRANSITIONS[self.state]:
             self._out.append(events.CommandRefused(command, self.state, self._why_not(cause)))
@@ -257,7 +257,7 @@ class Sequencer:
         self._to_next(COMMAND_CAUSES[type(command)])
 
     def _reorder(self, command: GoTo | Judge) -> None:
-        """Let another test be next, or another verdict hold; what cannot be done is refused."""
+        """Obey a command about the order or a verdict, or refuse it."""
         try:
             if isinstance(command, GoTo):
                 self.schedule.go_to(command.test, command.direction)
@@ -326,7 +326,7 @@ class Sequencer:
         self._tell_progress()
 
     def _held_against_feed(self, reading: Reading) -> Reading:
-        """Return a reading of a run, doubtful where the machine cannot have moved the bar so fast."""
+        """Return a reading, doubtful if the machine cannot move the bar so fast."""
         if self._reachable is None or reading.length_mm is None or reading.status != OK:
             return reading
         if self.state not in RECORDING or self._record is None:
@@ -366,7 +366,7 @@ class Sequencer:
             self._out.append(events.RunProgress(self._record.run, swept, self._record.circle.swept_deg))
 
     def _look_for_missed(self, reading: Reading) -> None:
-        """Say so where the machine is on its circle and nobody records it."""
+        """Report an unrecorded circle."""
         if self._watch is None or reading.length_mm is None or reading.status != OK:
             return
         if not self._watch.seen(reading.t_s, reading.length_mm):
@@ -398,7 +398,7 @@ class Sequencer:
             self._move(Trigger.LATE)
 
     def _complete(self, problem: str = "") -> bool:
-        """End the recording, for a reason other than its circle where one is given; return whether it holds one."""
+        """End the recording, for a given problem or its circle; return whether it holds one."""
         self._flush()
         record = self._record
         if record is None:
@@ -437,7 +437,7 @@ class Sequencer:
         self._out.append(events.StateChanged(self.state, commands_allowed(self.state)))
 
     def _flush(self) -> None:
-        """Tell of the samples so far, before anything that comes after them."""
+        """Report the samples so far."""
         if not self._samples:
             return
         samples, self._samples = tuple(self._samples), []
@@ -457,7 +457,7 @@ class Sequencer:
 
 
 def _length_gone(reading: Reading, phi_deg: float) -> str:
-    """Say what the instrument told in the middle of the turn: what is missing there, no fit brings back."""
+    """Report a gap within the turn, which no fit restores."""
     said = f" ({reading.said})" if reading.said else ""
     what = f"the instrument reports {reading.status}{said} at {phi_deg:.0f}° of the turn"
     return f"{what}; {reading.remedy or 'check bar and instrument'}, then repeat the run"

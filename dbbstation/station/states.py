@@ -1,4 +1,4 @@
-"""States of the sequencer and the transitions between them, as one table."""
+"""States of the sequencer and their transitions, as one table."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class State(StrEnum):
-    """Where the sequence stands; the text is what people read."""
+    """State of the sequence, in words for people."""
 
     BETWEEN = "between runs"
     ANNOUNCED = "waiting for the set-up"
@@ -43,7 +43,7 @@ class State(StrEnum):
 
 
 class Trigger(StrEnum):
-    """Why a state changes: commands first, then what the readings, the schedule or the equipment bring."""
+    """Causes of a change: commands, then readings, schedule or equipment."""
 
     START = "start"
     ACCEPT = "accept"

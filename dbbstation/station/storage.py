@@ -1,4 +1,4 @@
-"""Storage: subscribes to the sequence and keeps every sample and verdict in the session folder."""
+"""Storage: keeps every sample and verdict in the session folder."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class Storage:
     """Writes a session as it happens; an observer of the station.
 
     Args:
-        now: the time of day with its zone.
-        programs: NC program, kept in the session already, by test and direction.
-        unreadable: what the driver rejected so far, by what was wrong with it.
-        asked: whether the instrument is asked for each reading: the time of each then has an uncertainty of its own.
-        instrument: what reads the lengths; None: not known.
+        now: with its zone.
+        programs: kept in the session, by test and direction.
+        unreadable: rejected bytes so far, by fault.
+        asked: whether each reading is requested, so that its time has an own uncertainty.
+        instrument: None: not known.
     """
 
     def __init__(
@@ -64,10 +64,10 @@ class Storage:
         self._instrument = instrument
 
     def __call__(self, event: events.Event) -> None:
-        """Keep what the event says.
+        """Keep an event.
 
         Raises:
-            OutputError: the disk refuses; what was written before stays.
+            OutputError: the disk refuses; earlier data stays.
         """
         match event:
             case events.RunStarted():
@@ -92,13 +92,13 @@ class Storage:
                 pass
 
     def recorded(self, run: events.RunId, behind: Sequence[events.Sample]) -> Recording:
-        """Return the run that goes on, from its journal; a `Recorded` of the sequencer.
+        """Return the current run from its journal.
 
         Args:
-            behind: its last samples, which are not in the journal yet.
+            behind: last samples, not yet in the journal.
 
         Raises:
-            InputError: the journal cannot be read, or not as it was written.
+            InputError: the journal cannot be read, or was altered.
         """
         last = recording_of(run, behind)
         if self._journal is None or not self._journal.samples:
@@ -113,7 +113,7 @@ class Storage:
         )
 
     def sync_if_due(self) -> None:
-        """Bring to disk what has waited for a second, also while no readings come.
+        """Sync data that has waited for a second, also without readings.
 
         Raises:
             OutputError: the disk refuses.
@@ -122,7 +122,7 @@ class Storage:
             self._journal.sync_if_due()
 
     def close(self) -> None:
-        """Bring a run that goes on to disk as far as it came; its file stays a `.part`."""
+        """Sync a current run as far as it came; its file stays a `.part`."""
         if self._journal is None:
             return
         journal, self._journal = self._journal, None
@@ -173,13 +173,13 @@ class Storage:
 
 
 def time_of_day(clock: Callable[[], float], last: datetime | None = None) -> Callable[[], datetime]:
-    """Return a time of day that goes as fast as a scaled `clock`, so that runs on it lie apart as their samples do.
+    """Return a time of day that runs as fast as a scaled `clock`.
 
-    It begins so far back that it does not overtake the computer's own: nothing is recorded in the future.
+    It begins early enough to stay behind the computer's time.
 
     Args:
-        clock: machine time, faster than real time [s].
-        last: start of the last run of a session that goes on; time of day never falls behind it.
+        clock: faster than real time [s].
+        last: start of a continued session's last run, a lower bound.
     """
     begun_s = clock()
     begun = datetime.now(UTC) - FASTER_BEGINS_BEFORE

@@ -1,4 +1,4 @@
-"""Runs of a session that were recorded whole and never judged: a crash, a quit or a pulled plug came before the verdict."""
+"""Runs that were recorded whole but not judged, because of a crash or a quit."""
 
 from __future__ import annotations
 
@@ -25,11 +25,7 @@ if TYPE_CHECKING:
 def unjudged(
     session: SessionFolder, judge: Callable[[RunId, Recording], tuple[Finding, ...]] = lambda _run, _recording: ()
 ) -> list[Waiting]:
-    """Return what waits for a verdict, in the order it was recorded.
-
-    Args:
-        judge: finds out what is wrong with a run that holds a circle.
-    """
+    """Return unjudged runs in recording order."""
     return [_waiting(session, entry, judge) for entry in session.runs if entry.state is RunState.COMPLETE]
 
 
@@ -51,7 +47,6 @@ def _waiting(
 
 
 def _on_turn(raw: RawCircle) -> tuple[Sample, ...]:
-    """Samples of the turn with their angles, thinned to what a screen can show."""
     step = max(len(raw) // MOST_SHOWN, 1)
     rows = zip(raw.t_s[::step].tolist(), raw.length_mm[::step].tolist(), raw.phi_deg[::step].tolist(), strict=True)
     return tuple(Sample(t_s, length_mm, phi_deg=phi_deg) for t_s, length_mm, phi_deg in rows)

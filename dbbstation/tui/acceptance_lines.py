@@ -1,4 +1,4 @@
-"""The rows and sentences of an acceptance; the numbers are those that `report --before` prints."""
+"""Rows and sentences of an acceptance, with the numbers of `report --before`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _DIGEST = 8
 
 
 def test_line(one: ToleranceOfTestAnswer) -> Content:
-    """Return the row of one test and figure: its worst circle before and now, limit, U and a word."""
+    """Return the row of a test and figure: worst circle before and now, limit, U, word."""
     row = _ROW.format(
         test=_short(one.test),
         figure=texts.FIGURE_NAMES[one.quantity],
@@ -43,7 +43,7 @@ def test_line(one: ToleranceOfTestAnswer) -> Content:
 
 
 def worst_lines(answer: AcceptanceAnswer) -> Iterator[str]:
-    """Yield a sentence for each tolerance: the worst circle before and now; where there is none, what is missing."""
+    """Yield a sentence for each tolerance: the worst circle before and now, or what is missing."""
     told = [(one, one.worst) for one in answer.tolerances if one.worst is not None]
     for one, worst in told:
         before = None if one.before is None else one.before.worst
@@ -59,7 +59,7 @@ def worst_lines(answer: AcceptanceAnswer) -> Iterator[str]:
 
 
 def in_force_line(in_force: InForce) -> str:
-    """Return in words what the circles of a session ran by."""
+    """Return what commanded the circles of a session, in words."""
     if in_force.compensated == 0:
         return texts.RUN_BY_NOMINAL if in_force.programs else texts.RUN_BY_PLAIN
     if in_force.compensated < in_force.circles:
@@ -68,7 +68,7 @@ def in_force_line(in_force: InForce) -> str:
 
 
 def way_back_lines(former: Former, kept: tuple[Path, ...]) -> Iterator[str]:
-    """Yield where that lies which the circles before ran by."""
+    """Yield where the former models are."""
     in_force = former.in_force
     if in_force.compensated == 0:
         yield texts.WAY_BACK_NOMINAL.format(folder=former.folder)
@@ -85,7 +85,7 @@ def _circle(worst: WorstAnswer) -> str:
 
 
 def _expanded(worst: WorstAnswer | None) -> str:
-    """Return U of a circle; what stands for none where nobody knows it."""
+    """Return U of a circle, or a placeholder."""
     u_um = None if worst is None else worst.expanded_um
     return texts.NOT_BEFORE if u_um is None else f"{u_um:.1f}"
 

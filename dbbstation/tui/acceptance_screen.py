@@ -1,4 +1,4 @@
-"""Acceptance: circles as measured before and now, held against the shop's tolerances; where the way back lies."""
+"""Acceptance: circles before and now against the shop's tolerances, and the way back."""
 
 from __future__ import annotations
 
@@ -32,11 +32,7 @@ if TYPE_CHECKING:
 
 
 class AcceptanceScreen(RowScreen):
-    """Pushed over the results.
-
-    Args:
-        search: looks for sessions that this one can be held against.
-    """
+    """Shown over the results."""
 
     help_name = "acceptance"
 
@@ -55,12 +51,10 @@ class AcceptanceScreen(RowScreen):
         self._seen: object = None
 
     def on_mount(self) -> None:
-        """Look for sessions measured before."""
         self._searching = Background(lambda: self._search(self._after.session))
         self._draw()
 
     def look(self) -> None:
-        """Take in what was found, and how far the work has come."""
         if self._searching is not None and self._searching.done:
             searching, self._searching = self._searching, None
             try:
@@ -71,7 +65,6 @@ class AcceptanceScreen(RowScreen):
         self._draw()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Only keys that mean something now stand in the footer and do something."""
         if action == "former":
             return self._after.busy is None and self._found is not None and bool(self._found.formers)
         if action == "cancel":
@@ -83,21 +76,17 @@ class AcceptanceScreen(RowScreen):
         self._draw()
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
-        """Choose the session before, while none is."""
         if self._after.former is None and self.check_action("former", ()):
             self._accept(self.at)
 
     def action_former(self) -> None:
-        """Ask for the session before."""
         if self._found is not None:
             self.app.push_screen(ChooseQuestion(texts.FORMER_TITLE, self._offered()), self._accept)
 
     def action_cancel(self) -> None:
-        """End what is being done."""
         self._after.cancel()
 
     def action_back(self) -> None:
-        """Go back to the results; the work goes on there."""
         self.dismiss()
 
     def _offered(self) -> list[str]:
@@ -140,7 +129,7 @@ class AcceptanceScreen(RowScreen):
             self.refresh_bindings()
 
     def _sentence(self) -> tuple[str, bool]:
-        """Return the sentence at the top, and whether it tells of something wrong."""
+        """Return the sentence at the top, and whether it reports a fault."""
         result = self._after.results[SessionTask.ACCEPTANCE]
         if self._failure:
             return self._failure, True
@@ -169,7 +158,7 @@ class AcceptanceScreen(RowScreen):
         return Content("" if self._found is None else texts.RUN_BY_NOW.format(by=in_force_line(self._found.now)))
 
     def _notes(self, answer: AcceptanceAnswer | None) -> list[Content]:
-        """Return what stands below the list: worst figures, what the circles ran by, the way back, the file."""
+        """Return the notes below the list."""
         after = self._after
         told = [] if answer is None else [Content(text) for text in worst_lines(answer)]
         if self._found is not None:

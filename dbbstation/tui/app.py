@@ -1,4 +1,4 @@
-"""The app of the station: takes what happened, has the screen on top drawn, passes on what is pressed."""
+"""The station's app: takes events, draws the top screen, passes keys on."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ _NOT_OPERATED = {"overview": "o", "large": "f", "results": "e", "temperature": "
 
 
 class Sequence(Protocol):
-    """What the screen needs of whatever runs the sequence; `Runner` does."""
+    """What runs the sequence; `Runner` does."""
 
     @property
     def alive(self) -> bool:
@@ -78,19 +78,19 @@ class Sequence(Protocol):
 
     @property
     def crash(self) -> Exception | None:
-        """What ended it and should not have: a mistake in the program."""
+        """Return the programming error that ended it."""
 
     def start(self) -> None:
         """Open instrument and session and run."""
 
     def send(self, command: Command) -> bool:
-        """Pass a command on; return whether anybody is there to take it."""
+        """Send a command; return whether it was taken."""
 
     def mail(self) -> list[Event | SequenceOpened]:
         """Return what has come since the last call."""
 
     def wait(self) -> None:
-        """Wait until a sequence that is over has let go of the session."""
+        """Wait until an ended sequence has released the session."""
 
     def close(self) -> None:
         """End the sequence and wait for that."""
@@ -100,11 +100,11 @@ class StationApp(App[None]):
     """Screens on one board.
 
     Args:
-        shown: plan and plate; None: the start screen says what is measured.
-        runner: runs the sequence; started when the screen stands; None where `front` opens it.
-        clock: real time, for telling an old reading [s].
-        front: finds sessions and opens jobs; None: there is only what `runner` runs.
-        operated: the one job that can be measured, for an operator; None: everything can.
+        shown: None: the start screen chooses what is measured.
+        runner: started with the screen; None if `front` opens it.
+        clock: real time, for stale readings [s].
+        front: finds sessions and opens jobs; None: only `runner`.
+        operated: the operator's one job; None: everything.
     """
 
     TITLE = "dbbstation"
@@ -150,7 +150,6 @@ class StationApp(App[None]):
         self._looked_up: tuple[Path, str] | None = None
 
     def get_default_screen(self) -> MeasureScreen | StartScreen | JobScreen:
-        """Return the screen at the bottom of the stack."""
         if self._operated is not None and self._front is not None:
             return JobScreen(self, self._front, self._operated)
         if self._runner is None and self._front is not None:
@@ -158,18 +157,16 @@ class StationApp(App[None]):
         return MeasureScreen(self, self._show, clock=self._clock)
 
     def on_ready(self) -> None:
-        """Begin to measure, and to look, once every part stands."""
         if self._runner is not None:
             self._runner.start()
         self.set_interval(LOOK_S, self.look)
 
     async def on_event(self, event: ScreenEvent) -> None:
-        """Take what is pressed, as long as there is a screen: Textual asks the screen on top without looking for one."""
+        """Take keys only while a screen exists: Textual asks the top screen unchecked."""
         if self.screen_stack or not isinstance(event, InputEvent | Paste):
             await super().on_event(event)
 
     def on_unmount(self) -> None:
-        """Whatever closed the screen, the sequence and all work end in order."""
         if self._runner is not None:
             self._runner.close()
         for after in self._after.values():
@@ -180,7 +177,6 @@ class StationApp(App[None]):
             self._front.close()
 
     def look(self) -> None:
-        """Take in what was done elsewhere, take the mail, draw what changed."""
         if self.screen_stack:  # none: the last look may come while it closes
             self._finish_works()
         for screen in reversed(self.screen_stack):
@@ -208,7 +204,7 @@ class StationApp(App[None]):
             self._end()
 
     def _answer_job(self, operated: Operated) -> None:
-        """Show the answer on a job whose plan is through, behind the temperature where that is asked for."""
+        """Show the answer on a finished job, after asking for the temperature if wanted."""
         self._answering = True
         folder = Path(self.board.session)
         missing = self.board.finished.missing if self.board.finished is not None else ()
@@ -229,11 +225,11 @@ class StationApp(App[None]):
 
     @property
     def crash(self) -> Exception | None:
-        """What ended the sequence and should not have: a mistake in the program."""
+        """Return the programming error that ended the sequence."""
         return None if self._runner is None else self._runner.crash
 
     def _look_up_last(self) -> None:
-        """Have the circles of the session before read, once a test; where there are none, none are drawn."""
+        """Read the circles of the session before, once a test."""
         board, folder = self.board, Path(self.board.session)
         if not board.session or not board.test or self._looked_up == (folder, board.test):
             return
@@ -258,11 +254,11 @@ class StationApp(App[None]):
                 then(outcome)
 
     def do(self, work: Callable[[], Any], then: Callable[[Any], None], failed: Callable[[Exception], None]) -> None:
-        """Do work of some seconds in the background; as `Reception` has it."""
+        """Do work of some seconds in the background."""
         self._works.append((Background(work), then, failed))
 
     def open(self, choice: Choice, prepared: Prepared, failed: Callable[[Exception], None]) -> None:
-        """Open a job in the background, and show the screen beside the machine; one at a time."""
+        """Open a job in the background and show its screen; one at a time."""
         front = self._front
         if front is None or self._opening:
             return
@@ -278,7 +274,7 @@ class StationApp(App[None]):
         self.do(begin, self._measure, refused)
 
     def _measure(self, opened: Opened) -> None:
-        """Show the screen beside the machine over the start screen, and begin."""
+        """Show the measuring screen and begin."""
         self._opening = False
         plan = opened.prepared.job.plan
         self._show = Shown(plan.plan.name, plan.jig.bores, tests=plan.to_domain().tests)
@@ -294,7 +290,7 @@ class StationApp(App[None]):
             self.pop_screen()
 
     def _end(self) -> None:
-        """Close what was measured: back to the start screen where there is one."""
+        """Close the measurement and return to the start screen."""
         self._leaving = False
         start = self.screen_stack[0] if self.screen_stack else None
         if (
@@ -311,7 +307,7 @@ class StationApp(App[None]):
         start.search()
 
     def show_results(self, folder: Path) -> None:
-        """Show what can be done with a session that is measured; what was done before still stands there."""
+        """Show what can be done with a measured session."""
         known = self._after.get(folder)
         if known is not None and known.busy is None and known.outdated:
             known.close()
@@ -322,24 +318,24 @@ class StationApp(App[None]):
 
     @property
     def drawn(self) -> BoardScreen | None:
-        """The topmost screen that shows the board; questions and help only stand before it."""
+        """Return the topmost screen that shows the board."""
         return next((screen for screen in reversed(self.screen_stack) if isinstance(screen, BoardScreen)), None)
 
     def draw(self) -> None:
-        """Draw the board, as long as there is a screen: the last look may come while it closes."""
+        """Draw the board while a screen exists."""
         drawn = self.drawn
         if drawn is not None and drawn.is_mounted:
             drawn.draw()
 
     def send(self, command: Command) -> None:
-        """Pass a command on to the sequence; a verdict also when the plan is through."""
+        """Send a command to the sequence; a verdict also after the plan."""
         if isinstance(command, Judge) and self.board.state is State.FINISHED:
             self._judge_afterwards(command)
         elif self._runner is not None:
             self._runner.send(command)
 
     def _judge_afterwards(self, command: Judge) -> None:
-        """Note a verdict in the session, and begin the sequence anew: what does not count any more is measured again."""
+        """Note a verdict and restart the sequence, which repeats what no longer counts."""
         runner, folder = self._runner, Path(self.board.session)
         if runner is None:
             return
@@ -361,7 +357,7 @@ class StationApp(App[None]):
         self.do(write, written, failed)
 
     def _drop_stale_question(self) -> None:
-        """Take a question back whose circle has ended meanwhile: an answer to it would hit something else."""
+        """Withdraw a question whose circle has ended."""
         question = self.screen_stack[-1] if self.screen_stack else None  # none: the last look may come while it closes
         if isinstance(question, GiveUpQuestion):
             running = self.board.state in RECORDING and self.board.announced is not None
@@ -370,14 +366,13 @@ class StationApp(App[None]):
 
     @property
     def _measuring(self) -> bool:
-        """Whether the screen on top belongs to the machine, and not to what comes before or after."""
+        """Return whether the top screen belongs to the machine."""
         top = self.screen_stack[-1] if self.screen_stack else None  # none while it closes
         return self._runner is not None and not isinstance(top, RowScreen | AnswerScreen)
 
     def check_action(  # noqa: PLR0911 - a line per action, nothing nested
         self, action: str, parameters: tuple[object, ...]
     ) -> bool | None:
-        """Only keys that mean something now stand in the footer and do something."""
         if self._operated is not None and action in _NOT_OPERATED:
             return False
         if action == "connect":
@@ -395,7 +390,7 @@ class StationApp(App[None]):
         return super().check_action(action, parameters)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        """Offer what the keys of a screen do now, with the sentence that help has for each."""
+        """Return the current keys with their help."""
         if not isinstance(screen, ExplainedScreen):
             return
         for key, active in screen.active_bindings.items():
@@ -408,11 +403,9 @@ class StationApp(App[None]):
                 yield SystemCommand(active.binding.description, sentence, act)
 
     def action_overview(self) -> None:
-        """Open the overview."""
         self.push_screen(OverviewScreen(self, self._show))
 
     def action_large(self) -> None:
-        """Change between the screen beside the machine and large figures; an overview makes way for these."""
         before = self.drawn
         if isinstance(before, LargeScreen | OverviewScreen):
             self.pop_screen()
@@ -420,27 +413,22 @@ class StationApp(App[None]):
             self.push_screen(LargeScreen(self, self._show, clock=self._clock))
 
     def action_explain(self) -> None:
-        """Say what the screen shows and what each key does."""
         explained = next((each for each in reversed(self.screen_stack) if isinstance(each, ExplainedScreen)), None)
         if explained is not None and not isinstance(self.screen, ModalScreen):
             without = () if self._operated is None else _NOT_OPERATED.values()
             self.push_screen(HelpScreen(explained.help_name, tuple(without)))
 
     def action_messages(self) -> None:
-        """Show the messages with all their words."""
         self.push_screen(MessagesScreen(list(self.board.messages)))
 
     def action_connect(self) -> None:
-        """Open instrument and session again after a fault."""
         if self._runner is not None:
             self._runner.start()
 
     def action_temperature(self) -> None:
-        """Ask for the temperature of the shop and note it."""
         self._ask_temperature(lambda: None)
 
     def action_results(self) -> None:
-        """Show what can be done with what is measured so far; the temperature after the last circle comes first."""
         folder = Path(self.board.session)
         if self.board.finished is not None and self.board.temperature_due:
             self._ask_temperature(lambda: self.show_results(folder))
@@ -448,11 +436,9 @@ class StationApp(App[None]):
             self.show_results(folder)
 
     def action_brightness(self) -> None:
-        """Change between dark and light."""
         self.theme = LIGHT if self.theme == DARK else DARK
 
     def action_leave(self) -> None:
-        """Quit, after a question where a circle is being recorded."""
         if self._runner is None:
             self.exit()
         elif self.board.state in RECORDING and self.drawn is not None:
@@ -463,7 +449,7 @@ class StationApp(App[None]):
             self.leave(sure=True)
 
     def _ask_temperature(self, then: Callable[[], None]) -> None:
-        """Ask for the temperature of the shop, note it where it is given, then go on; one question at a time."""
+        """Ask for the shop's temperature, note it, then go on; one question at a time."""
         if isinstance(self.screen, TemperatureQuestion):
             return
 
@@ -477,7 +463,7 @@ class StationApp(App[None]):
         self.push_screen(TemperatureQuestion(), answered)
 
     def _note_temperature(self, degc: float, then: Callable[[], None]) -> None:
-        """Note a temperature [degC] by the sequence, or in the session's file where the sequence is over."""
+        """Note a temperature [degC] by the sequence, or in the file after its end."""
         runner, folder = self._runner, Path(self.board.session)
         if runner is None or AddNote in self.board.allowed:
             self.send(AddNote(ambient_temp_c=degc))
@@ -498,17 +484,17 @@ class StationApp(App[None]):
         self.do(write, written, failed)
 
     def close_down(self) -> None:
-        """End the sequence and the screen without a question, whatever screen is on top."""
+        """End sequence and screen without a question."""
         self._wholly = True
         self.leave(sure=True)
 
     def give_up(self) -> None:
-        """End the sequence from another thread, where the screen is stuck; what was read is on the disk then."""
+        """End the sequence from another thread while the screen is stuck."""
         if self._runner is not None:
             self._runner.close()
 
     def leave(self, sure: bool | None) -> None:  # noqa: FBT001 - answer of a question
-        """End the sequence, if they are sure; the screen closes when it has ended."""
+        """End the sequence if sure; the screen closes afterwards."""
         if not sure:
             return
         if self._runner is None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class ChooseQuestion(ModalScreen[int | None]):
-    """Returns the place of what was chosen; None where nothing was."""
+    """Returns the place of the choice, or None."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,q,ctrl+c", "dismiss(None)", "Back")]
 
@@ -30,29 +30,25 @@ class ChooseQuestion(ModalScreen[int | None]):
         self._title, self._rows, self._at = title, [Content(label) for label in labels], at
 
     def compose(self) -> ComposeResult:
-        """Ask."""
         with Vertical():
             yield Static(self._title, markup=False)
             yield OptionList(*(Option(row) for row in self._rows))
 
     def on_mount(self) -> None:
-        """Offer what was chosen before."""
         options = self.query_one(OptionList)
         options.highlighted = min(max(self._at, 0), len(self._rows) - 1) if self._rows else None
         mark_chosen(options, self._rows)
         options.focus()
 
     def on_option_list_option_highlighted(self) -> None:
-        """Move the mark."""
         mark_chosen(self.query_one(OptionList), self._rows)
 
     def on_option_list_option_selected(self, chosen: OptionList.OptionSelected) -> None:
-        """Close with the place of what was chosen."""
         self.dismiss(chosen.option_index)
 
 
 class TypeQuestion(ModalScreen[str | None]):
-    """Returns what was typed, without blanks about it; None where nothing was asked of it."""
+    """Returns the stripped text, or None."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,ctrl+c", "dismiss(None)", "Back")]
 
@@ -61,11 +57,9 @@ class TypeQuestion(ModalScreen[str | None]):
         self._title, self._text = title, text
 
     def compose(self) -> ComposeResult:
-        """Ask."""
         with Vertical():
             yield Static(self._title, markup=False)
             yield Input(value=self._text, placeholder=TYPED)
 
     def on_input_submitted(self, submitted: Input.Submitted) -> None:
-        """Close with what was typed."""
         self.dismiss(submitted.value.strip())

@@ -1,4 +1,4 @@
-"""The bar on its calibrator: live reading, what is stated of both, and the calibration."""
+"""The bar on its calibrator: live reading, statements and calibration."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class BarScreen(RowScreen):
     """Owns the instrument until it is left.
 
     Args:
-        then: told the file of the calibration when it is left with one.
+        then: receives the file of the calibration.
     """
 
     help_name = "bar"
@@ -47,17 +47,14 @@ class BarScreen(RowScreen):
         self._problem = ""
 
     def on_mount(self) -> None:
-        """Open the instrument."""
         self._show()
         self._reopen()
 
     def on_unmount(self) -> None:
-        """Give the instrument back."""
         if self._calibration is not None:
             self._calibration.close()
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
-        """Change the chosen row."""
         name = list(texts.BAR_ROWS)[self.at]
 
         def answered(text: str | None) -> None:
@@ -79,7 +76,6 @@ class BarScreen(RowScreen):
         self.app.push_screen(TypeQuestion(texts.BAR_ROWS[name], self._values[name]), answered)
 
     def action_begin(self) -> None:
-        """Read the bar, once everything is stated."""
         if self._calibration is None or self._missing():
             return
         try:
@@ -92,14 +88,12 @@ class BarScreen(RowScreen):
         self._calibration.begin(stated, self._front.new_bar_file())
 
     def action_back(self) -> None:
-        """Go back, with the calibration where there is one."""
         found = None if self._calibration is None else self._calibration.found
         self.dismiss()
         if found is not None:
             self._then(found.path)
 
     def look(self) -> None:
-        """Show the live reading, and how the calibration stands."""
         calibration = self._calibration
         if not self.stands:
             return
@@ -148,7 +142,7 @@ class BarScreen(RowScreen):
         )
 
     def _reads_mm(self) -> float | None:
-        """What the bar reads now [mm]; None where that is nothing, or doubtful."""
+        """Return the bar's reading [mm]; None without a sound one."""
         reading = None if self._calibration is None else self._calibration.latest
         return None if reading is None or reading.status == DOUBTFUL else reading.length_mm
 

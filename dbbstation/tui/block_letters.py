@@ -1,4 +1,4 @@
-"""Large letters from blocks: a font of three to five by five points, each point some columns wide and some rows high."""
+"""Large letters from blocks, three to five by five points."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ _FONT = {
 
 
 def largest(texts: Sequence[str], width: int, height: int) -> tuple[int, int]:
-    """Return columns and rows of a point with which each of some texts fits into a width, below a height.
+    """Return the size of a point [columns, rows] with which all texts fit.
 
     Args:
-        texts: each in one line of its own, all of one size.
+        texts: one line each.
     """
     points = max(len(_points(text)[0]) for text in texts)
     wide, high = max(width // points, 1), max(height // HIGH, 1)
@@ -70,7 +70,7 @@ def largest(texts: Sequence[str], width: int, height: int) -> tuple[int, int]:
 
 
 def block_rows(text: str, wide: int, high: int) -> list[str]:
-    """Return the rows of a text in large letters; what the font does not have is a question mark.
+    """Return the rows of a text in large letters; unknown characters become question marks.
 
     Args:
         text: letters, digits and `.-+?`; small letters become large ones.

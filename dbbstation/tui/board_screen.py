@@ -1,4 +1,4 @@
-"""A screen that shows the board: drawn when it is the topmost of its kind."""
+"""A screen that shows the board."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _GIVES_UP = {"repeat": "Repeat", "reject": "Reject"}
 
 
 class Desk(Protocol):
-    """What a screen needs of the app; `StationApp` is one."""
+    """What a screen needs of `StationApp`."""
 
     board: Board
 
@@ -49,11 +49,7 @@ class Desk(Protocol):
 
 
 class BoardScreen(ExplainedScreen):
-    """Panels and whatever else is made from the board.
-
-    Args:
-        desk: has the board, and takes commands.
-    """
+    """Panels and other parts made from the board."""
 
     def __init__(self, desk: Desk) -> None:
         super().__init__()
@@ -61,7 +57,6 @@ class BoardScreen(ExplainedScreen):
         self._keys: object = None
 
     def draw(self) -> None:
-        """Draw the board; the footer only where other keys mean something now."""
         for panel in self.query(Panel):
             panel.show(self.desk.board)
         keys = self.keys()
@@ -70,18 +65,16 @@ class BoardScreen(ExplainedScreen):
             self.refresh_bindings()
 
     def keys(self) -> object:
-        """Return what decides which keys mean something; compared with what it was."""
+        """Return what decides the active keys."""
         board = self.desk.board
         return board.allowed, board.state, board.fault is None
 
 
 class RunScreen(BoardScreen):
-    """A screen in front of the machine: its keys send commands to the present run.
+    """A screen at the machine; its keys command the present run.
 
     Args:
-        desk: has the board, and takes commands.
-        shown: plan and plate.
-        clock: real time, for telling an old reading [s].
+        clock: real time, for stale readings [s].
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -102,7 +95,6 @@ class RunScreen(BoardScreen):
         self._clock = clock
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Only keys that mean something now stand in the footer and do something."""
         if action == "tell":
             return type(COMMANDS[str(parameters[0])]) in self.desk.board.allowed
         if action == "accept":
@@ -112,13 +104,13 @@ class RunScreen(BoardScreen):
         return super().check_action(action, parameters)
 
     def action_next(self) -> None:
-        """Do what the word on the run says: accept it, or measure it again. Nothing that is wrong is accepted so."""
+        """Accept the run or repeat it, as its word says."""
         completed = self.desk.board.completed
         again = completed is None or completed.answer.word is Advice.REPEAT
         self.desk.send(COMMANDS["repeat" if again else "accept"])
 
     def action_accept(self) -> None:
-        """Accept the run; one with something wrong for a reason only."""
+        """Accept the run; a faulty one only for a reason."""
         completed = self.desk.board.completed
         if completed is None or completed.answer.word is not Advice.REPEAT:
             self.desk.send(Accept())
@@ -131,8 +123,6 @@ class RunScreen(BoardScreen):
         self.app.push_screen(ReasonQuestion(completed.run.label, counts=True), answered)
 
     def action_tell(self, name: str) -> None:
-        """Send a command, after a question where it gives up a circle that is being recorded."""
-
         def answered(sure: bool | None) -> None:  # noqa: FBT001 - answer of a question
             if sure:
                 self.desk.send(COMMANDS[name])
@@ -144,11 +134,11 @@ class RunScreen(BoardScreen):
 
 
 def ask_to_give_up(screen: BoardScreen, act: str, then: Callable[[bool | None], None]) -> None:
-    """Ask whether to give up the circle that is being recorded; one question at a time.
+    """Ask whether to give up the recording; one question at a time.
 
     Args:
-        act: what was asked for, as a verb with a capital letter.
-        then: called with the answer.
+        act: a capitalised verb.
+        then: receives the answer.
     """
     if isinstance(screen.app.screen, GiveUpQuestion):
         return

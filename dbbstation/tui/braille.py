@@ -1,7 +1,7 @@
-"""Planes of dots that become braille characters: two by four dots in every cell of a terminal.
+"""Planes of dots as braille characters, two by four dots a cell.
 
-A plane is a boolean array, shape (4 rows, 2 columns), y downwards. Several planes share the cells: their dots are OR-ed,
-and every cell tells which planes have a dot in it, so that it can be coloured.
+A plane is a boolean array, shape (4 rows, 2 columns), y downwards. Overlaid planes share cells, which are coloured by
+plane.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype
 
 
 def empty(columns: int, rows: int) -> Plane:
-    """Return a plane without dots for so many cells."""
+    """Return a plane without dots."""
     return np.zeros((rows * CELL_HIGH, columns * CELL_WIDE), dtype=np.bool_)
 
 
 def light(plane: Plane, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
-    """Raise the dots at points; those outside the plane are left out.
+    """Raise dots at points inside the plane.
 
     Args:
-        x: dots to the right of the plane's left edge, shape (n,).
-        y: dots below its upper edge, shape (n,).
+        x: dots from the left edge, shape (n,).
+        y: dots from the upper edge, shape (n,).
     """
     with np.errstate(invalid="ignore"):
         inside = (x >= 0.0) & (x < plane.shape[1]) & (y >= 0.0) & (y < plane.shape[0])
@@ -45,9 +45,9 @@ def light(plane: Plane, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
 
 
 def connect(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the points with as many more between neighbours that no dot of the line is left out.
+    """Return the points with more in between, so that lines have no gaps.
 
-    A point that is not a number ends one line and begins the next.
+    NaN separates lines.
 
     Args:
         x: shape (n,) [dots].
@@ -72,14 +72,14 @@ def connect(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.
 
 
 def patterns(plane: Plane) -> NDArray[np.uint8]:
-    """Return the dots of every cell as the lowest byte of its character, shape (rows, columns)."""
+    """Return the dots of every cell as its character's lowest byte, shape (rows, columns)."""
     high, wide = plane.shape
     cells = plane.reshape(high // CELL_HIGH, CELL_HIGH, wide // CELL_WIDE, CELL_WIDE)
     return np.einsum("rycx,yx->rc", cells, _BITS, dtype=np.uint8)
 
 
 def overlay(planes: Sequence[Plane]) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
-    """Return the characters of planes laid over each other, and whose dots stand in each cell.
+    """Return characters of overlaid planes, and the planes with dots in each cell.
 
     Returns:
         Code points, shape (rows, columns); and a bit per plane, the first plane's lowest, shape (rows, columns).

@@ -1,4 +1,4 @@
-"""What the screen shows gives the terminal no orders: a machine's name, a reason, what an instrument says."""
+"""Show control characters in shown texts instead of obeying them."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from dbbstation.text.printable import TEXT
 def show_controls() -> None:
     """Let Textual and Rich show control characters.
 
-    Each has a table of five that it takes out of every text; escape, with which orders begin, is in neither. Textual is pinned
-    to one release, and a test holds that its table still counts.
+    Both remove only five of them, without escape. Textual is pinned, and a test guards its table.
     """
     for table in (content._CONTROL_STRIP_TRANSLATE, control._CONTROL_STRIP_TRANSLATE):  # noqa: SLF001 (no other way in)
         cast("dict[int, str]", table).update(TEXT)

@@ -1,4 +1,4 @@
-"""The mark before the chosen row: a terminal without colours shows which row is chosen by it alone."""
+"""A mark before the chosen row, for terminals without colours."""
 
 from __future__ import annotations
 
@@ -16,11 +16,7 @@ CURSOR = "▸ "
 
 
 def mark_chosen(options: OptionList, rows: Sequence[Content]) -> None:
-    """Show rows with the mark before the chosen one.
-
-    Args:
-        rows: as they are without a mark; as many as the list has, or more.
-    """
+    """Show rows with the mark before the chosen one."""
     for place, row in enumerate(rows[: options.option_count]):
         mark = CURSOR if place == options.highlighted else " " * len(CURSOR)
         options.replace_option_prompt_at_index(place, Content(mark) + row)

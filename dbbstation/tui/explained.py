@@ -1,4 +1,4 @@
-"""A screen that has a help text of its own, and whatever every such screen does ten times a second."""
+"""A screen with a help text, polled ten times a second."""
 
 from __future__ import annotations
 
@@ -14,4 +14,4 @@ class ExplainedScreen(Screen[None]):
     """Under which the texts of help have it."""
 
     def look(self) -> None:
-        """Take in what has changed elsewhere."""
+        """Take in changes from elsewhere."""

@@ -23,10 +23,9 @@ _DISTANCE, _MEAN = (8, 7), (7, 6)
 
 
 class FiguresPanel(Panel):
-    """A table of two runs at most, so that both directions can be compared."""
+    """A table of at most two runs, for both directions."""
 
     def text(self, board: Board) -> Content:
-        """Return titles and rows."""
         wide = self.content_size.width >= _WIDE
         centre = f"{'X':>7}{'Y':>7}" if wide else ""
         titles = f"{'figures [µm]':{_NAME}}{centre}{'centre':>{_DISTANCE[wide]}}{'mean':>{_MEAN[wide]}}{'circul.':>8}"
@@ -50,7 +49,7 @@ def _row(completed: RunCompleted, verdict: RunDecision, *, wide: bool) -> Conten
 
 
 def _short(label: str) -> str:
-    """Return a run's name that fits; its end tells direction and repeat, its beginning whether it was rejected."""
+    """Return a fitting name that keeps direction, repeat and rejection."""
     if len(label) < _NAME:
         return label
     sign = "x " if label.startswith("x ") else ""

@@ -1,4 +1,4 @@
-"""What was looked for in a circle that waits for its verdict: number, limit, and a word that a colour repeats."""
+"""Findings of a circle that awaits its verdict: number, limit, and a coloured word."""
 
 from __future__ import annotations
 
@@ -37,12 +37,11 @@ WORD_STYLES = {
 
 
 class FindingsPanel(Panel):
-    """The word on the run, then a row for each finding, as many as fit."""
+    """The run's word, then as many findings as fit."""
 
     can_grow = True
 
     def text(self, board: Board) -> Content:
-        """Return the word on the run that was completed last, and its findings."""
         if board.completed is None:
             return Content("")
         ordered = sorted(board.completed.findings, key=lambda one: (_ORDER.index(one.verdict), rank(one)))
@@ -50,7 +49,7 @@ class FindingsPanel(Panel):
 
 
 def word_of(completed: RunCompleted) -> Content:
-    """Return the word on a run, standing out."""
+    """Return the highlighted word on a run."""
     word = completed.answer.word
     return Content.styled(f" {word} ", WORD_STYLES[word])
 

@@ -1,4 +1,4 @@
-"""Help on a screen: what it shows, and a sentence for each key."""
+"""Help on a screen and its keys."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class HelpScreen(ModalScreen[None]):
     """Stands before the screen that it explains.
 
     Args:
-        without: keys of every screen that cannot be pressed here.
+        without: common keys that do not work here.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,f1,question_mark,q", "dismiss", "Close")]
@@ -36,7 +36,6 @@ class HelpScreen(ModalScreen[None]):
         self._without = frozenset(without)
 
     def compose(self) -> ComposeResult:
-        """Show the texts."""
         here, everywhere = HELP[self._help], HELP["everywhere"]
         with VerticalScroll():
             yield Static(Content.styled(here.title, "bold"))

@@ -1,4 +1,4 @@
-"""Help on every screen and key; what the screens say themselves is in `texts`."""
+"""Help on screens and keys; texts of the screens are in `texts`."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class Help:
     """Help on one screen.
 
     Attributes:
-        shows: what stands on it, a paragraph each.
-        keys: a sentence for each key, by Textual's name of the key.
+        shows: a paragraph each.
+        keys: a sentence by Textual's name of the key.
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""A small map of the jig plate: where the ball stands."""
+"""A small map of the jig plate with the ball's place."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _LETTERS = 3
 
 
 class JigMap(Panel):
-    """Bores by number, X to the right and Y up as on the table; the one of this run stands in brackets, inverted.
+    """Bores by number, X to the right and Y up; the run's bore is in inverted brackets.
 
     Args:
-        bores: number of each bore with its x, y on the plate [mm].
+        bores: number and x, y on the plate [mm].
     """
 
     def __init__(self, bores: Mapping[int, tuple[float, float]], *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
@@ -32,12 +32,11 @@ class JigMap(Panel):
         self.styles.width, self.styles.height = COLUMNS, ROWS
 
     def text(self, board: Board) -> Content:
-        """Return the map."""
         return drawn(self._bores, None if board.announced is None else board.announced.ball.bore)
 
 
 def drawn(bores: Mapping[int, tuple[float, float]], marked: int | None) -> Content:
-    """Return a map of bores, one of them marked; empty where there are none."""
+    """Return a map of bores with one marked; empty without bores."""
     if not bores:
         return Content("")
     rows = [[" "] * COLUMNS for _ in range(ROWS)]
@@ -56,7 +55,7 @@ def drawn(bores: Mapping[int, tuple[float, float]], marked: int | None) -> Conte
 
 
 def _cell(bores: Mapping[int, tuple[float, float]], bore: int) -> tuple[int, int]:
-    """Row and column where a bore's three letters begin; the plate keeps its shape."""
+    """Return row and column of a bore's letters; the plate keeps its shape."""
     x, y = bores[bore]
     xs, ys = [place[0] for place in bores.values()], [place[1] for place in bores.values()]
     reach = max(max(xs) - min(xs), max(ys) - min(ys)) or 1.0

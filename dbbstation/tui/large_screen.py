@@ -1,4 +1,4 @@
-"""Large figures: length, state and next action, to be read from two metres."""
+"""Length, state and next action, readable from two metres."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ _TEXTS = 3
 
 
 class LargeFigures(Panel):
-    """Three rows of large letters, as large as all of them fit.
+    """Three rows of letters as large as fit.
 
     Args:
-        clock: real time, for telling an old reading [s].
+        clock: real time, for stale readings [s].
     """
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic, id: str | None = None) -> None:  # noqa: A002 - Textual's name
@@ -52,7 +52,6 @@ class LargeFigures(Panel):
         self._age = Age(clock)
 
     def text(self, board: Board) -> Content:
-        """Return length, state and next action."""
         state, action = LARGE_WORDS[board.state]
         state_style = "$text-primary"
         if board.state is State.COMPLETE and board.completed is not None:
@@ -82,7 +81,7 @@ class LargeFigures(Panel):
 
 
 class LargeScreen(RunScreen):
-    """The trace makes room for letters; the keys are those beside the machine."""
+    """The measuring screen with letters instead of the trace."""
 
     help_name = "large"
 
@@ -92,7 +91,6 @@ class LargeScreen(RunScreen):
     ]
 
     def compose(self) -> ComposeResult:
-        """Put the parts where they belong."""
         yield TitleLine(self._show.plan, id="large-title")
         yield NowLine(id="large-now")
         yield LargeFigures(clock=self._clock, id="large-figures")

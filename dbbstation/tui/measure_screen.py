@@ -1,4 +1,4 @@
-"""The screen beside the machine: live reading, trace, set-up, figures and all runs."""
+"""The screen at the machine: live reading, trace, set-up, figures and all runs."""
 
 from __future__ import annotations
 
@@ -35,12 +35,10 @@ if TYPE_CHECKING:
 
 
 class MeasureScreen(RunScreen):
-    """The screen that the station opens with.
+    """The station's first screen.
 
     Args:
-        desk: has the board, and takes commands.
-        shown: plan and plate.
-        clock: real time, for telling an old reading [s].
+        clock: real time, for stale readings [s].
     """
 
     help_name = "measure"
@@ -56,7 +54,6 @@ class MeasureScreen(RunScreen):
         self._view = View.MEASURED
 
     def compose(self) -> ComposeResult:
-        """Put the parts where they belong."""
         yield TitleLine(self._show.plan, id="title")
         yield NowLine(id="now")
         with Horizontal(id="middle"):
@@ -75,7 +72,6 @@ class MeasureScreen(RunScreen):
         yield Footer(show_command_palette=False)
 
     def draw(self) -> None:
-        """Draw panels and trace."""
         super().draw()
         board = self.desk.board
         views = board.views
@@ -88,11 +84,10 @@ class MeasureScreen(RunScreen):
         self.set_class(judged, "-verdict")
 
     def keys(self) -> object:
-        """Return what decides which keys mean something: also what there is to be seen."""
+        """Return what decides the active keys and views."""
         return super().keys(), len(self.desk.board.views)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Only keys that mean something now stand in the footer and do something."""
         if action == "view":
             return len(self.desk.board.views) > 1
         if action == "to_results":
@@ -100,11 +95,9 @@ class MeasureScreen(RunScreen):
         return super().check_action(action, parameters)
 
     async def action_to_results(self) -> None:
-        """Show what can be done with what is measured."""
         await self.run_action("app.results")
 
     def action_view(self) -> None:
-        """Show the next of the views that there are."""
         views = list(self.desk.board.views)
         at = views.index(self._view) if self._view in views else 0
         self._view = views[(at + 1) % len(views)]

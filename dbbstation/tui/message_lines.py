@@ -16,10 +16,9 @@ STYLES = {Weight.NOTE: "", Weight.WARNING: "$text-warning", Weight.FAULT: "bold 
 
 
 class MessageLines(Panel):
-    """As many as fit, each in one line; what needs all its words stands above, in the present sentence."""
+    """As many messages as fit, one line each."""
 
     def text(self, board: Board) -> Content:
-        """Return the last messages."""
         height = max(self.size.height, 1)
         if not board.messages:
             where = f"recording into {board.session}" if board.session else ""

@@ -1,4 +1,4 @@
-"""All messages with all their words, the newest first: the two lines beside the machine cut them."""
+"""All messages in full, the newest first."""
 
 from __future__ import annotations
 
@@ -32,7 +32,6 @@ class MessagesScreen(ModalScreen[None]):
         self._messages = tuple(reversed(messages))
 
     def compose(self) -> ComposeResult:
-        """Show the messages."""
         with VerticalScroll():
             yield Static(Content.styled(texts.MESSAGES_TITLE, "bold"))
             for message in self._messages:

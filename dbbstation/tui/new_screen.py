@@ -1,4 +1,4 @@
-"""What is measured: a row for each thing that a session needs, and a sentence that says what is missing."""
+"""What is measured: a row for each choice, and what is missing."""
 
 from __future__ import annotations
 
@@ -36,12 +36,7 @@ _NAME = 15
 
 
 class NewScreen(RowScreen):
-    """Pushed over the sessions.
-
-    Args:
-        reception: does work in the background, opens jobs.
-        front: knows what can be chosen.
-    """
+    """Shown over the sessions."""
 
     help_name = "new"
 
@@ -58,15 +53,12 @@ class NewScreen(RowScreen):
         self._reception, self._front = reception, front
 
     def on_mount(self) -> None:
-        """Show what stands there."""
         self._show()
 
     def action_back(self) -> None:
-        """Go back to the sessions."""
         self.dismiss()
 
     def action_begin(self) -> None:
-        """Read and check everything, then show the checklist."""
         missing = self.choice.missing()
         if missing:
             self._show()
@@ -76,7 +68,6 @@ class NewScreen(RowScreen):
         self._reception.do(lambda: self._front.prepare(choice), self._prepared, self._failed)
 
     def action_probe(self) -> None:
-        """Ask the port for a reading."""
         line = self.choice.line
         if not line.instrument or not line.port:
             self._show()
@@ -85,7 +76,6 @@ class NewScreen(RowScreen):
         self._reception.do(lambda: self._front.probe(line), self._answered, self._failed)
 
     def action_empty(self) -> None:
-        """Take back what stands in the row."""
         part = ROWS[self.at]
         if part is SetUpPart.INSTRUMENT:
             self._line(instrument="", profile="", zero_mm=None)
@@ -97,7 +87,6 @@ class NewScreen(RowScreen):
             self._take(**{_FIELDS[part]: _EMPTY[part]})
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
-        """Change the chosen row."""
         part = ROWS[self.at]
         if part in self._kept():
             return
@@ -118,7 +107,7 @@ class NewScreen(RowScreen):
                 self._type(part, str(getattr(self.choice, _FIELDS[part]) or ""), lambda text: self._typed(part, text))
 
     def _kept(self) -> frozenset[SetUpPart]:
-        """Rows that a session which exists has by itself."""
+        """Return the rows that an existing session decides."""
         return frozenset(ROWS) - frozenset(_OF_LINE) if self.choice.goes_on else frozenset()
 
     def _choose_file(self, part: SetUpPart) -> None:
@@ -313,6 +302,6 @@ _EMPTY: dict[SetUpPart, object] = {
 
 
 def _next(one: _Kind) -> _Kind:
-    """The next of the values of an enumeration, behind the last comes the first."""
+    """Return the next value of an enumeration, cyclically."""
     every = list(type(one))
     return every[(every.index(one) + 1) % len(every)]

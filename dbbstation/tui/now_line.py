@@ -1,4 +1,4 @@
-"""What to do now, in plain words, where nobody overlooks it."""
+"""What to do now, in plain words."""
 
 from __future__ import annotations
 
@@ -21,17 +21,16 @@ _ASKING = {State.ANNOUNCED, State.ARMED, State.COMPLETE, State.PAUSED}
 
 
 class NowLine(Panel):
-    """One sentence; grows where a fault needs more words."""
+    """One sentence; grows for a fault."""
 
     can_grow = True
     _say: Callable[[Board], str] = staticmethod(now)
 
     def text(self, board: Board) -> Content:
-        """Return the sentence."""
         return Content(self._say(board))
 
     def show(self, board: Board) -> None:
-        """Show the sentence, and whether it asks for something, in colour as well."""
+        """Show the sentence, coloured if it asks for something."""
         super().show(board)
         wrong = (
             board.state is State.COMPLETE
@@ -44,6 +43,6 @@ class NowLine(Panel):
 
 
 class OperatorNowLine(NowLine):
-    """The same for an operator of a job."""
+    """The same for an operator."""
 
     _say = staticmethod(now_for_operator)

@@ -1,4 +1,4 @@
-"""What an operator sees of a job: the job, the set-up and the circle of each run, the answer. Nothing else can be reached."""
+"""An operator's screens: job, set-up, circle and answer."""
 
 from __future__ import annotations
 
@@ -44,11 +44,7 @@ _NAME = 16
 
 
 class JobScreen(RowScreen):
-    """At the bottom of the stack: what is measured, and the few things that may be changed.
-
-    Args:
-        front: reads and checks.
-    """
+    """The bottom screen: what is measured, and its few choices."""
 
     help_name = "job"
 
@@ -58,16 +54,14 @@ class JobScreen(RowScreen):
         self._choice: Choice | None = None
 
     def on_mount(self) -> None:
-        """Find the session."""
         self.search()
 
     def search(self) -> None:
-        """Find the session anew: the last one where it is not complete."""
+        """Find the last session if it is not complete."""
         self.say(texts.START_LOOKS)
         self._reception.do(self._operated.choice, self._found, self._failed)
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
-        """Begin, or change what may be changed."""
         if self._choice is None:
             return
         if self.at == 0:
@@ -158,18 +152,15 @@ _FIELDS = {"operator": "operator", "order": "job"}
 
 
 class OperateScreen(RunScreen):
-    """Before a circle its set-up, during and behind it large letters; of the keys those that measure.
+    """Set-up before a circle, large letters during and after it.
 
     Args:
-        desk: has the board, and takes commands.
-        shown: plan and plate.
-        clock: real time, for telling an old reading [s].
+        clock: real time, for stale readings [s].
     """
 
     help_name = "operate"
 
     def compose(self) -> ComposeResult:
-        """Put the parts where they belong."""
         yield TitleLine(self._show.plan, id="title")
         yield OperatorNowLine(id="now")
         with Vertical(id="set-up-view"):
@@ -183,22 +174,20 @@ class OperateScreen(RunScreen):
         yield Footer(show_command_palette=False)
 
     def draw(self) -> None:
-        """Draw the set-up before a circle, large letters then."""
         self.set_class(self.desk.board.state in {None, State.BETWEEN, State.ANNOUNCED, State.PAUSED}, "-set-up")
         super().draw()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Only keys that mean something now stand in the footer; what is wrong can only be measured again."""
         if action == "accept" or (action == "tell" and str(parameters[0]) in {"reject", "skip", "accept"}):
             return False
         return super().check_action(action, parameters)
 
 
 class AnswerScreen(ExplainedScreen):
-    """The one answer, in large letters, with its reasons and what to do.
+    """The answer in large letters, with reasons and what to do.
 
     Args:
-        back: called when it is left.
+        back: called on leaving.
     """
 
     help_name = "answer"
@@ -211,7 +200,6 @@ class AnswerScreen(ExplainedScreen):
         self._answered: Answered | None = None
 
     def compose(self) -> ComposeResult:
-        """Put the parts where they belong."""
         yield Static(banner(virtual=self._virtual) + Content(f" dbbstation · {texts.ANSWER_TITLE}"), id="row-title")
         yield Static(Content(texts.ANSWER_WAITS), id="answer-word")
         with VerticalScroll(id="answer-why", can_focus=False):
@@ -219,32 +207,26 @@ class AnswerScreen(ExplainedScreen):
         yield Footer(show_command_palette=False)
 
     def on_unmount(self) -> None:
-        """End what is still being worked out."""
         self._answer.close()
 
     def on_resize(self) -> None:
-        """Letters are as large as they fit."""
         self._draw()
 
     def look(self) -> None:
-        """Show the answer once it is there."""
         if self._answered is None:
             self._answered = self._answer.look()
             self._draw()
             self.refresh_bindings()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Enter leaves an answer that can be read, and not what is still worked out."""
         if action == "read":
             return self._answered is not None
         return super().check_action(action, parameters)
 
     def action_read(self) -> None:
-        """Go back to the job."""
         self._back()
 
     def action_back(self) -> None:
-        """Go back to the job; an answer that is still worked out is given up."""
         self._back()
 
     def _draw(self) -> None:

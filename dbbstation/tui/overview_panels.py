@@ -1,4 +1,4 @@
-"""Parts of the overview: what is left, the plate, the list of tests, the chosen run."""
+"""Parts of the overview: rest, plate, tests, chosen run."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ class ChosenTest:
     """The chosen test and direction.
 
     Attributes:
-        tests: names in the plan's order.
-        way: 0 for its first direction, 1 for its second.
-        back: 0 for its last run, 1 for the one before, and so on.
+        tests: in the plan's order.
+        way: 0 or 1 for its first or second direction.
+        back: 0 for its last run, 1 for the one before.
     """
 
     tests: Sequence[str]
@@ -59,33 +59,32 @@ class ChosenTest:
 
     @property
     def test(self) -> str:
-        """Name of the chosen test; empty where there are none."""
+        """Return the chosen test; empty without tests."""
         return self.tests[self.at] if self.tests else ""
 
     def direction(self, shown: Shown) -> Direction:
-        """Return the chosen direction; the only one where the test has one."""
+        """Return the chosen direction, or the test's only one."""
         directions = shown.tests[self.test].directions
         return directions[min(self.way, len(directions) - 1)]
 
     def runs(self, board: Board, shown: Shown) -> tuple[RunCompleted, ...]:
-        """Return the runs of the chosen test and direction, in the order they were recorded."""
+        """Return the chosen runs in recording order."""
         return board.runs_of(self.test, self.direction(shown)) if self.tests else ()
 
     def run(self, board: Board, shown: Shown) -> RunCompleted | None:
-        """Return the chosen run; None where none was recorded."""
+        """Return the chosen run, or None."""
         runs = self.runs(board, shown)
         return runs[-1 - min(self.back, len(runs) - 1)] if runs else None
 
 
 class LeftLine(Panel):
-    """What is left and how long that takes; a hint where the keys have to wait."""
+    """The rest of the plan with its duration, and a hint while keys wait."""
 
     def __init__(self, shown: Shown, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._show = shown
 
     def text(self, board: Board) -> Content:
-        """Return the sentence."""
         if board.state is State.FINISHED:
             return Content(texts.THROUGH)
         if GoTo not in board.allowed and board.state is not None:
@@ -98,9 +97,9 @@ class LeftLine(Panel):
 
 
 class PlateMap(Panel):
-    """Bores where they are, under each its tests: a row per direction with sign, word and circularity where there is room for that.
+    """Bores in place, with their tests: a row per direction with sign, word and circularity.
 
-    Where there is not, a row per test with a sign for each direction and the greater circularity; the list has the words.
+    A narrow map has a row per test with signs and the greater circularity.
     """
 
     def __init__(self, shown: Shown, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
@@ -110,7 +109,6 @@ class PlateMap(Panel):
         self._name_room = min(max(map(len, shown.tests), default=0), _CELL - 7)
 
     def text(self, board: Board) -> Content:
-        """Return the map; balls in no bore stand side by side below it."""
         signs = _signs(board)
         bores = self._show.bores
         xs = sorted({x for x, _ in bores.values()})
@@ -150,7 +148,7 @@ class PlateMap(Panel):
     def _directions(
         self, name: str, board: Board, signs: dict[str, list[tuple[Task, Mark]]], width: int
     ) -> list[Content]:
-        """Rows of a test in words, a direction each; what is repeated at the end of the plan stands in the list."""
+        """Return rows of a test, one per direction, without repeats at the plan's end."""
         rows: list[Content] = []
         for task, mark in signs.get(name, []):
             if task.occurrence > 1:
@@ -177,7 +175,7 @@ class PlateMap(Panel):
 
 
 def _filled(text: Content, figure_um: float | None, width: int) -> Content:
-    """Return a cell of the map: with the figure and its unit, without unit, in whole µm, or without it, as there is room."""
+    """Return a cell with as much of figure and unit as fits."""
     told = () if figure_um is None else (f"{figure_um:5.1f} µm", f"{figure_um:5.1f}", f" {figure_um:.0f}")
     fitting = [figure for figure in told if len(text.plain) + len(figure) < width]
     text += Content(fitting[0] if fitting else "")
@@ -185,7 +183,7 @@ def _filled(text: Content, figure_um: float | None, width: int) -> Content:
 
 
 class TestList(Panel):
-    """As many tests as fit, the chosen one among them; the chosen direction stands in brackets."""
+    """As many tests as fit around the chosen one; the direction is in brackets."""
 
     __test__ = False
     """Not one of pytest's."""
@@ -195,7 +193,6 @@ class TestList(Panel):
         self._choice = choice
 
     def text(self, board: Board) -> Content:
-        """Return a row per test."""
         grouped: dict[tuple[str, int], list[tuple[Task, Mark]]] = {}
         for task, mark in zip(board.tasks, board.marks, strict=True):
             grouped.setdefault((task.test, task.occurrence), []).append((task, mark))
@@ -222,7 +219,7 @@ class TestList(Panel):
 
 
 class ChosenRun(Panel):
-    """The chosen run: figures, verdict with its reason, what was found wrong; which of how many it is."""
+    """The chosen run: figures, verdict, reason, findings."""
 
     def __init__(self, shown: Shown, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -230,7 +227,6 @@ class ChosenRun(Panel):
         self._choice = choice
 
     def text(self, board: Board) -> Content:
-        """Return the sentences."""
         if not self._choice.tests:
             return Content("")
         completed = self._choice.run(board, self._show)
@@ -254,7 +250,7 @@ def _figures(completed: RunCompleted) -> str:
 
 
 def _decided(board: Board, completed: RunCompleted) -> Content:
-    """Verdict and reason, then each finding that is wrong with number and limit."""
+    """Return verdict and reason, then each wrong finding with number and limit."""
     label = completed.run.label
     verdict = board.verdicts.get(label, RunDecision.NONE).value or texts.NO_VERDICT
     reason = board.reasons.get(label, "")
@@ -269,7 +265,7 @@ def _decided(board: Board, completed: RunCompleted) -> Content:
 
 
 def _signs(board: Board) -> dict[str, list[tuple[Task, Mark]]]:
-    """Runs of each test with their marks, those that are repeated at the end behind the others."""
+    """Return the marks of each test's runs, repeats at the plan's end last."""
     marks: dict[str, list[tuple[Task, Mark]]] = {}
     for task, mark in zip(board.tasks, board.marks, strict=True):
         marks.setdefault(task.test, []).append((task, mark))
@@ -293,7 +289,7 @@ def _run(board: Board, task: Task, mark: Mark, *, marked: bool, wide: bool) -> C
 
 
 def _rows_needed(shown: Shown, per_test: int) -> int:
-    """Rows of the map without any empty row between bores."""
+    """Return the rows of the map without gaps."""
     ys = {y for _, y in shown.bores.values()}
     deepest = 0
     for y in ys:

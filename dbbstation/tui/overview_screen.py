@@ -1,4 +1,4 @@
-"""All tests of the plan: a map of the plate, how each run stands, what is left; another test, another verdict."""
+"""All tests on a map of the plate, to choose another test or verdict."""
 
 from __future__ import annotations
 
@@ -31,12 +31,7 @@ _VERDICT_BEFORE = {"take_back": RunDecision.ACCEPTED, "accept_again": RunDecisio
 
 
 class OverviewScreen(BoardScreen):
-    """Pushed over the present screen, and popped.
-
-    Args:
-        desk: has the board, and takes commands.
-        shown: plan and plate.
-    """
+    """Shown over the present screen."""
 
     help_name = "overview"
 
@@ -64,7 +59,6 @@ class OverviewScreen(BoardScreen):
         self.choice = ChosenTest(names, at, way)
 
     def compose(self) -> ComposeResult:
-        """Put the parts where they belong."""
         yield TitleLine(self._show.plan, id="overview-title")
         yield LeftLine(self._show, id="left")
         with Horizontal(id="plate-and-tests"):
@@ -74,13 +68,12 @@ class OverviewScreen(BoardScreen):
         yield Footer(show_command_palette=False)
 
     def keys(self) -> object:
-        """Return what decides which keys mean something: also the choice, and the verdict on it."""
+        """Return what decides the active keys, with choice and verdict."""
         run = self._run()
         verdict = self.desk.board.verdicts.get(run.run.label) if run else None
         return super().keys(), self.choice.at, self.choice.way, verdict, len(self._runs())
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Only keys that mean something now stand in the footer and do something."""
         board = self.desk.board
         if action == "go_to":
             return GoTo in board.allowed and bool(self.choice.tests)
@@ -97,28 +90,24 @@ class OverviewScreen(BoardScreen):
         return super().check_action(action, parameters)
 
     def action_choose(self, steps: int) -> None:
-        """Choose a test above or below."""
         self.choice.back = 0
         self.choice.at = min(max(self.choice.at + steps, 0), max(len(self.choice.tests) - 1, 0))
         self.draw()
 
     def action_turn(self, way: int) -> None:
-        """Choose a direction."""
         self.choice.way, self.choice.back = way, 0
         self.draw()
 
     def action_earlier(self) -> None:
-        """Choose the run before; behind the first comes the last again."""
+        """Choose the run before, cyclically."""
         self.choice.back = (self.choice.back + 1) % max(len(self._runs()), 1)
         self.draw()
 
     def action_go_to(self) -> None:
-        """Let the chosen run be measured next, and look at that."""
         self.desk.send(GoTo(self.choice.test, self._direction()))
         self.action_back()
 
     def action_take_back(self) -> None:
-        """Take an accepted run back, for a reason."""
         completed = self._run()
         if completed is None:
             return
@@ -130,7 +119,7 @@ class OverviewScreen(BoardScreen):
         self.app.push_screen(ReasonQuestion(completed.run.label), answered)
 
     def action_accept_again(self) -> None:
-        """Let a rejected run count; one with something wrong for a reason only."""
+        """Accept a rejected run; a faulty one only for a reason."""
         completed = self._run()
         if completed is None:
             return
@@ -145,7 +134,6 @@ class OverviewScreen(BoardScreen):
         self.app.push_screen(ReasonQuestion(completed.run.label, counts=True), answered)
 
     def action_back(self) -> None:
-        """Go back to the screen below."""
         self.dismiss()
 
     def _judge(self, completed: RunCompleted, *, accepted: bool, reason: str) -> None:

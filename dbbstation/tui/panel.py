@@ -1,4 +1,4 @@
-"""A part of the screen that is text: updated only when the text has changed."""
+"""A text on the screen, updated only when it changes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Panel(Static):
-    """Text made from the board; subclasses say what it is."""
+    """Text made from the board."""
 
     can_grow = False
     """Whether the height follows the text; a layout of the screen costs much more than a text."""
@@ -22,7 +22,6 @@ class Panel(Static):
         self._shown = Content()
 
     def text(self, board: Board) -> Content:
-        """Return what is shown of a board."""
         raise NotImplementedError
 
     def show(self, board: Board) -> None:
@@ -34,5 +33,5 @@ class Panel(Static):
 
 
 def lines(*rows: Content) -> Content:
-    """Return rows under each other."""
+    """Return rows below each other."""
     return Content("\n").join(rows)

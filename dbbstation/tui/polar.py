@@ -1,4 +1,4 @@
-"""The polar trace as a drawing: deviations about the nominal circle, magnified, in braille dots. Arrays in, cells out."""
+"""The polar trace: magnified deviations about the nominal circle in braille dots."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _MARGIN_DOTS = 4.0
 
 @dataclass(frozen=True)
 class Dial:
-    """Where things lie in a field of cells."""
+    """Geometry of a field of cells."""
 
     columns: int
     rows: int
@@ -41,12 +41,12 @@ class Dial:
 
     @cached_property
     def dot_aspect(self) -> float:
-        """Height of a dot over its width."""
+        """Return height over width of a dot."""
         return self.cell_aspect * braille.CELL_WIDE / braille.CELL_HIGH
 
     @cached_property
     def radius(self) -> float:
-        """Radius of all that is drawn [dot widths]."""
+        """Return the drawing's radius [dot widths]."""
         wide, high = self.columns * braille.CELL_WIDE, self.rows * braille.CELL_HIGH * self.dot_aspect
         return max(min(wide, high) / 2.0 - _MARGIN_DOTS, 1.0)
 
@@ -57,11 +57,11 @@ class Dial:
     def places(
         self, theta_deg: NDArray[np.float64], share: NDArray[np.float64] | float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return where points lie, in dots from the upper left corner, shape (n,) each.
+        """Return points in dots from the upper left corner, shape (n,) each.
 
         Args:
-            theta_deg: angles from +X (to the right) towards +Y (up), shape (n,) [deg].
-            share: distances from the centre as shares of the radius, shape (n,).
+            theta_deg: from +X (right) towards +Y (up), shape (n,).
+            share: of the radius, shape (n,).
         """
         theta = np.radians(theta_deg)
         x = self.columns * braille.CELL_WIDE / 2.0 + self.radius * share * np.cos(theta)
@@ -69,13 +69,13 @@ class Dial:
         return x, y
 
     def cell(self, theta_deg: float, share: float) -> tuple[int, int]:
-        """Return row and column of the cell at a place, kept within the field."""
+        """Return row and column of the cell at a place, within the field."""
         x, y = self.places(np.array([theta_deg]), share)
         row, column = int(y[0] // braille.CELL_HIGH), int(x[0] // braille.CELL_WIDE)
         return min(max(row, 0), self.rows - 1), min(max(column, 0), self.columns - 1)
 
     def magnification(self, scale_um: float, radius_mm: float) -> float:
-        """Return how many times larger deviations are drawn than the circle."""
+        """Return the magnification of deviations relative to the circle."""
         return (BAND_SHARE / scale_um) / (NOMINAL_SHARE / (1e3 * radius_mm))
 
 
@@ -83,7 +83,7 @@ _Values = TypeVar("_Values", float, "NDArray[np.float64]")
 
 
 def share_of(deviation_um: _Values, scale_um: float) -> _Values:
-    """Return where deviations are drawn, as shares of the dial's radius."""
+    """Return deviations as shares of the dial's radius."""
     return NOMINAL_SHARE + BAND_SHARE * deviation_um / scale_um
 
 
@@ -96,12 +96,12 @@ def draw_trace(
     *,
     thick: bool = False,
 ) -> None:
-    """Add a trace to a plane: every sample's dot, and the line from each to the next.
+    """Add a trace's dots and lines to a plane.
 
     Args:
-        theta_deg: angles, shape (n,) [deg].
-        deviation_um: bar length minus nominal; not a number where the line breaks, shape (n,) [µm].
-        thick: draw it two dots wide, the second outside the first.
+        theta_deg: shape (n,).
+        deviation_um: bar length minus nominal, shape (n,); NaN breaks the line.
+        thick: two dots wide.
     """
     share = share_of(deviation_um, scale_um)
     for outward in (0.0, 1.0 / dial.radius) if thick else (0.0,):
@@ -109,7 +109,7 @@ def draw_trace(
 
 
 def draw_scale(plane: Plane, dial: Dial, start_deg: float | None) -> None:
-    """Add the nominal circle, dotted, the rings of plus and minus the scale, sparser, and a spoke at the start angle."""
+    """Add the nominal circle, rings of plus and minus the scale, and the start's spoke."""
     for share, spacing in (
         (NOMINAL_SHARE, _DOTS_BETWEEN_MARKS),
         (NOMINAL_SHARE + BAND_SHARE, 2 * _DOTS_BETWEEN_MARKS),
@@ -123,7 +123,7 @@ def draw_scale(plane: Plane, dial: Dial, start_deg: float | None) -> None:
 
 
 def grown_scale_um(scale_um: float, largest_um: float) -> float:
-    """Return the scale, or the next of 1, 2, 5, 10, … that holds the largest deviation; a scale never shrinks."""
+    """Return the scale, grown to the next of 1, 2, 5, 10, … if needed."""
     needed = max(scale_um, SMALLEST_SCALE_UM)
     if largest_um <= needed:
         return needed

@@ -1,4 +1,4 @@
-"""The checklist before circles are measured: what the program checked, and what only a person can see."""
+"""The checklist before circles: checked facts, and what a person must see."""
 
 from __future__ import annotations
 
@@ -36,13 +36,7 @@ _GOOD, _OPEN, _NOTE = "✓", "!", "·"
 
 
 class PrepareScreen(RowScreen):
-    """Pushed over what is measured, or over the sessions: one that goes on has a shorter list.
-
-    Args:
-        reception: opens the job.
-        front: writes programs.
-        prepared: what became of it; it was checked.
-    """
+    """Shown over the choices or the sessions; shorter for a continued session."""
 
     help_name = "prepare"
 
@@ -72,34 +66,27 @@ class PrepareScreen(RowScreen):
         self._told: tuple[tuple[str, str], ...] = ()
 
     def on_mount(self) -> None:
-        """Open the instrument, and show the list."""
         self._line = self._front.hold(self._prepared.protocol, self._prepared.line)
         self._show()
 
     def look(self) -> None:
-        """Show what the instrument reads."""
         if self._line is not None:
             self._tell()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """A session that goes on has its programs, where there are any."""
         if action == "programs":
             return not (self._goes_on and self._prepared.job.programs)
         return super().check_action(action, parameters)
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
-        """Confirm the chosen line, or take it back."""
         self._confirmed ^= {list(self._list)[self.at]}
         self._show()
 
     def action_all(self) -> None:
-        """Confirm every line."""
         self._confirmed = set(self._list)
         self._show()
 
     def action_temperature(self) -> None:
-        """Take the temperature of the shop before the circles."""
-
         def answered(text: str | None) -> None:
             degc = None if text is None else shop_degc(text)
             if degc is not None:
@@ -108,7 +95,6 @@ class PrepareScreen(RowScreen):
         self.app.push_screen(TemperatureQuestion(), answered)
 
     def action_programs(self) -> None:
-        """Write programs beside the session: nominal ones, or those of a new session compensated with a model."""
         models = () if self._goes_on else self._front.models()
         if not models:
             self._write(None)
@@ -122,7 +108,6 @@ class PrepareScreen(RowScreen):
         self.app.push_screen(ChooseQuestion(texts.PROGRAMS_TITLE, labels), answered)
 
     def action_begin(self) -> None:
-        """Begin to measure, once everything is confirmed."""
         if len(self._confirmed) < len(self._list):
             self._show()
             return
@@ -130,7 +115,6 @@ class PrepareScreen(RowScreen):
         self._reception.open(self._choice, self._prepared, self._failed)
 
     def action_back(self) -> None:
-        """Go back to what is measured."""
         self.dismiss()
 
     @property
@@ -155,7 +139,7 @@ class PrepareScreen(RowScreen):
             self.about(lines(*(Content(f"{sign} {text}") for sign, text in told)))
 
     def _checked(self) -> Iterator[tuple[str, str]]:
-        """Yield sign and sentence of what the program knows."""
+        """Yield sign and sentence of checked facts."""
         prepared = self._prepared
         if self._line is not None:
             yield self._reading(self._line)
@@ -176,7 +160,7 @@ class PrepareScreen(RowScreen):
         yield from self._shop()
 
     def _reading(self, line: HeldLine) -> tuple[str, str]:
-        """What the instrument reads, and how the bar stands for the first circle."""
+        """Return the reading, and the bar's place for the first circle."""
         latest, first = line.latest, self._prepared.first
         if line.failure is not None:
             return _OPEN, texts.CHECK_SILENT.format(why=line.failure, again_s=AGAIN_S)
@@ -200,7 +184,7 @@ class PrepareScreen(RowScreen):
         return texts.CHECK_PROGRAMS.format(count=len(programs), by=by, folder=where).rstrip()
 
     def _shop(self) -> Iterator[tuple[str, str]]:
-        """Yield what is known of bar, temperature and people."""
+        """Yield bar, temperature and people."""
         choice, details = self._choice, self._prepared.job.details
         bar = details.bar
         if not self._goes_on and bar is not None and bar.calibrated is not None:
@@ -234,7 +218,7 @@ class PrepareScreen(RowScreen):
         self._reception.do(lambda: self._front.write_programs(choice, model), written, self._failed)
 
     def _take(self, choice: Choice) -> None:
-        """Check a changed choice, and go on with it where it holds."""
+        """Check a changed choice, and go on if it is valid."""
         self.say(texts.NEW_CHECKS)
 
         def prepared(found: Prepared) -> None:

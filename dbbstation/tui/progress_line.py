@@ -1,4 +1,4 @@
-"""How far the circle and the plan are."""
+"""Progress of circle and plan."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ _SHORTEST = 6
 
 
 class ProgressLine(Panel):
-    """Two bars with their numbers in one line."""
+    """Two bars with numbers in one line."""
 
     def text(self, board: Board) -> Content:
-        """Return the line."""
         length = max((self.size.width - _FIXED) // 2, _SHORTEST)
         count = len(board.tasks)
         done = board.accepted / count if count else 0.0

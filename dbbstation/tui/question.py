@@ -14,11 +14,10 @@ if TYPE_CHECKING:
 
 
 class GiveUpQuestion(ModalScreen[bool]):
-    """Returns whether to do what ends the run.
+    """Returns whether to end the run.
 
     Args:
-        run: name of the run that goes on.
-        act: what was asked for, as a verb with a capital letter.
+        act: a capitalised verb.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -32,7 +31,6 @@ class GiveUpQuestion(ModalScreen[bool]):
         self._act = act
 
     def compose(self) -> ComposeResult:
-        """Ask."""
         text = (
             f"The circle {self.run} is being recorded. {self._act} all the same?\n\n"
             "What was recorded so far is kept, but the run has to be measured again. The machine is not stopped.\n\n"
@@ -42,22 +40,16 @@ class GiveUpQuestion(ModalScreen[bool]):
             yield Static(text, markup=False)
 
     def action_answer(self, answer: bool) -> None:  # noqa: FBT001 - called by a key's action string
-        """Close with the answer."""
         self.dismiss(answer)
 
 
 class YesQuestion(GiveUpQuestion):
-    """Returns whether to do what the text asks.
-
-    Args:
-        text: the question; what each answer does stands in it.
-    """
+    """Returns whether to do what the text asks."""
 
     def __init__(self, text: str) -> None:
         super().__init__("", "")
         self._text = text
 
     def compose(self) -> ComposeResult:
-        """Ask."""
         with Vertical():
             yield Static(self._text, markup=False)

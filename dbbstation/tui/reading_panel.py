@@ -1,4 +1,4 @@
-"""The live reading: length, deviation, what the instrument says of it, how many come."""
+"""The live reading: length, deviation, status, rate."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _FAR_UM = 9_999.9
 
 
 class Age:
-    """Tells a reading that came just now from one that only still stands there.
+    """Tells a live reading from a stale one.
 
     Args:
         clock: real time [s].
@@ -47,7 +47,7 @@ class Age:
         self._new_s = clock()
 
     def stale_s(self, board: Board) -> float | None:
-        """Return for how long no reading has come; None where the last one is as good as live."""
+        """Return the time without a reading; None if live."""
         if board.rate.total != self._total:
             self._total, self._new_s = board.rate.total, self._clock()
         old_s = self._clock() - self._new_s
@@ -58,7 +58,7 @@ class ReadingPanel(Panel):
     """Two rows.
 
     Args:
-        clock: real time, for telling an old reading [s].
+        clock: real time, for stale readings [s].
     """
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic, id: str | None = None) -> None:  # noqa: A002 - Textual's name
@@ -66,7 +66,6 @@ class ReadingPanel(Panel):
         self._age = Age(clock)
 
     def text(self, board: Board) -> Content:
-        """Return length and deviation, below them status, rate and losses."""
         old_s = self._age.stale_s(board)
         sample = board.sample
         if sample is None:
@@ -78,7 +77,7 @@ class ReadingPanel(Panel):
 
 
 def seat_words(found: BarAtFeedIn) -> str:
-    """Say how the bar stands at the feed-in point."""
+    """Return how the bar stands at the feed-in point, in words."""
     if found.seated:
         return SEATED
     if found.backwards:
@@ -129,7 +128,7 @@ def _rate(board: Board, old_s: float | None) -> Content:
 
 
 def _lost(board: Board) -> list[Content]:
-    """Say what is missing in the run; doubtful samples only where there are some."""
+    """Return what is missing in the run, and doubtful samples if any."""
     lost = (
         Content(f"{board.lost} lost") if not board.lost else Content.styled(f"{board.lost} lost", "bold $text-warning")
     )

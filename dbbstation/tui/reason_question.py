@@ -1,4 +1,4 @@
-"""Asked before an accepted run is taken back, and before one counts with which something is wrong: why."""
+"""Asks why an accepted run is withdrawn, or a faulty one counts."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 
 class ReasonQuestion(ModalScreen[str | None]):
-    """Returns the reason; None where all stays as it is.
+    """Returns the reason, or None for no change.
 
     Args:
-        counts: ask why it counts, and not why it does not.
+        counts: ask why it counts.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -43,25 +43,22 @@ class ReasonQuestion(ModalScreen[str | None]):
         self._title = REASON_TITLE_COUNTS if counts else REASON_TITLE
 
     def compose(self) -> ComposeResult:
-        """Ask."""
         reasons = "\n".join(f"{key}  {reason}" for key, reason in self._reasons.items())
         with Vertical():
             yield Static(f"{self._title.format(run=self._run_label)}\n\n{reasons}\n\n{REASON_KEYS}", markup=False)
             yield Input(placeholder=REASON_TYPED, disabled=True)
 
     def action_because(self, key: str) -> None:
-        """Close with a reason of the list."""
         if key in self._reasons:
             self.dismiss(self._reasons[key])
 
     def action_type(self) -> None:
-        """Let the reason be typed."""
         field = self.query_one(Input)
         field.disabled = False
         field.add_class("-typing")
         field.focus()
 
     def on_input_submitted(self, submitted: Input.Submitted) -> None:
-        """Close with what was typed; an empty line is no reason."""
+        """Close with a text; an empty line is no reason."""
         if submitted.value.strip():
             self.dismiss(submitted.value.strip())

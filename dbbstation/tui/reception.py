@@ -1,4 +1,4 @@
-"""What the screens before and after a sequence need of the app."""
+"""What screens before and after a sequence need of the app."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _Outcome = TypeVar("_Outcome")
 
 
 class StationDesk(Protocol):
-    """Does work in the background, opens jobs, shows results; `StationApp` is one."""
+    """Works in the background, opens jobs, shows results; `StationApp` is one."""
 
     def do(
         self,
@@ -22,10 +22,10 @@ class StationDesk(Protocol):
         then: Callable[[_Outcome], None],
         failed: Callable[[Exception], None],
     ) -> None:
-        """Do work of some seconds; `then` takes its outcome, `failed` an error that a user can cause."""
+        """Do work of some seconds; `then` takes its outcome, `failed` a StationError."""
 
     def open(self, choice: Choice, prepared: Prepared, failed: Callable[[Exception], None]) -> None:
-        """Open a job and show the screen beside the machine."""
+        """Open a job and show its screen."""
 
     def show_results(self, folder: Path) -> None:
-        """Show what can be done with a session that is measured."""
+        """Show what can be done with a measured session."""

@@ -1,4 +1,4 @@
-"""What the steps after a session found, line by line; the numbers are those that their commands print."""
+"""Results of steps, line by line, with the numbers of their commands."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _MOST = 6
 
 
 def result_lines(step: SessionTask, answer: Mapping[str, object]) -> list[str]:
-    """Return what is worth reading of the result of a step, as JSON has it."""
+    """Return the main results of a step's JSON."""
     match step:
         case SessionTask.CALIBRATE:
             return list(_calibrated(read_plain(CalibrationAnswer, answer)))

@@ -1,4 +1,4 @@
-"""After a session, without leaving: calibrate, diagnose, programs, report; what they found, and where it is."""
+"""After a session: calibrate, diagnose, programs, report, and their results."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _STYLES = {
 
 
 class ResultsScreen(RowScreen):
-    """Pushed over the sessions or the screen beside the machine."""
+    """Shown over the sessions or the measuring screen."""
 
     help_name = "results"
 
@@ -53,11 +53,9 @@ class ResultsScreen(RowScreen):
         self._seen: object = None
 
     def on_mount(self) -> None:
-        """Show how the steps stand."""
         self._draw()
 
     def look(self) -> None:
-        """Take in how far the work has come."""
         busy = self._after.busy
         self._after.look()
         if self._after.busy is not busy and busy is not None and self._after.busy is not None:
@@ -65,7 +63,6 @@ class ResultsScreen(RowScreen):
         self._draw()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Only keys that mean something now stand in the footer and do something."""
         match action:
             case "step":
                 return self._after.can(SessionTask(str(parameters[0])))
@@ -80,31 +77,25 @@ class ResultsScreen(RowScreen):
         self._draw()
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
-        """Do the chosen step; an acceptance has a screen of its own."""
         if STEPS[self.at] is SessionTask.ACCEPTANCE:
             self.action_acceptance()
         elif self._after.can(STEPS[self.at]):
             self._begin(STEPS[self.at])
 
     def action_step(self, name: str) -> None:
-        """Do one step."""
         self._begin(SessionTask(name))
 
     def action_every(self) -> None:
-        """Do all steps, one behind the other."""
         self._begin(*USUAL)
 
     def action_acceptance(self) -> None:
-        """Hold the session against one that was measured before."""
         self._go_to(SessionTask.ACCEPTANCE)
         self.app.push_screen(AcceptanceScreen(self._after))
 
     def action_cancel(self) -> None:
-        """End what is being done."""
         self._after.cancel()
 
     def action_back(self) -> None:
-        """Go back; what is being done is ended, after a question."""
         if self._after.busy is None:
             self.dismiss()
             return

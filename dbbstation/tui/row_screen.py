@@ -1,4 +1,4 @@
-"""A screen with a sentence at the top and rows below it, of which one is chosen with the arrow keys."""
+"""A screen with a sentence and rows chosen by arrow keys."""
 
 from __future__ import annotations
 
@@ -28,7 +28,6 @@ class RowScreen(ExplainedScreen):
         self._put: list[Content] = []
 
     def compose(self) -> ComposeResult:
-        """Put the parts where they belong."""
         yield Static(Content(f" dbbstation · {HELP[self.help_name].title}"), id="row-title")
         yield Static("", id="row-now", markup=False)
         yield OptionList(id="rows")
@@ -45,7 +44,7 @@ class RowScreen(ExplainedScreen):
         now.set_class(wrong, "-wrong")
 
     def banner(self, *, virtual: bool) -> None:
-        """Show the title, with a banner where the machine is virtual."""
+        """Show the title, marked if the machine is virtual."""
         if self.stands:
             title = Content(f" dbbstation · {HELP[self.help_name].title}")
             self.query_one("#row-title", Static).update(banner(virtual=virtual) + title)
@@ -58,16 +57,16 @@ class RowScreen(ExplainedScreen):
 
     @property
     def stands(self) -> bool:
-        """Whether its parts are there: what was begun in the background may end before, or after it was left."""
+        """Return whether its parts exist: background work may end too early or late."""
         return bool(self.query("#row-text"))
 
     @property
     def at(self) -> int:
-        """Place of the chosen row."""
+        """Return the place of the chosen row."""
         return self.query_one("#rows", OptionList).highlighted or 0
 
     def put(self, rows: Sequence[Content]) -> None:
-        """Show rows; the chosen place stays chosen."""
+        """Show rows and keep the chosen place."""
         if not self.stands:
             return
         options = self.query_one("#rows", OptionList)
@@ -83,12 +82,11 @@ class RowScreen(ExplainedScreen):
         options.focus()
 
     def on_option_list_option_highlighted(self) -> None:
-        """Move the mark."""
         self._mark()
         self.chosen_another()
 
     def chosen_another(self) -> None:
-        """Tell of the row that the cursor is on."""
+        """React to another chosen row."""
 
     def _mark(self) -> None:
         mark_chosen(self.query_one("#rows", OptionList), self._put)

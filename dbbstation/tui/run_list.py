@@ -1,4 +1,4 @@
-"""Planned runs, test by test, with a sign and a word for how each stands."""
+"""Planned runs by test, each with sign and word."""
 
 from __future__ import annotations
 
@@ -30,10 +30,9 @@ _SHORTEST_NAME = 4
 
 
 class RunList(Panel):
-    """As many tests as fit, the present one among them."""
+    """As many tests as fit around the present one."""
 
     def text(self, board: Board) -> Content:
-        """Return a row per test."""
         numbered = enumerate(zip(board.tasks, board.marks, strict=True), start=1)
         here = board.announced.number if board.announced else 1
         room = max(self.size.width - 2 * (_CELL + 1), _SHORTEST_NAME)

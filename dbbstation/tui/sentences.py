@@ -1,4 +1,4 @@
-"""What to do now, in one plain sentence; and what is wrong, where, and what helps."""
+"""What to do now, and what is wrong, in plain sentences."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _BEGIN = "Opening instrument and session …"
 
 
 def now(board: Board) -> str:
-    """Return what a person does now, or waits for."""
+    """Return what to do or wait for."""
     if board.fault is not None:
         return _fault(board)
     if board.state is None:
@@ -30,7 +30,7 @@ def now(board: Board) -> str:
 
 
 def now_for_operator(board: Board) -> str:
-    """Return the same for an operator of a job, who can only measure again what is wrong."""
+    """Return the same for an operator, who can only repeat a faulty run."""
     completed = board.completed
     if board.fault is not None or board.state not in {State.COMPLETE, State.FLAWED} or completed is None:
         return now(board) if board.finished is None else _THROUGH

@@ -1,4 +1,4 @@
-"""The set-up of the announced run: bore and holder or place under the spindle, ball, tilt, bar."""
+"""The announced run's set-up: place, ball, tilt, bar."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ class SetUpPanel(Panel):
     """Five rows."""
 
     def text(self, board: Board) -> Content:
-        """Return what has to stand where."""
         announced = board.announced
         if announced is None:
             return Content("")
@@ -35,7 +34,7 @@ class SetUpPanel(Panel):
 
 
 def _place(ball: Ball) -> tuple[str, str, str]:
-    """Return where a ball stands, and on what; under the spindle, where the machine stands while it is put up."""
+    """Return where a ball stands and on what; under the spindle also the machine's place."""
     if not ball.place_known:
         x, y, z = ball.centre_mm
         return "under spindle", "at", f"X {x:g} Y {y:g} Z {z:g}"

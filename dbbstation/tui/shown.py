@@ -1,4 +1,4 @@
-"""What screens show that no event tells."""
+"""What screens show beside events."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Shown:
     """Plan and plate.
 
     Attributes:
-        bores: number of each bore of the jig plate with its x, y on the plate [mm].
-        cell_aspect: height of a terminal's cell over its width.
+        bores: number and x, y on the plate [mm].
+        cell_aspect: height over width of a terminal's cell.
     """
 
     plan: str

@@ -1,4 +1,4 @@
-"""The first screen: sessions to go on with, a new one, or everything on a virtual machine."""
+"""The first screen: continue a session, begin one, or use a virtual machine."""
 
 from __future__ import annotations
 
@@ -25,11 +25,7 @@ _NAME = 22
 
 
 class StartScreen(RowScreen):
-    """At the bottom of the stack where no job was given.
-
-    Args:
-        front: knows sessions.
-    """
+    """The bottom screen without a job."""
 
     help_name = "start"
 
@@ -46,11 +42,10 @@ class StartScreen(RowScreen):
         self._sessions: tuple[SessionLine, ...] = ()
 
     def on_mount(self) -> None:
-        """Look for sessions."""
         self.search()
 
     def search(self) -> None:
-        """List the sessions anew; what is said at the top about a failure stays."""
+        """List the sessions anew; a reported failure stays."""
         self.say(texts.START_LOOKS)
         self._reception.do(self._front.sessions, self._list, self._failed)
 
@@ -60,13 +55,11 @@ class StartScreen(RowScreen):
         return self._sessions[self.at] if self._sessions else None
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Only keys that mean something now stand in the footer and do something."""
         if action in {"line", "results"}:
             return self.chosen is not None and not self.chosen.problem
         return super().check_action(action, parameters)
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
-        """Go on with the chosen session."""
         line = self.chosen
         if line is None:
             return
@@ -87,21 +80,17 @@ class StartScreen(RowScreen):
         self._tell()
 
     def action_new(self) -> None:
-        """Choose what is measured into a new session."""
         self._enter(NewScreen(self._reception, self._front, self._front.first_choice()))
 
     def action_virtual(self) -> None:
-        """Choose nothing: everything is virtual."""
         self._enter(NewScreen(self._reception, self._front, self._front.virtual_choice()))
 
     def action_line(self) -> None:
-        """Choose by what the session is gone on with."""
         if self.chosen is not None:
             choice = self._front.goes_on_with(self.chosen.folder)
             self._enter(NewScreen(self._reception, self._front, choice))
 
     def action_results(self) -> None:
-        """Work on the chosen session."""
         if self.chosen is not None:
             self._reception.show_results(self.chosen.folder)
 
@@ -113,13 +102,13 @@ class StartScreen(RowScreen):
         self.refresh_bindings()
 
     def _prepared(self, choice: Choice, prepared: Prepared) -> None:
-        """Show the short checklist, where nobody has gone elsewhere meanwhile."""
+        """Show the short checklist, unless another screen is open."""
         if self.is_current:
             self.say(texts.START_SOME)
             self._enter(PrepareScreen(self._reception, self._front, choice, prepared))
 
     def _enter(self, screen: RowScreen) -> None:
-        """Open a screen; who comes back from it has no more need of the instrument."""
+        """Open a screen; on return the instrument is released."""
 
         def left(_: None) -> None:
             self._reception.do(self._front.release, lambda _: None, self._failed)

@@ -1,4 +1,4 @@
-"""All steps of the set-up, where the screen is tall enough."""
+"""All steps of the set-up, on a tall screen."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ if TYPE_CHECKING:
 
 
 class StepsPanel(Panel):
-    """One step per row or two; those that are done for this run are dim."""
+    """One step in a row or two; finished ones are dim."""
 
     can_grow = True
 
     def text(self, board: Board) -> Content:
-        """Return the steps."""
         if board.announced is None or board.finished is not None:
             return Content("")
         steps = board.announced.instructions

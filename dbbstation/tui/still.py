@@ -1,4 +1,4 @@
-"""A screen that stands still: events in, a picture out. For the documentation, and for tests of what is drawn."""
+"""A still picture of a screen after events, for documentation and tests."""
 
 from __future__ import annotations
 
@@ -20,11 +20,7 @@ _ROUNDS = 4
 
 
 class Happened:
-    """Stands where the runner stands: everything has happened already, and nobody takes commands.
-
-    Args:
-        events: all of them, in order.
-    """
+    """A runner for which everything has happened."""
 
     alive = False
     crash: Exception | None = None
@@ -48,7 +44,7 @@ class Happened:
         return False
 
     def mail(self) -> list[Event | SequenceOpened]:
-        """Return everything at the first call, nothing later."""
+        """Return everything at the first call."""
         events, self._events = self._events, []
         return events
 
@@ -64,10 +60,9 @@ async def still_svg(
     """Return the screen after these events as SVG.
 
     Args:
-        shown: plan and plate.
         size: columns and rows.
         theme: dark or light.
-        press: keys pressed after that.
+        press: keys pressed afterwards.
     """
     app = StationApp(shown, Happened(events), clock=lambda: 0.0)
     async with app.run_test(size=size) as pilot:

@@ -1,4 +1,4 @@
-"""Asks for the temperature of the shop, until it is one, or goes on without."""
+"""Asks for the shop's temperature, or goes on without."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 
 class TemperatureQuestion(TypeQuestion):
-    """Returns a text that is a temperature; None where nobody gave one."""
+    """Returns a valid temperature as text, or None."""
 
     def __init__(self) -> None:
         super().__init__(texts.TEMPERATURE_NOW)
 
     def on_input_submitted(self, submitted: Input.Submitted) -> None:
-        """Close with a temperature, or with nothing; say what is none."""
+        """Close with a temperature or nothing; refuse other texts."""
         submitted.prevent_default()
         text = submitted.value.strip()
         if not text or shop_degc(text) is not None:

@@ -1,4 +1,4 @@
-"""What the screens say about themselves, for whoever translates it: here, in `sentences` and in `help_texts`."""
+"""Texts of the screens for translators, with `sentences` and `help_texts`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The top line: which plan, which of its runs, in which state."""
+"""The top line: plan, run, state."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def banner(*, virtual: bool) -> Content:
-    """Return what stands at the beginning of the top line where the machine is virtual."""
+    """Return the mark of a virtual machine for the top line."""
     return Content.styled(VIRTUAL_BANNER, "reverse bold $text-warning") if virtual else Content("")
 
 
@@ -26,7 +26,6 @@ class TitleLine(Panel):
         self._plan = plan
 
     def text(self, board: Board) -> Content:
-        """Return the line."""
         sign = banner(virtual=board.virtual)
         run: list[Content] = []
         if board.announced is not None and board.finished is None:
@@ -52,7 +51,7 @@ _SHORTEST = 4
 
 
 def _shortened(name: str, room: int) -> str:
-    """Return a name, or its beginning, in so many columns; empty where nothing of use fits."""
+    """Return a name, or its beginning, in so many columns; empty if too few."""
     if len(name) <= room:
         return name
     return f"{name[: room - 1].rstrip()}…" if room >= _SHORTEST else ""

@@ -1,4 +1,4 @@
-"""The live polar trace on the screen: draws what has come since the last look, and only the rows that it changes."""
+"""The live polar trace; only changed rows are drawn."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ _SMALLEST_ROWS = 6
 
 
 class TraceView(Widget):
-    """Deviation of the bar about the nominal circle, both directions of a test in one dial.
+    """Deviation of the bar about the nominal circle, both directions in one dial.
 
     Args:
-        cell_aspect: height of a terminal's cell over its width.
+        cell_aspect: height over width of a terminal's cell.
     """
 
     COMPONENT_CLASSES: ClassVar[set[str]] = {
@@ -83,7 +83,7 @@ class TraceView(Widget):
 
     @property
     def scale_um(self) -> float:
-        """Deviation at the outer ring [µm]."""
+        """Return the deviation at the outer ring [µm]."""
         return self._scale_um
 
     def show(
@@ -93,12 +93,12 @@ class TraceView(Widget):
         head: Direction | None = None,
         beneath: Mapping[Direction, LiveTrace | Derived] | None = None,
     ) -> None:
-        """Draw what has come since the last call.
+        """Draw what is new.
 
         Args:
-            circle: what the dial is labelled for; None before the first run.
-            head: the direction that runs now; a mark shows where it is.
-            beneath: circles of the session before, drawn dim.
+            circle: for the dial's labels; None before the first run.
+            head: the running direction, marked.
+            beneath: circles of the session before, dim.
         """
         fresh = circle is not self._circle or any(
             traces.get(direction) is not trace for direction, (trace, _) in self._drawn.items()
@@ -145,7 +145,7 @@ class TraceView(Widget):
             self._drawn[direction] = (trace, count)
 
     def _compose_cells(self) -> None:
-        """Lay planes and texts over each other, and ask for the rows that look different now."""
+        """Overlay planes and texts and request changed rows."""
         planes = (self._background, self._planes[Direction.CCW], self._planes[Direction.CW], self._last)
         codes, members = braille.overlay(planes)
         self._letter(codes, members)
@@ -187,11 +187,10 @@ class TraceView(Widget):
         members[row, column : column + len(text)] = _LABEL
 
     def on_resize(self) -> None:
-        """Draw for the new size."""
         self.show(self._circle, self._traces, self._head, self._beneath)
 
     def notify_style_update(self) -> None:
-        """Colours changed: draw all rows with them."""
+        """Draw all rows in changed colours."""
         super().notify_style_update()
         self.refresh()
 
@@ -215,7 +214,7 @@ class TraceView(Widget):
         return Strip(segments, len(row)).adjust_cell_length(wide, base)
 
     def _styles(self) -> dict[int, Style]:
-        """Return the style of a cell by whose dots it has: a trace goes before the scale."""
+        """Return a cell's style by its planes, the trace first."""
         scale, last, ccw, cw, both, label = (
             self.get_component_rich_style(f"trace--{part}") for part in ("scale", "last", "ccw", "cw", "both", "label")
         )
@@ -256,6 +255,6 @@ class TraceView(Widget):
 
 
 def _rounded(times: float) -> str:
-    """Return a magnification with two digits that mean something."""
+    """Return a magnification with two significant digits."""
     place = 10.0 ** max(np.floor(np.log10(max(times, 1.0))) - 1.0, 0.0)
     return f"{round(times / place) * place:.0f}"

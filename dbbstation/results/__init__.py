@@ -1,1 +1,1 @@
-"""Typed results of tasks: frozen, units in their names, uncertainties beside values."""
+"""Typed, frozen results of tasks, with units in names and uncertainties beside values."""

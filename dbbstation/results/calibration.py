@@ -1,4 +1,4 @@
-"""What a calibration found: the result of `calibrate`."""
+"""The result of `calibrate`."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class CalibrationResult(Framed, CalibrationFigures):
     """What a calibration found.
 
     Attributes:
-        method: how ball positions are known: `jig`, `conv-a` or `conv-b`.
+        method: of ball positions: `jig`, `conv-a` or `conv-b`.
         covariance: of the machine's parameters.
-        model: to predict and compensate with, or to write to a file.
+        model: for prediction, compensation or a file.
     """
 
     method: str
@@ -28,7 +28,7 @@ class CalibrationResult(Framed, CalibrationFigures):
     model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)
 
     def rows(self) -> list[dict[str, object]]:
-        """The machine's parameters, one row for each; `u` is the standard uncertainty."""
+        """Return the machine's parameters as rows; `u` is the standard uncertainty."""
         return [
             {
                 "source": one.name,
@@ -42,5 +42,5 @@ class CalibrationResult(Framed, CalibrationFigures):
         ]
 
     def run_rows(self) -> list[dict[str, object]]:
-        """Figures of the runs before and after, one row for each."""
+        """Return figures of runs before and after as rows."""
         return rows_of(self.runs)

@@ -1,4 +1,4 @@
-"""What is wrong with files, and what was found beside: the result of `check`."""
+"""The result of `check`."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class CheckedFile:
     """A file, or a session.
 
     Attributes:
-        ok: whether nothing is wrong with it.
-        runs: of a session whose runs were judged; absent else.
+        ok: whether it has no fault.
+        runs: judged ones of a session; else absent.
     """
 
     file: str
@@ -37,7 +37,7 @@ class CheckedFile:
 
 @dataclass(frozen=True)
 class DryRunResult:
-    """The programs of a plan, tried on a machine."""
+    """The trial of a plan's programs."""
 
     plan: str
     machine: str
@@ -55,11 +55,7 @@ class SampledPlanResult:
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What `check` found.
-
-    Attributes:
-        warnings: what is worth knowing.
-    """
+    """What `check` found."""
 
     files: tuple[CheckedFile, ...]
     dry_runs: tuple[DryRunResult, ...]

@@ -1,4 +1,4 @@
-"""Figures of one circle after ISO 230-4 with their budgets, as `circles --json` has them; lengths in µm."""
+"""Figures of one circle after ISO 230-4 with budgets, as in `circles --json`; lengths in µm."""
 
 from __future__ import annotations
 
@@ -15,12 +15,7 @@ from dbbstation.quality.finding import Finding
 
 @dataclass(frozen=True)
 class LargestAndLeast:
-    """Largest and least deviation.
-
-    Attributes:
-        max: largest [µm].
-        min: least [µm].
-    """
+    """Largest and least deviation [µm]."""
 
     max: float
     min: float
@@ -28,12 +23,7 @@ class LargestAndLeast:
 
 @dataclass(frozen=True)
 class PlaneVector:
-    """A place in the plane of the circle.
-
-    Attributes:
-        x: along X [µm].
-        y: along Y [µm].
-    """
+    """A place in the plane of the circle [µm]."""
 
     x: float
     y: float
@@ -41,12 +31,7 @@ class PlaneVector:
 
 @dataclass(frozen=True)
 class ShownFeed:
-    """The feed that the recording shows.
-
-    Attributes:
-        value: of it [mm/min].
-        u: its standard uncertainty [mm/min].
-    """
+    """The feed by the recording, with its standard uncertainty [mm/min]."""
 
     value: float
     u: float
@@ -54,12 +39,12 @@ class ShownFeed:
 
 @dataclass(frozen=True)
 class NoiseFigures:
-    """Noise of a recording.
+    """Noise of a recording [µm].
 
     Attributes:
-        of_slow_figures: standard deviation that figures of a turn have [µm]; None where it cannot be told.
-        of_a_reading: standard deviation of one reading [µm]; likewise.
-        step_of_readings: least difference of two readings [µm].
+        of_slow_figures: standard deviation of a turn's figures; None if unknown.
+        of_a_reading: standard deviation; None if unknown.
+        step_of_readings: least difference of two readings.
     """
 
     of_slow_figures: float | None
@@ -69,13 +54,10 @@ class NoiseFigures:
 
 @dataclass(frozen=True)
 class RunWithoutCircle:
-    """A run whose recording shows no circle.
+    """A run without circle.
 
     Attributes:
-        direction: `ccw` or `cw`.
-        repeat: counts runs of this test and direction.
-        problem: why it shows none.
-        findings: what was found of it; absent where these were not asked for.
+        findings: absent if not asked for.
     """
 
     session: str
@@ -86,7 +68,7 @@ class RunWithoutCircle:
     findings: Annotated[tuple[Finding, ...] | None, Absent] = None
 
     def row(self) -> dict[str, object]:
-        """Its name and findings, for a table."""
+        """Return name and findings for a table."""
         named = {"session": self.session, "test": self.test, "direction": self.direction, "repeat": self.repeat}
         return {**named, **({"problem": self.problem} if self.problem else {}), **_verdicts(self.findings)}
 
@@ -96,17 +78,15 @@ class CircleFiguresResult:
     """Figures of one circle.
 
     Attributes:
-        direction: `ccw` or `cw`.
-        repeat: counts runs of this test and direction.
-        g_um: circular deviation G, minimum zone [µm].
-        g_least_squares_um: circular deviation about the least-squares centre [µm].
-        f_um: radial deviations F about the least-squares centre [µm].
-        mean_radial_error_um: mean length less commanded length [µm].
-        centre_um: least-squares centre less commanded centre [µm].
-        closure: from the end of the turn to its beginning; None where it cannot be told.
-        drift_um_per_turn: of lengths over a turn; None where there is no second pass [µm].
-        feed_shown_mm_min: that the recording shows; None where it cannot be told.
-        findings: what was found of it; absent where these were not asked for.
+        g_um: circular deviation G, minimum zone.
+        g_least_squares_um: circular deviation about the least-squares centre.
+        f_um: radial deviations F about the least-squares centre.
+        mean_radial_error_um: mean less commanded length.
+        centre_um: least-squares less commanded centre.
+        closure: end of the turn to its beginning; None if unknown.
+        drift_um_per_turn: None without a second pass.
+        feed_shown_mm_min: by the recording; None if unknown.
+        findings: absent if not asked for.
     """
 
     session: str
@@ -138,7 +118,7 @@ class CircleFiguresResult:
     findings: Annotated[tuple[Finding, ...] | None, Absent] = None
 
     def row(self) -> dict[str, object]:
-        """Every number of the circle, for a table."""
+        """Return all numbers of the circle for a table."""
         found: dict[str, object] = {}
         for key, value in vars(self).items():
             match value:
@@ -161,12 +141,11 @@ class CircleFiguresResult:
 
 @dataclass(frozen=True, kw_only=True)
 class PairFigures:
-    """Figures of both directions of a circle.
+    """Figures of both directions together.
 
     Attributes:
-        repeat: counts runs of this test.
-        g_um: bidirectional circular deviation G(b), minimum zone [µm].
-        d_um: mean bidirectional radial deviation D [µm].
+        g_um: bidirectional circular deviation G(b), minimum zone.
+        d_um: mean bidirectional radial deviation D.
     """
 
     session: str
@@ -185,9 +164,8 @@ class QuickLookResult:
     """Signatures of serial axes in one circle.
 
     Attributes:
-        repeat: counts runs of this test.
-        symptoms: empty where there are too few samples.
-        left_rms_um: of what signatures leave [µm]; None there.
+        symptoms: empty for too few samples.
+        left_rms_um: beyond signatures; None for too few samples.
     """
 
     session: str

@@ -1,4 +1,4 @@
-"""Measured circles with their figures, and what `circles --json` prints of them."""
+"""Measured circles with their figures, the result of `circles`."""
 
 from __future__ import annotations
 
@@ -39,11 +39,10 @@ class MeasuredCircle:
     """One accepted run.
 
     Attributes:
-        entry: what the session says of it.
-        analysis: its figures; None where its recording shows no circle.
-        problem: why it shows none; empty where it does.
-        known: what the session states of bar and ball.
-        judgement: what was found of it; None where it was not asked for.
+        analysis: None without a circle.
+        problem: why there is none; else empty.
+        known: stated facts of bar and ball.
+        judgement: None if not asked for.
     """
 
     session: str
@@ -68,9 +67,8 @@ class Circled:
     """Circles of one or more sessions.
 
     Attributes:
-        circles: in the order in which they were measured.
-        pairs: both directions of one test, repeat and mounting.
-        warnings: what was found beside.
+        circles: in order of measurement.
+        pairs: directions of one test, repeat and mounting.
     """
 
     circles: tuple[MeasuredCircle, ...]
@@ -81,16 +79,16 @@ class Circled:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CirclesResult(Framed):
-    """Figures of measured circles after ISO 230-4, as `circles --json` prints them.
+    """Figures of measured circles after ISO 230-4, as in `circles --json`.
 
     Attributes:
         filter: of G, F and H, in words.
-        false_alarms_per_run: that the limits of findings are made for.
-        runs: figures of each circle with their budgets; lengths in µm.
-        pairs: the same of both directions together.
-        quick_look: signatures of serial axes; None where they were not asked for.
-        csv: file of the table; absent where none was written.
-        circles: the circles themselves, with their analyses.
+        false_alarms_per_run: basis of the findings' limits.
+        runs: figures with budgets; lengths in µm.
+        pairs: of both directions together.
+        quick_look: signatures of serial axes; None if not asked for.
+        csv: absent if none was written.
+        circles: with analyses.
     """
 
     edition: str
@@ -104,7 +102,7 @@ class CirclesResult(Framed):
     circles: Annotated[Circled, AsItIs, Kept] = field(repr=False)
 
     def rows(self) -> list[dict[str, object]]:
-        """Every number of every circle, one row for each."""
+        """Return all numbers, a row per circle."""
         return [run.row() for run in self.runs]
 
 
@@ -112,7 +110,7 @@ def circles_result(found: Circled, chosen: Filter, *, quick_look: bool = False) 
     """Return the figures of circles.
 
     Args:
-        quick_look: look for signatures of serial axes.
+        quick_look: include signatures of serial axes.
     """
     return CirclesResult(
         edition=EDITION,
@@ -182,7 +180,7 @@ def _pair(pair: MeasuredPair) -> PairFigures:
 
 
 def _quick_looks(found: Circled) -> list[QuickLookResult]:
-    """Signatures of serial axes in every circle, both directions of one together."""
+    """Return signatures of serial axes in every circle, directions grouped."""
     partner = {id(pair.one): pair.other for pair in found.pairs}
     second = {id(pair.other) for pair in found.pairs}
     looks = []

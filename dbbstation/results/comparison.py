@@ -1,4 +1,4 @@
-"""Where two sessions differ: the result of `compare`."""
+"""The result of `compare`."""
 
 from __future__ import annotations
 
@@ -17,17 +17,16 @@ from dbbstation.results.frame import Framed
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedRun:
-    """One run of B less the same run of A.
+    """A run of B less that of A.
 
     Attributes:
-        direction: `ccw` or `cw`.
-        number: of the comparison in this test and direction.
-        differs: whether what was found is there in this run beyond doubt.
-        rms_um: of the whole smooth difference [µm].
-        centre_shift_um: by how much the centre moved, x and y [µm].
-        circularity_um: greatest less least of the difference about its centre [µm].
-        peak_um: greatest difference, with its sign [µm].
-        by_angle_um: means over ten degrees from +X [µm].
+        number: in this test and direction.
+        differs: whether the found effects are certain in this run.
+        rms_um: whole smooth difference.
+        centre_shift_um: x and y.
+        circularity_um: range of the difference about its centre.
+        peak_um: with sign.
+        by_angle_um: means over ten degrees from +X.
     """
 
     test: str
@@ -52,10 +51,10 @@ class ComparedRun:
 
 @dataclass(frozen=True)
 class DirectionHalves:
-    """Parts of the difference that are the same in both directions, and opposite.
+    """Parts of the difference that are equal or opposite in both directions.
 
     Attributes:
-        opposite_um: rms of the part that changes its sign [µm].
+        opposite_um: rms of the part with changing sign.
     """
 
     same_um: float
@@ -64,11 +63,7 @@ class DirectionHalves:
 
 @dataclass(frozen=True)
 class LargestEffect:
-    """Where a cause does most.
-
-    Attributes:
-        direction: `ccw` or `cw`.
-    """
+    """Where a cause acts most."""
 
     test: str
     direction: str
@@ -92,17 +87,17 @@ class ComparedCause:
     """What was found of one cause.
 
     Attributes:
-        form: which strut, test or session, where it is there; else empty.
-        verdict: one of the six words of docs/verdicts.md.
+        form: strut, test or session, or empty.
+        verdict: see docs/verdicts.md.
         acts: `always` or `once`.
-        persists: it happened once, and other tests tell of it, too.
-        recurs: a wave over the time that other tests foretell.
-        gains: in tests that did not choose it; None where these were not asked for.
-        equivalent: causes that these sessions cannot tell from it; `class` in JSON.
-        rms_um: of its effect [µm]; None where it is not there.
-        taken_up: share that a new calibration would take up; likewise.
-        opposite: share that changes its sign with the direction; likewise.
-        spans: where along variables it is large.
+        persists: a single event, confirmed by other tests.
+        recurs: a wave over time, predicted by other tests.
+        gains: in tests that did not choose it; None if not tested.
+        equivalent: causes indistinguishable by these sessions; `class` in JSON.
+        rms_um: None if absent.
+        taken_up: share that a new calibration would absorb; None if absent.
+        opposite: share that changes sign with direction; None if absent.
+        spans: large ranges along variables.
     """
 
     name: str
@@ -129,11 +124,7 @@ class ComparedCause:
 
 @dataclass(frozen=True)
 class CauseNotAsked:
-    """A cause that needs what these sessions do not have.
-
-    Attributes:
-        form: empty.
-    """
+    """A cause that needs missing data."""
 
     name: str
     form: str
@@ -144,10 +135,10 @@ class CauseNotAsked:
 
 @dataclass(frozen=True)
 class ComparisonResidual:
-    """The residual beside everything found.
+    """The residual beyond all findings.
 
     Attributes:
-        probability: that noise alone leaves as much.
+        probability: by noise alone.
     """
 
     beyond_noise: bool
@@ -157,7 +148,7 @@ class ComparisonResidual:
 
 @dataclass(frozen=True)
 class NotComparable:
-    """A test that both sessions have and that cannot be compared."""
+    """A test of both sessions that cannot be compared."""
 
     test: str
     text: str
@@ -165,18 +156,17 @@ class NotComparable:
 
 @dataclass(frozen=True, kw_only=True)
 class ComparisonResult(Framed):
-    """Where two sessions differ, B less A.
+    """Differences of two sessions, B less A.
 
     Attributes:
-        text: what it comes to, in words.
-        held_out_worse: whether what was found predicts worse than nothing; None where not tested.
-        held_out_rms_um: errors of tests that took no part [µm].
+        text: summary.
+        held_out_worse: whether predictions get worse; None if not tested.
+        held_out_rms_um: errors of tests that took no part.
         runs: largest difference first.
-        directions: parts that are alike and opposite; None where only one direction was measured.
-        cancelling: effects that cancel each other; None where none do.
-        not_comparable: tests that cannot be compared.
-        averaged: tests whose repeats were averaged.
-        unlike: what else was not alike; `notes` in JSON.
+        directions: equal and opposite parts; None for one direction.
+        cancelling: None without such effects.
+        averaged: tests with averaged repeats.
+        unlike: other differences; `notes` in JSON.
     """
 
     a: str
@@ -206,7 +196,7 @@ class ComparisonResult(Framed):
     unlike: Annotated[tuple[str, ...], Field(serialization_alias="notes")]
 
     def rows(self) -> list[dict[str, object]]:
-        """One dictionary for each run."""
+        """Return one row per run."""
         return [
             {
                 "test": run.test,

@@ -1,4 +1,4 @@
-"""What `demo` shows: figures before and after, and parts of what its commands printed."""
+"""The result of `demo`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dbbstation.results.report import ReportVerdict
 
 @dataclass(frozen=True)
 class DemoLowPassed:
-    """The circular deviation of the readings without the bar's noise [µm]."""
+    """Circular deviation without the bar's noise [µm]."""
 
     measured: float
 
@@ -38,12 +38,12 @@ class DemoEvaluation:
 
 @dataclass(frozen=True)
 class MeasuredBeforeAfter:
-    """Measured figures of one circle; in µm.
+    """Measured figures of one circle [µm].
 
     Attributes:
-        centre_deviation_um: length of the least-squares centre's offset.
-        mean_radial_error_um: mean of length less radius.
-        circularity_um: circular deviation with the bar's noise.
+        centre_deviation_um: least-squares centre's offset.
+        mean_radial_error_um: mean length less radius.
+        circularity_um: circular deviation with noise.
     """
 
     centre_deviation_um: float
@@ -54,12 +54,7 @@ class MeasuredBeforeAfter:
 
 @dataclass(frozen=True)
 class DemoCircle:
-    """The first circle of a test in its first direction.
-
-    Attributes:
-        before: under nominal programs.
-        after: under compensated programs.
-    """
+    """A test's first circle in its first direction."""
 
     test: str
     before: MeasuredBeforeAfter
@@ -68,14 +63,14 @@ class DemoCircle:
 
 @dataclass(frozen=True)
 class DemoCalibration:
-    """What a kinematic calibration alone leaves within mountings [µm]."""
+    """Residual of a kinematic calibration within mountings [µm]."""
 
     residual_within_mounting_rms_um: float
 
 
 @dataclass(frozen=True)
 class DemoCause:
-    """A cause: its verdict, the share that the kinematic parameters conceal, and its parameters."""
+    """A cause: verdict, share absorbed by kinematic parameters, and parameters."""
 
     name: str
     verdict: str
@@ -85,7 +80,7 @@ class DemoCause:
 
 @dataclass(frozen=True)
 class DemoDiagnosis:
-    """What the diagnosis found, and how well held-out tests are predicted [µm] where they are `tested`."""
+    """Diagnosis, and predictions of held-out tests [µm] if `tested`."""
 
     sources: tuple[DemoCause, ...]
     held_out: str
@@ -94,7 +89,7 @@ class DemoDiagnosis:
 
 @dataclass(frozen=True)
 class DemoRanked:
-    """A cause of what was measured before, with what it contributes to G and to the centres [µm], and its cure."""
+    """A cause with its contributions to G and centres [µm], and cure."""
 
     cause: str
     g_um: float
@@ -104,7 +99,7 @@ class DemoRanked:
 
 @dataclass(frozen=True)
 class DemoReport:
-    """What the report says, and the causes that it ranks."""
+    """The report's statements and ranked causes."""
 
     verdict: ReportVerdict
     causes: tuple[DemoRanked, ...]
@@ -115,9 +110,7 @@ class DemoResult:
     """Files and figures of a demonstration.
 
     Attributes:
-        calibration: what `calibrate` left.
-        diagnosis: what `diagnose` found.
-        printed: everything that `diagnose` and `report` printed as JSON, by the command.
+        printed: JSON of `diagnose` and `report`, by command.
     """
 
     folder: Path

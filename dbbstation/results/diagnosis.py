@@ -1,4 +1,4 @@
-"""Which physics a calibration leaves out: the result of `diagnose`."""
+"""The result of `diagnose`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dbbstation.results.frame import Framed
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """A figure under the kinematic calibration (before) and under the joint model (after)."""
+    """A figure under kinematic calibration (before) and joint model (after)."""
 
     before: float
     after: float
@@ -28,14 +28,7 @@ class BeforeAfter:
 
 @dataclass(frozen=True)
 class CircularityLeft:
-    """Circularity that is left of one run [µm].
-
-    Attributes:
-        direction: `ccw` or `cw`.
-        repeat: counts runs of this test and direction.
-        before: under the kinematic calibration [µm].
-        after: under the joint model [µm].
-    """
+    """Residual circularity of one run [µm]."""
 
     test: str
     direction: str
@@ -46,13 +39,13 @@ class CircularityLeft:
 
 @dataclass(frozen=True)
 class WorkspaceGain:
-    """How far apart kinematic calibration and joint model put the tool over the workspace.
+    """Distance of kinematic calibration and joint model over the workspace.
 
     Attributes:
-        error_rms_um: without the common shift [µm].
-        uncertainty_rms_um: standard uncertainty of the joint model there; None where not known [µm].
-        common_shift_um: mean of X, Y and Z [µm].
-        uncertainty_with_shift_rms_um: likewise; None where not known [µm].
+        error_rms_um: without common shift.
+        uncertainty_rms_um: standard uncertainty of the joint model; None if unknown.
+        common_shift_um: mean of X, Y and Z.
+        uncertainty_with_shift_rms_um: None if unknown.
     """
 
     error_rms_um: float
@@ -66,12 +59,11 @@ class WorkspaceGain:
 
 @dataclass(frozen=True)
 class MisfitLocation:
-    """Where the misfit of the kinematic calibration is large.
+    """Where the kinematic misfit is large.
 
     Attributes:
-        direction: `ccw` or `cw`.
-        strut: 1 to 6; None where no one stands out.
-        variable: what it follows; None where nothing does.
+        strut: 1 to 6; None if none stands out.
+        variable: None if it follows none.
     """
 
     test: str
@@ -89,19 +81,18 @@ class CauseResult:
     """What was found of one cause.
 
     Attributes:
-        name: of the error source.
-        verdict: one of the six words of docs/verdicts.md.
-        ambiguous_with: causes that explain the recordings about as well.
-        concealed: R² of its effect on the kinematic parameters.
-        signature_rms_um: size of its effect on the readings [µm].
-        unconcealed_rms_um: part of that which no kinematic parameter can imitate [µm].
+        verdict: see docs/verdicts.md.
+        ambiguous_with: causes of similar probability.
+        concealed: R² of its effect on kinematic parameters.
+        signature_rms_um: its effect on readings.
+        unconcealed_rms_um: part beyond kinematic parameters.
         gain: log Bayes factor.
         stability: selection frequency.
-        equivalent: causes that these recordings cannot tell apart from it; `class` in JSON.
-        log_evidence: the gain, under its older name.
+        equivalent: causes indistinguishable by these recordings; `class` in JSON.
+        log_evidence: the gain under its older name.
         acts: `always` or `once`.
-        persists: it happened once, and held-out tests tell of it, too.
-        gains: in tests that were held back; None where none were.
+        persists: a single event, confirmed by held-out tests.
+        gains: in held-out tests; None without any.
     """
 
     name: str
@@ -128,7 +119,7 @@ class CurveFollows:
     """What an unmodelled effect is a function of.
 
     Attributes:
-        kind: of curve, such as `wave`; empty for the usual one.
+        kind: such as `wave`; empty for the usual one.
     """
 
     variable: str
@@ -147,18 +138,18 @@ class UnexplainedPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class UnexplainedCurve:
-    """An unmodelled effect as a function of what organises it.
+    """An unmodelled effect as a curve.
 
     Attributes:
-        variable: what it follows, as printed.
-        period_mm: of a wave of strut length [mm]; None for all others.
-        strut: 1 to 6; None where all struts follow it, or no strut's error is meant.
-        form: which of its kind, in words; empty where there is one.
-        period: of a wave, in the variable's unit; None for what is none.
-        direction: in which what it moves does so most; empty where that is one number.
-        convention: what was taken out of it because fitted parameters make that; empty where nothing was.
-        readings_um: root mean square of what it does to the readings [µm].
-        unconcealed_um: of what the fitted machine parameters leave of that [µm].
+        variable: as printed.
+        period_mm: of a wave of strut length; else None.
+        strut: 1 to 6; None for all struts or none.
+        form: kind in words; may be empty.
+        period: of a wave, in the variable's unit; else None.
+        direction: of the strongest motion; empty for a scalar.
+        convention: part removed since fitted parameters can make it; may be empty.
+        readings_um: rms effect on readings.
+        unconcealed_um: part beyond fitted machine parameters.
     """
 
     variable: str
@@ -180,9 +171,9 @@ class UnexplainedResult:
     """The unmodelled residual.
 
     Attributes:
-        strut: 1 to 6; None where it is not one strut's.
-        variable: what it follows; None where nothing does clearly.
-        curve: the error along the variable; None where nothing organises it.
+        strut: 1 to 6, or None.
+        variable: None without a clear one.
+        curve: None if nothing organises it.
     """
 
     rms_um: float
@@ -194,10 +185,10 @@ class UnexplainedResult:
 
 @dataclass(frozen=True)
 class ParameterShift:
-    """Bias of a parameter of the kinematic calibration.
+    """Bias of a kinematic parameter.
 
     Attributes:
-        before_um: without the causes that were found [µm].
+        before_um: without the found causes.
     """
 
     parameter: str
@@ -212,7 +203,7 @@ class ProposedTest:
     """A circle to measure next.
 
     Attributes:
-        source: cause whose uncertainty it brings down.
+        source: cause whose uncertainty it reduces.
     """
 
     text: str
@@ -232,20 +223,18 @@ class ProposedTest:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DiagnosisFigures(Framed):
-    """Everything that a diagnosis says; what is `before` is the kinematic calibration, what is `after` the joint model.
+    """Results of a diagnosis: kinematic calibration `before`, joint model `after`.
 
     Attributes:
-        mismatch: whether the recordings differ from the kinematic model.
+        mismatch: whether recordings contradict the kinematic model.
         probability: of that misfit by chance.
-        held_out_rms_um: error of predicting held-out tests [µm].
-        held_out: `tested`, or `not-tested` where the tests are too few.
-        held_out_worse: whether what was found predicts worse; None where not tested.
-        workspace: how far both models are apart; None where nothing was found.
-        outliers: kept out of the fits.
-        cancelling: effects of named causes on the readings that cancel each other; None where none do.
-        unexplained: the unmodelled residual.
-        second_start_agrees: whether a second search came to the same causes; None where there was none.
-        next_test: what to measure next; None: no proposal.
+        held_out_rms_um: prediction error of held-out tests.
+        held_out: `tested`, or `not-tested` for too few tests.
+        held_out_worse: whether predictions get worse; None if not tested.
+        workspace: distance of both models; None without findings.
+        cancelling: cancelling effects of named causes; None without any.
+        second_start_agrees: whether a second search agrees; None without one.
+        next_test: None: no proposal.
     """
 
     mismatch: bool
@@ -275,7 +264,7 @@ class DiagnosisFigures(Framed):
         return tuple(one for one in self.sources if one.verdict == "identified")
 
     def rows(self) -> list[dict[str, object]]:
-        """Causes, one row for each."""
+        """Return one row per cause."""
         return [
             {
                 "cause": one.name,
@@ -290,11 +279,11 @@ class DiagnosisFigures(Framed):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DiagnosisResult(DiagnosisFigures):
-    """What a diagnosis found.
+    """The result of a diagnosis.
 
     Attributes:
-        effects: what each cause of the joint model contributes to the circles, the greatest circular deviation first.
-        model: the joint model, to predict and compensate with, or to write to a file.
+        effects: contributions to circles, the greatest first.
+        model: joint model.
     """
 
     effects: tuple[CauseContribution, ...]

@@ -1,4 +1,4 @@
-"""Mass, friction and what is left out of one strut drive: the result of `drive`."""
+"""The result of `drive`."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveResult(Framed, DriveFindings):
-    """What is found of one strut drive, to show and to keep.
+    """Findings on one strut drive.
 
     Attributes:
-        compared: file of what was compared; absent where none was written.
-        figure: file of the figure; absent where none was written.
+        compared: absent if none was written.
+        figure: absent if none was written.
     """
 
     compared: Annotated[str | None, Absent] = None
     figure: Annotated[str | None, Absent] = None
 
     def rows(self) -> list[dict[str, object]]:
-        """One dictionary for each cause."""
+        """Return one row per cause."""
         shown = ("name", "verdict", "probability", "gain", "concealed", "signature_rms_n", "text")
         return [{name: getattr(one, name) for name in shown} for one in self.sources]
 

@@ -1,4 +1,4 @@
-"""What each cause of a model contributes to the circles, and what they would be without it."""
+"""What each cause of a model contributes to circles."""
 
 from __future__ import annotations
 
@@ -16,11 +16,9 @@ class CuredRun:
     """One run with and without a cause; G up to 30 undulations per revolution.
 
     Attributes:
-        direction: `ccw` or `cw`.
-        repeat: of the test and direction.
-        g_um: circular deviation that the cause would make by itself [µm].
-        centre_um: how far it moves the centre, X and Y [µm].
-        measured_centre_um: centre less the commanded one, X and Y [µm].
+        g_um: circular deviation of the cause alone.
+        centre_um: shift of the centre, X and Y.
+        measured_centre_um: less the commanded one, X and Y.
     """
 
     test: str
@@ -36,19 +34,18 @@ class CuredRun:
 
 @dataclass(frozen=True, kw_only=True)
 class CauseContribution:
-    """What one cause contributes, over all runs.
+    """A cause's contribution over all runs.
 
     Attributes:
-        cause: name of the source; `geometry` for all kinematic parameters together.
-        verdict: of the diagnosis; empty of the geometry, and where no diagnosis was made.
-        g_um: mean circular deviation that it would make by itself [µm].
-        g_u_um: standard uncertainty of that; None where not known.
-        centre_um: mean distance by which it moves the centres [µm].
-        centre_u_um: standard uncertainty of that; None where not known.
-        workspace_um: root mean square distance over the workspace by which it moves the tool, about a common shift [µm]; None
-            where it follows more than the pose.
-        workspace_u_um: standard uncertainty of that; None where not known.
-        measured_g_um: mean circular deviation as measured [µm].
+        cause: source, or `geometry` for all kinematic parameters.
+        verdict: empty for geometry or without diagnosis.
+        g_um: mean circular deviation of the cause alone.
+        g_u_um: standard uncertainty; None if unknown.
+        centre_um: mean shift of the centres.
+        centre_u_um: standard uncertainty; None if unknown.
+        workspace_um: rms tool shift over the workspace about a common shift; None if it follows more than the pose.
+        workspace_u_um: standard uncertainty; None if unknown.
+        measured_g_um: mean circular deviation.
     """
 
     cause: str
@@ -68,7 +65,7 @@ class CauseContribution:
 
 
 def effect_results(effects: Sequence[CauseEffect], verdicts: Mapping[str, str]) -> tuple[CauseContribution, ...]:
-    """Return causes in the order of what they contribute."""
+    """Return causes by contribution."""
     return tuple(_result(one, verdicts.get(one.name, "")) for one in effects)
 
 

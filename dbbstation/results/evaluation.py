@@ -1,4 +1,4 @@
-"""What a model leaves of recordings, circle by circle: the result of `evaluate`."""
+"""The result of `evaluate`."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from dbbstation.results.frame import Framed
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationResult(Framed):
-    """What a model leaves of recordings, and how true the machine moves without compensation.
+    """What a model leaves of recordings, and the uncompensated machine's accuracy.
 
     Attributes:
-        nominal_rms_um: measured less predicted length over all runs under the nominal machine [µm].
-        flatness_um: of X, Y = ±190 mm, as the model predicts it of programs that are not compensated [µm].
-        flatness_u_um: its standard uncertainty; None where it is not known [µm].
-        parallelism_um: of a move along X, likewise [µm].
-        parallelism_u_um: its standard uncertainty; None where it is not known [µm].
-        plane_uncertainty_not_known_because: why one of both is not known; None where both are.
-        plane_without: sources that are left out there, because no pose alone says what they do.
-        tolerances: of the shop, held against every circle; None where another result holds them.
+        nominal_rms_um: measured less nominally predicted length over all runs.
+        flatness_um: of X, Y = ±190 mm without compensation, by the model.
+        flatness_u_um: standard uncertainty; None if unknown.
+        parallelism_um: of a move along X without compensation.
+        parallelism_u_um: standard uncertainty; None if unknown.
+        plane_uncertainty_not_known_because: None if known.
+        plane_without: sources left out, since they need more than a pose.
+        tolerances: None if another result holds them.
     """
 
     runs: tuple[EvaluatedRun, ...]
@@ -39,12 +39,12 @@ class EvaluationResult(Framed):
     tolerances: Annotated[tuple[EvaluatedTolerance, ...] | None, Absent] = ()
 
     def rows(self) -> list[dict[str, object]]:
-        """Figures of the runs, one row for each."""
+        """Return one row per run."""
         return rows_of(self.runs)
 
 
 def rows_of(runs: tuple[EvaluatedRun, ...]) -> list[dict[str, object]]:
-    """Figures of runs as rows of a table; lengths in µm."""
+    """Return figures of runs as rows; lengths in µm."""
     rows = []
     for run in runs:
         row: dict[str, object] = {"test": run.test, "direction": run.direction, "repeat": run.repeat}

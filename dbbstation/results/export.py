@@ -1,4 +1,4 @@
-"""A table of samples: the result of `export`."""
+"""The result of `export`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the same task on many sessions found: the result of `fleet`."""
+"""The result of `fleet`."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Kind = Literal["parameter", "figure", "cause"]
 
 @dataclass(frozen=True)
 class FleetValue:
-    """One number that a task found of a machine.
+    """One number of a machine.
 
     Attributes:
-        uncertainty: standard uncertainty; None where it is not known.
-        of: circle that it was measured on, in words; empty where it is none of a circle.
-        logarithmic: whether it is a positive size, of which ratios are compared.
+        uncertainty: standard; None if unknown.
+        of: circle in words; may be empty.
+        logarithmic: whether ratios of a positive size are compared.
     """
 
     kind: Kind
@@ -37,12 +37,11 @@ class FleetValue:
 
 @dataclass(frozen=True)
 class FleetCause:
-    """One cause as a diagnosis found it.
+    """A cause found by a diagnosis.
 
     Attributes:
-        name: of the error source.
-        verdict: one of the six words of docs/verdicts.md.
-        probability: given the catalogue of causes; None where it was not worked out.
+        verdict: see docs/verdicts.md.
+        probability: given the catalogue of causes; None if not computed.
     """
 
     name: str
@@ -52,12 +51,7 @@ class FleetCause:
 
 @dataclass(frozen=True)
 class FleetFound:
-    """What a task found of one session.
-
-    Attributes:
-        values: numbers that can be compared with those of other machines.
-        headline: in a few words.
-    """
+    """Findings of one session."""
 
     values: tuple[FleetValue, ...]
     causes: tuple[FleetCause, ...]
@@ -70,16 +64,14 @@ class FleetSession:
     """One session of a fleet.
 
     Attributes:
-        session: its folder, from the folder that was named.
-        machine: serial number, or the name in its machine file, with the session where each is a machine of its own; empty where
-            the session cannot be read.
-        started: start of its first run, ISO 8601; None where none is noted.
+        session: folder relative to the named one.
+        machine: serial number or name, with the session if it counts apart; empty if unreadable.
+        started: first run, ISO 8601; None if not noted.
         state: `done`, `up-to-date` or `failed`.
-        problem: why it failed; empty where it did not.
-        files: what was written of it, within the folder of the results.
-        headline: in a few words what was found.
-        compared: whether the comparison of machines has it: the last session of each machine.
-        values: that the task found.
+        problem: empty without failure.
+        files: within the results' folder.
+        headline: findings in a few words.
+        compared: whether it is its machine's last session.
     """
 
     session: str
@@ -96,16 +88,16 @@ class FleetSession:
 
 @dataclass(frozen=True)
 class Scored:
-    """One quantity of one machine, held against its sisters.
+    """One quantity of one machine against its sisters.
 
     Attributes:
-        of: circle in words; empty for none.
-        uncertainty: standard uncertainty; None where not known.
-        usual: middle of those; None where nothing can be said.
-        scatter: standard deviation of those, beyond their uncertainties; None likewise.
-        score: standard normal where the machine is like its sisters; None likewise.
-        smallest_seen: departure from the middle from which on it would count as unlike; None likewise.
-        unlike: whether it is unlike its sisters, at the stated rate of false alarms.
+        of: circle in words; may be empty.
+        uncertainty: standard; None if unknown.
+        usual: middle of the sisters; None if unknown.
+        scatter: their standard deviation beyond uncertainties; None if unknown.
+        score: standard normal for a like machine; None if unknown.
+        smallest_seen: departure that would count as unlike; None if unknown.
+        unlike: at the stated rate of false alarms.
     """
 
     machine: str
@@ -125,17 +117,16 @@ class Scored:
 
     @property
     def key(self) -> tuple[str, ...]:
-        """By what a session's value is found."""
+        """Return the key of a session's value."""
         return self.session, self.kind, self.quantity, self.of
 
 
 @dataclass(frozen=True)
 class SharedCause:
-    """A cause that was found in some machines of a fleet.
+    """A cause of several machines.
 
     Attributes:
-        name: of the error source.
-        false_claims: how many of those in `found_in` are expected to be wrong, by the probabilities of the diagnoses.
+        false_claims: expected errors in `found_in` by probability.
     """
 
     name: str
@@ -149,9 +140,9 @@ class FleetComparison:
     """Machines held against one another.
 
     Attributes:
-        false_alarms: probability that a fleet of like machines has any value marked as unlike.
-        causes: that were found anywhere.
-        notes: what was not compared, and why.
+        false_alarms: probability that like machines have any marked value.
+        causes: of any machine.
+        notes: omissions with reasons.
     """
 
     false_alarms: float
@@ -163,7 +154,7 @@ class FleetComparison:
 
     @property
     def unlike(self) -> tuple[Scored, ...]:
-        """Values that are unlike, the greatest score first."""
+        """Return unlike values, the greatest score first."""
         found = [one for one in self.scored if one.unlike]
         return tuple(sorted(found, key=lambda one: -abs(one.score or 0.0)))
 
@@ -174,10 +165,10 @@ class FleetResult(Framed):
 
     Attributes:
         task: `calibrate`, `circles`, `diagnose` or `report`.
-        page: file with a row for each machine.
-        sessions: in the order of their names.
-        notes: which sessions were counted as one machine, or each as its own, since they have no serial number.
-        comparison: of the machines; None where the task has no values to compare.
+        page: with a row per machine.
+        sessions: by name.
+        notes: on sessions without serial number.
+        comparison: None without comparable values.
     """
 
     task: str
@@ -190,11 +181,11 @@ class FleetResult(Framed):
 
     @property
     def failed(self) -> tuple[FleetSession, ...]:
-        """Sessions that failed."""
+        """Return failed sessions."""
         return tuple(one for one in self.sessions if one.state == "failed")
 
     def rows(self) -> list[dict[str, object]]:
-        """Every value of every session, one row for each, with its score where it was compared; a session without values has one row."""
+        """Return a row per value with its score; one row for a session without values."""
         scored = {} if self.comparison is None else {one.key: one for one in self.comparison.scored}
         return [
             dict(zip(TABLE, _row(session, value, scored), strict=True))
@@ -246,7 +237,7 @@ def _row(session: FleetSession, value: FleetValue | None, scored: Mapping[tuple[
 
 @dataclass(frozen=True)
 class StoredFiles:
-    """Where a result is kept: its key, and further files of it."""
+    """A kept result: its key and further files."""
 
     key: str
     files: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""What every result can do: JSON, a table, a figure, and a look in a notebook."""
+"""What every result offers: JSON, table, figure, notebook view."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Picture(bytes):
-    """A figure as SVG, which a notebook shows."""
+    """A figure as SVG for notebooks."""
 
     __slots__ = ()
 
@@ -37,23 +37,23 @@ class Framed:
     """A result that can be shown.
 
     Attributes:
-        drawing: draws it in a format, by the ending of a file's name; None where it has no figure.
-        notes: what was noticed on the way, which the command line prints on standard error.
+        drawing: draws by file extension; None without figure.
+        notes: printed on standard error.
     """
 
     drawing: Annotated[Callable[[object], bytes] | None, AsItIs, Kept] = field(default=None, repr=False, compare=False)
     notes: Annotated[tuple[str, ...], Kept] = field(default=(), repr=False)
 
     def rows(self) -> list[dict[str, object]]:
-        """The result's main table: one dictionary for each row, units in the names."""
+        """Return the main table, a dictionary per row, units in names."""
         raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain objects, lists, texts and numbers: what the command's `--json` prints."""
+        """Return plain objects as the command's `--json` prints."""
         return plain(self)
 
     def to_json(self, indent: int | None = 1) -> str:
-        """Everything as JSON, without the provenance that the command line adds."""
+        """Return JSON without the command line's provenance."""
         return json_of(self, indent)
 
     def to_frame(self) -> Any:  # noqa: ANN401 - pandas is no dependency
@@ -72,14 +72,14 @@ class Framed:
         """Draw the result.
 
         Args:
-            path: file to write, .svg, .png or .pdf; None: the figure is returned, which a notebook shows.
+            path: .svg, .png or .pdf; None: return the figure.
             force: overwrite the file.
 
         Returns:
             The figure as SVG; None where it was written to a file.
 
         Raises:
-            OutputError: the result has no figure; the file's ending is another; it exists and `force` is not given.
+            OutputError: no figure, another extension, or the file exists without `force`.
         """
         if self.drawing is None:
             raise OutputError(f"a {type(self).__name__} has no figure")

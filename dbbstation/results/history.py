@@ -1,4 +1,4 @@
-"""Histories of machines over their sessions: the result of `history`."""
+"""The result of `history`."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class HistorySession:
     """One session of a history.
 
     Attributes:
-        name: of its folder, from the folder of the history.
-        started: start of its first accepted run, ISO 8601.
+        name: folder relative to the history's.
+        started: first accepted run, ISO 8601.
     """
 
     name: str
@@ -27,7 +27,7 @@ class HistorySession:
 
     @property
     def date(self) -> str:
-        """Day on which it was started."""
+        """Return the day of its start."""
         return (self.started or "")[:10]
 
 
@@ -43,10 +43,10 @@ class ChangedQuantity:
 
 @dataclass(frozen=True)
 class HistoryChange:
-    """What changed on a machine from one session on.
+    """Changes of a machine from one session on.
 
     Attributes:
-        beside: what else is new in that session, in words.
+        beside: other news of that session, in words.
     """
 
     verdict: str
@@ -58,12 +58,12 @@ class HistoryChange:
 
 @dataclass(frozen=True)
 class HistoryEvent:
-    """Something beyond scatter and uncertainty of one quantity.
+    """An event of one quantity beyond scatter and uncertainty.
 
     Attributes:
         verdict: `changed` or `stands out`.
-        since: name of the session from which it is so.
-        found: name of the session that showed it.
+        since: first session.
+        found: session that showed it.
         decided_by: `stated-uncertainty` or `control-chart`.
     """
 
@@ -77,15 +77,13 @@ class HistoryEvent:
 
 @dataclass(frozen=True)
 class HistoryValue:
-    """One quantity in one session, with what the chart made of it; None where it was not watched.
+    """One quantity in one session, with the chart's values; None if not watched.
 
     Attributes:
-        started: start of the session, ISO 8601.
-        value: mean over the runs of the session, in the quantity's unit.
-        u: its standard uncertainty; None where not known.
-        z: standard normal where nothing changes.
-        cusum_high: cumulative sum upwards.
-        cusum_low: cumulative sum downwards.
+        started: ISO 8601.
+        value: mean over runs, in the quantity's unit.
+        u: standard uncertainty; None if unknown.
+        z: standard normal without change.
     """
 
     session: str
@@ -103,21 +101,19 @@ class QuantityHistory:
     """One quantity of one machine over its sessions.
 
     Attributes:
-        quantity: in words; no other of the machine has the same.
-        figure: such as `G`; name of a parameter.
-        test: name of the test; None for a parameter.
-        direction: `ccw` or `cw`; None for a parameter.
-        of: circle in words; of a parameter its error source.
-        why_not: why it is not watched; None where it is.
-        limit: greatest size by the shop's tolerances; None where there is none.
-        conformity: of the last value with that limit [ISO 14253-1].
-        exceeded_sessions: how many are beyond it by more than U.
+        quantity: unique words within the machine.
+        figure: such as `G`, or a parameter.
+        test: None for a parameter.
+        direction: None for a parameter.
+        of: circle in words, or a parameter's error source.
+        why_not: None if watched.
+        limit: greatest size by the shop's tolerances, or None.
+        conformity: of the last value [ISO 14253-1].
+        exceeded_sessions: beyond it by more than U.
         level: of the last stretch.
-        scatter_in_u: scatter of the last stretch, in stated uncertainties.
-        sessions_lacking: sessions that are needed until the next one can be held against those before.
-        decided_by: `stated-uncertainty` or `control-chart`; None where nothing was decided.
-        events: in time order.
-        values: in time order.
+        scatter_in_u: of the last stretch, in stated uncertainties.
+        sessions_lacking: before the next comparison.
+        decided_by: `stated-uncertainty` or `control-chart`, or None.
     """
 
     quantity: str
@@ -143,11 +139,11 @@ class QuantityHistory:
 
 @dataclass(frozen=True)
 class WatchLimits:
-    """Limits that each quantity is watched with, in standard deviations.
+    """Limits of every quantity, in standard deviations.
 
     Attributes:
-        reference: what a cumulative sum loses with each session.
-        single_limit: size from which a single session stands out.
+        reference: subtracted from a cumulative sum with each session.
+        single_limit: size of an outstanding session.
     """
 
     reference: float
@@ -161,9 +157,8 @@ class MachineHistoryResult:
 
     Attributes:
         machine: serial number or name.
-        sessions: in time order.
-        false_alarms_expected: over this history if nothing changed.
-        quantities: circles first, in the order of tests, then parameters.
+        false_alarms_expected: over this history without change.
+        quantities: circles by test, then parameters.
     """
 
     machine: str
@@ -178,11 +173,7 @@ class MachineHistoryResult:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A session or model that could not be used.
-
-    Attributes:
-        name: of its folder or file.
-    """
+    """An unusable session or model."""
 
     name: str
     problem: str
@@ -193,10 +184,10 @@ class HistoryResult(Framed):
     """Histories of the machines whose sessions lie in a folder.
 
     Attributes:
-        false_alarms_per_session: that the limits are made for, all quantities of a machine together.
-        figures: what the figures of circles mean.
-        worked_out: sessions and models that were read now; the others came from the index.
-        model_warnings: what has to be said of the model of each session, by the session's name; `remarks` begin with it.
+        false_alarms_per_session: over all quantities of a machine.
+        figures: meaning of the figures.
+        worked_out: sessions and models read now, not from the index.
+        model_warnings: of each session's model, by session; `remarks` begin with them.
     """
 
     coverage_factor: float
@@ -210,7 +201,7 @@ class HistoryResult(Framed):
     model_warnings: Annotated[Mapping[str, tuple[str, ...]], Kept] = field(default_factory=dict)
 
     def rows(self) -> list[dict[str, object]]:
-        """One row for each machine, quantity and session, None where there is nothing."""
+        """Return a row per machine, quantity and session, None for gaps."""
         return [
             {
                 "machine": machine.machine,

@@ -1,4 +1,4 @@
-"""Recordings that another program made, as a session: the result of `import`."""
+"""The result of `import`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ class TakenRun:
     """A run of the new session.
 
     Attributes:
-        computed: what was worked out and is in no file.
+        computed: values that no file has.
     """
 
     file: str
@@ -22,12 +22,12 @@ class TakenRun:
 
 @dataclass(frozen=True)
 class ImportResult:
-    """What was taken in.
+    """Recordings taken in.
 
     Attributes:
-        written: whether it was; False for a dry run.
-        mapping: what columns mean, as the mapping's file has it.
-        statements: what was assumed, worked out or left out; the session notes them.
+        written: False for a dry run.
+        mapping: content of the mapping's file.
+        statements: assumptions, computations and omissions, noted in the session.
     """
 
     session: str

@@ -1,4 +1,4 @@
-"""Instruments that are known: the result of `instruments`."""
+"""The result of `instruments`."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class InstrumentResult:
     """An instrument.
 
     Attributes:
-        profile: variant that is shown; empty where there is one.
-        line: settings of its serial line, as its protocol file has them.
-        protocol: everything that its file says; absent in the list.
+        profile: shown variant, or empty.
+        line: serial settings of its protocol file.
+        protocol: whole file; absent in the list.
     """
 
     name: str
@@ -40,7 +40,7 @@ class InstrumentResult:
 
 @dataclass(frozen=True)
 class InstrumentsResult:
-    """All instruments that are known."""
+    """All known instruments."""
 
     instruments: tuple[InstrumentResult, ...]
 
@@ -49,7 +49,7 @@ def instrument_result(protocol: Protocol, profiles: Iterable[str], *, whole: boo
     """Return an instrument.
 
     Args:
-        whole: with everything that its file says.
+        whole: include the whole file.
     """
     return InstrumentResult(
         name=protocol.name,

@@ -1,4 +1,4 @@
-"""Balls of a jig as a CMM measured them, and how well holders put them back: the results of `jig`."""
+"""The results of `jig`."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class MeasuredBall:
-    """A ball.
+    """A measured ball.
 
     Attributes:
         centre_mm: X, Y, Z in the jig's frame.
-        change_um: against the jig before, X, Y, Z; None where that has no such ball.
+        change_um: against the former jig, X, Y, Z; None for a new ball.
     """
 
     centre_mm: tuple[float, ...]
@@ -47,15 +47,15 @@ class HolderScatter:
 
 @dataclass(frozen=True)
 class HolderResult:
-    """How well a holder puts its ball back.
+    """A holder's repeatability.
 
     Attributes:
-        repeatability_um: standard deviation per axis, as a jig file has it [µm].
-        axes: of x, y and, where it was measured, z.
+        repeatability_um: standard deviation per axis, as in a jig file.
+        axes: x, y and, if measured, z.
         level: probability of the intervals.
-        rms_distance_um: root mean square of the distance from the mean place [µm].
-        p_axes_alike: probability of a ratio of variances as great as this if all axes scatter alike.
-        of_cmm_um: standard deviation of the CMM's readings that was taken off [µm].
+        rms_distance_um: from the mean place.
+        p_axes_alike: probability of so large a ratio of variances for equal axes.
+        of_cmm_um: subtracted standard deviation of the CMM.
     """
 
     repeatability_um: float
@@ -75,7 +75,7 @@ class HoldersResult:
     """What `jig holders` found.
 
     Attributes:
-        jig: file that it was written to; None for none.
+        jig: written file, or None.
     """
 
     holders: Mapping[str, HolderResult]
@@ -83,7 +83,7 @@ class HoldersResult:
 
 
 def holder_result(one: Repeatability) -> HolderResult:
-    """Return how well a holder puts its ball back."""
+    """Return a holder's repeatability."""
     return HolderResult(
         repeatability_um=one.together.s_um,
         together=_scatter(one.together),

@@ -1,4 +1,4 @@
-"""A session as it was measured: the result of `measure`."""
+"""The result of `measure`."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ class RecordedRun:
     """A run of the session.
 
     Attributes:
-        direction: `ccw` or `cw`.
-        repeat: counts runs of this test and direction.
-        mounting: of the ball; None where nobody counted.
+        mounting: of the ball; None if not counted.
     """
 
     test: str
@@ -29,13 +27,13 @@ class RecordedRun:
 
 @dataclass(frozen=True, kw_only=True)
 class CompletedRun(RecordedRun):
-    """A run that was measured now, with its first figures.
+    """A newly measured run with its first figures.
 
     Attributes:
-        lost: samples that did not arrive.
-        doubtful: samples that the instrument marked.
-        problem: why it shows no circle; None where it does.
-        centre_deviation_um: absent where it shows no circle [µm].
+        lost: missing samples.
+        doubtful: samples marked by the instrument.
+        problem: None with a circle.
+        centre_deviation_um: absent without a circle.
     """
 
     samples: int
@@ -53,10 +51,8 @@ class MeasuredSession:
     """A session.
 
     Attributes:
-        state: of the sequence when it ended.
-        fault: what ended it; None for none.
-        planned: runs of the plan.
-        missing: of them, as people read them.
+        state: of the sequence at its end.
+        fault: that ended it, or None.
     """
 
     session: str

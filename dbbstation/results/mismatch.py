@@ -1,4 +1,4 @@
-"""Where a simulation and a recording differ, and what was left out: the result of `mismatch`."""
+"""The result of `mismatch`."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class VariableResult:
 
     Attributes:
         kind: such as `angle` or `time`.
-        unit: of its values; empty where it has none.
-        period: after which it is the same again, in that unit; None where it has none.
+        unit: may be empty.
+        period: in that unit, or None.
     """
 
     name: str
@@ -38,14 +38,14 @@ class VariableResult:
 
 @dataclass(frozen=True)
 class OffsetResult(Value):
-    """Measured less simulated value on average."""
+    """Mean of measured less simulated value."""
 
     significant: bool
 
 
 @dataclass(frozen=True)
 class SearchBeginning:
-    """What a search that began in one way ended at."""
+    """The end of a search from one beginning."""
 
     beside: str
     log_odds: float
@@ -57,12 +57,12 @@ class NoiseResult:
     """Noise of one row.
 
     Attributes:
-        sigma: standard deviation, in the unit of the table.
-        rows_as_one: neighbours that count as one row, since their noise is alike.
-        measured_in_order: whether the order of the rows is known.
-        order: of the autoregression that describes neighbours.
-        degrees_of_freedom: of Student's t; None where it is normal.
-        grows_with: variable that its variance grows with; None where it is the same everywhere.
+        sigma: standard deviation, in the table's unit.
+        rows_as_one: correlated neighbours that count as one row.
+        measured_in_order: whether the row order is known.
+        order: of the autoregression.
+        degrees_of_freedom: of Student's t; None for normal noise.
+        grows_with: variable of its variance, or None.
     """
 
     sigma: float
@@ -76,10 +76,10 @@ class NoiseResult:
 
 @dataclass(frozen=True)
 class ResidualRms:
-    """Root mean square of measured less simulated values, in the unit of the table.
+    """Rms of measured less simulated values, in the table's unit.
 
     Attributes:
-        before: with parameters refitted and nothing found.
+        before: parameters refitted, no effects.
     """
 
     before: float
@@ -88,11 +88,11 @@ class ResidualRms:
 
 @dataclass(frozen=True)
 class HeldOutPart:
-    """Errors of one part that took no part in anything, in the unit of the table.
+    """Errors of one held-out part, in the table's unit.
 
     Attributes:
         as_simulated: rms of measured less simulated value.
-        before: with parameters refitted.
+        before: parameters refitted.
     """
 
     name: str
@@ -104,11 +104,11 @@ class HeldOutPart:
 
 @dataclass(frozen=True)
 class HeldOutRms:
-    """Errors of all held-out parts, in the unit of the table.
+    """Errors of all held-out parts, in the table's unit.
 
     Attributes:
-        before: with parameters refitted.
-        worse: whether corrected values predict worse than those as simulated.
+        before: parameters refitted.
+        worse: whether corrected values predict worse than simulated ones.
     """
 
     as_simulated: float
@@ -120,12 +120,12 @@ class HeldOutRms:
 
 @dataclass(frozen=True)
 class VariableShare:
-    """What of the mismatch follows one variable.
+    """Part of the mismatch that follows one variable.
 
     Attributes:
-        rms: of all effects over it, in the unit of the table.
-        share: of all that is explained, what these bring alone.
-        terms: how many effects.
+        rms: of all its effects, in the table's unit.
+        share: of the explained part, by these alone.
+        terms: number of effects.
     """
 
     variable: str
@@ -140,18 +140,18 @@ class EffectResult:
     """What was found of one effect.
 
     Attributes:
-        verdict: one of the six words of docs/verdicts.md.
+        verdict: see docs/verdicts.md.
         acts: `always` or `once`.
-        persists: it happened once, and other parts tell of it, too.
-        recurs: it happened more than once.
-        gains: in parts that did not choose it; None where these were not asked for.
-        form: family of forms; None for physics of one's own.
-        sigmas: norm of it over its standard deviation.
-        confounded: R² of it on the parameters.
-        rows: first and last row of what happened once.
+        persists: a single event, confirmed by other parts.
+        recurs: several events.
+        gains: in parts that did not choose it; None if not tested.
+        form: family; None for own physics.
+        sigmas: norm over standard deviation.
+        confounded: R² on the parameters.
+        rows: first and last of a single event.
         blocks: size in each run, by name.
-        equivalent: effects that these rows cannot tell from it.
-        resembles: R² of it on named forms.
+        equivalent: effects indistinguishable by these rows.
+        resembles: R² on named forms.
     """
 
     name: str
@@ -180,15 +180,15 @@ class EffectResult:
 
 @dataclass(frozen=True)
 class RefittedResult:
-    """A parameter of the simulation, fitted anew.
+    """A refitted parameter of the simulation.
 
     Attributes:
-        before: change alone, by ordinary least squares.
-        after: change beside what was found.
-        confounded: R² of the parameter on what was found.
-        known: standard uncertainty to which it was known before; None where it was free.
-        stated: whether the user gave that.
-        far: whether it moved so far that its derivative, or what was known of it, must be asked again.
+        before: change by ordinary least squares alone.
+        after: change beside the effects.
+        confounded: R² of the parameter on the effects.
+        known: prior standard uncertainty; None if free.
+        stated: whether the user stated it.
+        far: whether derivative or prior must be renewed after so large a change.
     """
 
     name: str
@@ -211,24 +211,24 @@ class NextMeasurement:
 
 @dataclass(frozen=True, kw_only=True)
 class MismatchResult(Framed):
-    """What is found of a table of measured and simulated values.
+    """Findings in a table of measured and simulated values.
 
     Attributes:
-        unit: of measured and simulated values; empty where it has none.
-        blocks: names of the runs.
+        unit: of these values; may be empty.
+        blocks: names of runs.
         variables: that the difference may follow.
-        levels: whether anything differs, what it follows, which law it is.
-        mismatch: whether there is more than noise.
-        offset: measured less simulated on average; None where none was allowed.
-        held_out_rms: errors of held-out parts; None where not tested.
-        cancelling: effects that cancel each other; None where none do.
-        parameters: of the simulation, fitted anew.
-        left: whether something is left beyond noise.
-        second_start_agrees: whether a search that begins with nothing ends at the same effects.
-        not_asked: physics of one's own that could not be asked, and why, by name.
-        out: file of the corrected table; absent where none was written.
-        figure: file of the figure; absent where none was written.
-        table: columns of the files by name, with the corrected simulation and what it leaves as further ones.
+        levels: existence, variables and law of a difference.
+        mismatch: whether it exceeds noise.
+        offset: mean difference; None if not allowed.
+        held_out_rms: None if not tested.
+        cancelling: None without such effects.
+        parameters: refitted.
+        left: whether anything exceeds noise.
+        second_start_agrees: whether a search from nothing agrees.
+        not_asked: own physics not tested, with reasons by name.
+        out: absent if none was written.
+        figure: absent if none was written.
+        table: columns by name, with corrected simulation and residual.
     """
 
     unit: str
@@ -256,7 +256,7 @@ class MismatchResult(Framed):
     table: Annotated[Mapping[str, tuple[str | float, ...]], AsItIs, Kept]
 
     def rows(self) -> list[dict[str, object]]:
-        """One dictionary for each effect."""
+        """Return one row per effect."""
         return [
             {
                 "name": one.name,

@@ -1,4 +1,4 @@
-"""What has to be said of a model wherever its numbers are used: physics that it lacks, causes that are not decided or unknown."""
+"""Warnings of a model: missing physics, undecided and unknown causes."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ LEAST_PRINTED = 1e-99
 
 
 def model_warnings(identified: IdentifiedModel) -> tuple[str, ...]:
-    """Return what whoever uses a model has to know first, one sentence each; empty where nothing speaks against it.
+    """Return a model's warnings, a sentence each; may be empty.
 
     Args:
-        identified: the model, with the numbers that its fit reported.
+        identified: with its fit's numbers.
     """
     report = identified.report
     told = [*missing_physics_warnings(report), *_undecided(report), *unknown_cause_notes(identified.model)]
@@ -25,13 +25,13 @@ def model_warnings(identified: IdentifiedModel) -> tuple[str, ...]:
 
 
 def lacks_physics(report: Mapping[str, Any]) -> bool:
-    """Return whether the fit of a model said that physics is missing."""
+    """Return whether a fit reported missing physics."""
     misfit = report.get("misfit")
     return isinstance(misfit, Mapping) and misfit.get("missing_physics") is True
 
 
 def missing_physics_warnings(report: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the warning that physics is missing; empty where chance explains what the model leaves."""
+    """Return the warning of missing physics; empty if chance explains the residual."""
     if not lacks_physics(report):
         return ()
     misfit = report["misfit"]
@@ -44,21 +44,21 @@ def missing_physics_warnings(report: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def exceeds(rms_um: float, probability: float) -> str:
-    """Return by how much a residual exceeds what chance explains, in words.
+    """Return how far a residual exceeds chance, in words.
 
     Args:
-        rms_um: beyond noise and mountings [µm].
+        rms_um: beyond noise and mountings.
     """
     return f"the residual exceeds noise and mountings by {rms_um:.2f} µm rms (probability by chance {chance_in_words(probability)})"
 
 
 def chance_in_words(probability: float) -> str:
-    """Return the probability of an F test as printed; the smallest ones underflow."""
+    """Return an F test's probability as printed; the smallest underflow."""
     return "below 1e-99" if probability < LEAST_PRINTED else f"{probability:.1g}"
 
 
 def _undecided(report: Mapping[str, Any]) -> list[str]:
-    """Causes that a diagnosis could not tell apart, and what it found that predicts worse."""
+    """Return undecided causes, and findings that predict worse."""
     said = report.get("diagnosis")
     if not isinstance(said, Mapping):
         return []
@@ -73,7 +73,7 @@ def _lists(said: Mapping[str, Any]) -> list[Sequence[str]]:
 
 
 def unknown_cause_notes(model: MachineModel) -> list[str]:
-    """Say of a model that keeps an error that its cause is unknown."""
+    """Return notes on a kept error of unknown cause."""
     return [
         f"the model has {name}, an error whose cause is unknown; it holds where it was measured, while it lasts"
         for name in unknown_causes(model)
@@ -81,6 +81,6 @@ def unknown_cause_notes(model: MachineModel) -> list[str]:
 
 
 def unknown_causes(model: MachineModel) -> tuple[str, ...]:
-    """Names of the sources of a model that describe an error without a cause."""
+    """Return a model's sources without a cause."""
     own = model.of_the_machine().sources
     return tuple(fitted.source.name for fitted in own if not fitted.source.candidate and fitted.values.any())

@@ -1,4 +1,4 @@
-"""From the comparison of two sessions to its result."""
+"""From a comparison of two sessions to its result."""
 
 from __future__ import annotations
 
@@ -37,11 +37,10 @@ def comparison_result(
     drawing: Callable[[object], bytes] | None = None,
     notes: tuple[str, ...] = (),
 ) -> ComparisonResult:
-    """Return everything that a comparison reports; lengths in µm, runs largest first.
+    """Return the result of a comparison; lengths in µm, largest runs first.
 
     Args:
-        unlike: what else was not alike.
-        notes: what was noticed in the files.
+        unlike: other differences.
     """
     largest_first = sorted(found.runs, key=lambda run: (-run.differs, -float(np.sum(run.found_mm**2)), -run.rms_mm))
     pairs, halves, held_out = found.matching, found.halves_mm, found.trial.held_out

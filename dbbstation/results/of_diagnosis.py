@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 
 
 def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> DiagnosisFigures:
-    """Return everything that a diagnosis says.
+    """Return the figures of a diagnosis.
 
     Args:
-        lacking: why further sources could not be looked at, by name.
+        lacking: reasons against further sources, by name.
     """
     rest = diagnosis.unexplained
     before, after = diagnosis.held_out
@@ -94,17 +94,13 @@ def diagnosis_result(
     drawing: Callable[[object], bytes],
     notes: tuple[str, ...],
 ) -> DiagnosisResult:
-    """Return the whole result of a diagnosis.
-
-    Args:
-        notes: what was noticed on the way.
-    """
+    """Return the whole result of a diagnosis."""
     own = {one.name: getattr(figures, one.name) for one in fields(DiagnosisFigures)}
     return DiagnosisResult(**{**own, "drawing": drawing, "notes": notes}, effects=effects, model=model)
 
 
 def kept_of(figures: DiagnosisFigures) -> dict[str, object]:
-    """Return what a model file keeps of the diagnosis that it comes from: what speaks against its causes."""
+    """Return what a model file keeps of its diagnosis: doubts about causes."""
     open_ones = (one for one in figures.sources if one.verdict == Verdict.AMBIGUOUS)
     groups = {frozenset((one.name, *one.ambiguous_with)): [one.name, *one.ambiguous_with] for one in open_ones}
     return {
@@ -115,7 +111,7 @@ def kept_of(figures: DiagnosisFigures) -> dict[str, object]:
 
 
 def _circularity(diagnosis: Diagnosis) -> tuple[CircularityLeft, ...]:
-    """Circularity that is left of every run, under the kinematic and the joint model."""
+    """Return every run's residual circularity under both models."""
     return tuple(
         CircularityLeft(
             run.test,
@@ -145,7 +141,7 @@ def _workspace(diagnosis: Diagnosis) -> WorkspaceGain | None:
 
 
 def _mountings(diagnosis: Diagnosis) -> list[CauseResult]:
-    """Balls and bars that are not what they should be, under the names of the sources that say so."""
+    """Return deviating balls and bars by source name."""
     causes = []
     for name in dict.fromkeys(SOURCE_OF.values()):
         of = [outlier for outlier in diagnosis.outliers if SOURCE_OF.get(outlier.kind) == name]

@@ -1,4 +1,4 @@
-"""From worked-out histories to their result."""
+"""From histories to their result."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ def history_result(
     """Return histories as a result.
 
     Args:
-        left_out: sessions and models that could not be used, by name, with the reason.
-        worked_out: sessions and models that were read now.
-        model_warnings: what has to be said of the model of each session, by the session's name.
+        left_out: unusable sessions and models with reasons, by name.
+        worked_out: sessions and models read now.
+        model_warnings: of each session's model, by session.
     """
     return HistoryResult(
         coverage_factor=asked.coverage_factor,
@@ -115,7 +115,7 @@ def _changes(one: MachineHistory, sessions: Sequence[HistorySession]) -> Iterato
 
 
 def _beside(sessions: Sequence[SessionFigures], since: int) -> Iterator[str]:
-    """Yield what else is new in a session, where it may be why something changed."""
+    """Yield other news of a session that may explain a change."""
     if not since:
         return
     before, after = sessions[since - 1], sessions[since]

@@ -1,4 +1,4 @@
-"""From the comparison of a table to its result."""
+"""From a table's comparison to its result."""
 
 from __future__ import annotations
 
@@ -36,12 +36,10 @@ def mismatch_result(
     drawing: Callable[[object], bytes] | None = None,
     notes: tuple[str, ...] = (),
 ) -> MismatchResult:
-    """Return everything that is reported of a table.
+    """Return the result of a table.
 
     Args:
-        found: the comparison.
-        table: columns of the files, with the corrected simulation; None: none.
-        notes: what was noticed in the files.
+        table: columns with the corrected simulation; None: none.
     """
     compared = found.table
     return MismatchResult(

@@ -1,4 +1,4 @@
-"""From measured circles and tolerances to the figures of a report, now beside before."""
+"""From circles and tolerances to a report's figures, now and before."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def tolerances_by_test(
     both: tuple[Sequence[ToleratedCircle], Sequence[ToleratedCircle]],
     coverage_factor: float,
 ) -> Iterable[ToleranceOfTest]:
-    """Yield every tolerance held against the circles of each test that it is for."""
+    """Yield every tolerance against the circles of each of its tests."""
     for test in tests:
         now, before = ([one for one in circles if one.test == test] for circles in both)
         for one in tolerances:
@@ -43,7 +43,7 @@ def tolerances_by_test(
 def compared(
     tolerance: Tolerance, now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle], coverage_factor: float
 ) -> ComparedTolerance:
-    """Return what one tolerance says of circles now and before; nothing of before where it holds for none of them."""
+    """Return one tolerance against circles now and before, if it applies."""
     (held,) = held_against((tolerance,), now, coverage_factor)
     (former,) = held_against((tolerance,), before, coverage_factor)
     told = None if former.worst is None else _held(former, coverage_factor)
@@ -76,7 +76,7 @@ def _worst(held: Held, coverage_factor: float) -> WorstCircle | None:
 
 
 def side_by_side(now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle]) -> Iterable[MeasuredFigures]:
-    """Yield figures as measured, each with those of the same test, direction and repeat before."""
+    """Yield measured figures, with those of the same test, direction and repeat before."""
     former = {one.key: _sizes(one) for one in before}
     for one in now:
         yield MeasuredFigures(
@@ -89,7 +89,7 @@ def _sizes(one: ToleratedCircle) -> dict[str, MeasuredSize]:
 
 
 def means_of(measured: Sequence[MeasuredFigures]) -> Iterable[MeasuredMean]:
-    """Yield mean and largest of each figure; with those before of the circles that were measured both times."""
+    """Yield mean and largest of each figure, also of circles measured both times."""
     both = [one for one in measured if one.before is not None]
     taken = both or measured
     for figure in OF_A_MODEL:

@@ -31,7 +31,7 @@ HIDDEN = 0.1
 
 
 def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -> SimulatorResult:
-    """Return everything that is reported of a simulator."""
+    """Return the result of a simulator."""
     found, settled, model = answer.found, answer.found.settled, answer.model
     return SimulatorResult(
         simulator=model.name,
@@ -109,7 +109,7 @@ def _term(answer: SimulatorComparison, one: CauseFinding) -> PortTerm:
 
 
 def _why(one: CauseFinding) -> str:
-    """Sentence for a finding that has none of its own."""
+    """Return a sentence for a finding without one."""
     if one.verdict is not Verdict.IDENTIFIED:
         return ""
     hidden = f" The parameters had taken up {100.0 * one.confounded:.0f} % of it." if one.confounded > HIDDEN else ""

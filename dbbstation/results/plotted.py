@@ -1,4 +1,4 @@
-"""What a figure of circles shows: the result of `plot`."""
+"""The result of `plot`."""
 
 from __future__ import annotations
 
@@ -9,13 +9,11 @@ from dbbstation.results.circle_figures import PlaneVector
 
 @dataclass(frozen=True)
 class DrawnCircle:
-    """A run on the sheet.
+    """A drawn run.
 
     Attributes:
-        direction: `ccw` or `cw`.
-        repeat: counts runs of this test and direction.
-        u_g_um: its standard uncertainty; None where not known [µm].
-        centre_um: least-squares centre less the commanded one [µm].
+        u_g_um: standard uncertainty; None if unknown.
+        centre_um: least-squares less commanded centre.
     """
 
     session: str
@@ -29,13 +27,7 @@ class DrawnCircle:
 
 @dataclass(frozen=True)
 class PlotResult:
-    """A figure.
-
-    Attributes:
-        kind: what it shows of the circles.
-        drawn: runs in drawing order.
-        one_direction_only: tests that were measured in one direction, in words.
-    """
+    """A figure of circles."""
 
     figure: str
     kind: str

@@ -1,4 +1,4 @@
-"""Where the tool really goes: the result of `predict`."""
+"""The result of `predict`."""
 
 from __future__ import annotations
 
@@ -25,19 +25,18 @@ class PredictionResult(Framed):
     """Actual poses for commanded ones.
 
     Attributes:
-        file: table that was written; None where none was.
-        error_rms_um: root mean square of these [µm].
-        common_shift_um: mean of X, Y and Z, which a program whose zero is set on the part does not feel [µm].
-        error_about_mean_rms_um: root mean square without it [µm].
-        greatest_uncertainty_um: standard uncertainty of a position, where it is greatest; None where not known [µm].
+        file: None if none was written.
+        common_shift_um: mean of X, Y and Z, without effect on a part-set zero.
+        error_about_mean_rms_um: without the common shift.
+        greatest_uncertainty_um: standard, of a position; None if unknown.
         greatest_uncertainty_by_axis_um: the same of X, Y and Z each.
-        uncertainty_not_known_because: why; None where it is known.
-        directions_lost: what the recordings of the model could not determine.
-        unknown_causes: sources of the model that describe an error without a cause.
-        model_warnings: what speaks against the model, such as physics that it lacks.
+        uncertainty_not_known_because: None if known.
+        directions_lost: undetermined by the model's recordings.
+        unknown_causes: sources without a cause.
+        model_warnings: such as missing physics.
         commanded: poses, shape (n, 6) [mm, deg].
         actual: poses, shape (n, 6) [mm, deg].
-        uncertainty_mm: standard uncertainties of X, Y and Z, shape (n, 3) [mm]; NaN where not known.
+        uncertainty_mm: standard, of X, Y and Z, shape (n, 3); NaN if unknown.
     """
 
     file: Annotated[str | None, Absent] = None
@@ -57,7 +56,7 @@ class PredictionResult(Framed):
     uncertainty_mm: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
 
     def rows(self) -> list[dict[str, object]]:
-        """Actual poses with standard uncertainties of their positions, one row for each."""
+        """Return actual poses with standard uncertainties, a row each."""
         rows = []
         for pose, known in zip(self.actual.tolist(), self.uncertainty_mm.tolist(), strict=True):
             row: dict[str, object] = dict(zip(NAMES, pose, strict=True))
@@ -78,8 +77,7 @@ def prediction_result(
     Args:
         commanded: shape (n, 6) [mm, deg].
         actual: shape (n, 6) [mm, deg].
-        uncertainty_mm: shape (n, 3) [mm]; NaN where not known.
-        file: table that was written.
+        uncertainty_mm: shape (n, 3); NaN if unknown.
     """
     figures = pose_errors(commanded, actual, uncertainty_mm)
     unknown = None in figures.greatest_uncertainty_by_axis_um.values()

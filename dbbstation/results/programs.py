@@ -1,4 +1,4 @@
-"""NC programs that were written: the result of `compensate` and `program`."""
+"""The result of `compensate` and `program`."""
 
 from __future__ import annotations
 
@@ -22,21 +22,20 @@ class WrittenProgram:
     """One program.
 
     Attributes:
-        file: that was written; its name where none was.
+        file: or its name if not written.
         points: moves at feed.
-        greatest_correction_um: of a programmed point; None in a nominal program [µm].
-        chord_error_um: largest distance between a move and the path that it stands for [µm].
-        model_uncertainty_um: greatest standard uncertainty of the tool tip along the path; None where not known [µm].
-        model_uncertainty_by_axis_um: the same of X, Y and Z each; None in a nominal program.
-        model_uncertainty_not_known_because: why; None where it is known.
-        tilt_left_um: correction of the tilt that was left out, as felt 100 mm from the tip [µm].
-        feed_s: time of all moves at feed, as the control plans them [s].
-        rapid_s: time of all rapids, as the control plans them at the machine's greatest feed [s].
-        merged_um: distance of points that were left out from the lines in their place; None where short moves were not made one
-            [µm].
-        cost: what a preference cost, in words; empty without one.
-        slower_rapids: what rapids lose, in words; empty where that is next to nothing.
-        merged: what making short moves one costs, in words; empty where none were.
+        greatest_correction_um: None in a nominal program.
+        chord_error_um: largest distance between a move and its path.
+        model_uncertainty_um: greatest standard uncertainty of the tool tip along the path; None if unknown.
+        model_uncertainty_by_axis_um: of X, Y and Z; None in a nominal program.
+        model_uncertainty_not_known_because: None if known.
+        tilt_left_um: tilt correction left out, felt 100 mm from the tip.
+        feed_s: time at feed as the control plans it.
+        rapid_s: time of rapids at the machine's greatest feed.
+        merged_um: distance of left-out points from merged lines; None if not merged.
+        cost: of a preference, in words; may be empty.
+        slower_rapids: loss in words; empty if negligible.
+        merged: cost of merging in words; empty if none.
     """
 
     file: str
@@ -65,11 +64,11 @@ class ProgramsResult(Framed):
     """Programs, nominal or compensated.
 
     Attributes:
-        model_sha256: of the model's file; None where no file was given.
-        acceleration_mm_s2: that pieces are chosen for; None where the dialect says no look-ahead [mm/s²].
+        model_sha256: of its file, or None.
+        acceleration_mm_s2: that pieces suit; None if the dialect states no look-ahead.
         acceleration_known: whether the machine file states it.
-        model_warnings: what speaks against the model, such as physics that it lacks; empty of nominal programs.
-        acceleration_in_words: the acceleration, and where it is known from; empty where there is none.
+        model_warnings: such as missing physics; empty for nominal programs.
+        acceleration_in_words: with its origin; may be empty.
     """
 
     dialect: str
@@ -81,7 +80,7 @@ class ProgramsResult(Framed):
     acceleration_in_words: Annotated[str, Kept] = ""
 
     def rows(self) -> list[dict[str, object]]:
-        """Programs, one row for each."""
+        """Return one row per program."""
         return [
             {
                 "file": one.file,
@@ -109,8 +108,7 @@ def programs_result(
     """Return programs as a result.
 
     Args:
-        machine: that compensated programs are for; None of nominal ones.
-        notes: what was noticed on the way.
+        machine: of compensated programs; else None.
     """
     planned = None if dialect.look_ahead is None else machine
     return ProgramsResult(

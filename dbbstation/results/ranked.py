@@ -1,4 +1,4 @@
-"""Causes of a model beside measured circles, ranked by what they contribute, and a sentence of each."""
+"""Causes of a model ranked by their contribution to circles."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Ranked:
     """Causes beside the circles.
 
     Attributes:
-        verdicts: of the diagnosis that the model comes from, by cause.
-        why_not: why there are none; empty where there are.
+        verdicts: of the model's diagnosis, by cause.
+        why_not: why there are none; else empty.
     """
 
     session: str = ""
@@ -29,7 +29,7 @@ class Ranked:
 
 
 def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:
-    """Return the causes in the order of what they contribute, one sentence each with the cure."""
+    """Return the causes by contribution, a sentence each with the cure."""
     told = []
     for rank, one in enumerate(ranked.effects, start=1):
         g, g_u = with_uncertainty(one.g_um, expanded_uncertainty(one.g_u_um, coverage_factor))

@@ -1,4 +1,4 @@
-"""What a report shows: the result of `report`."""
+"""The result of `report`."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from dbbstation.results.frame import Framed
 
 @dataclass(frozen=True)
 class ReportVerdict:
-    """What a foreman reads first.
+    """The report's first statement.
 
     Attributes:
-        kind: `within`, `exceeded`, `cannot tell` or `none`, where nothing was held against anything.
-        reasons: one sentence for each tolerance that is not kept.
-        to_do: what to do, in order.
+        kind: `within`, `exceeded`, `cannot tell`, or `none` without tolerances.
+        reasons: a sentence for each broken tolerance.
+        to_do: in order.
     """
 
     kind: str
@@ -35,9 +35,8 @@ class CertificateState:
     """Whether a report is a certificate.
 
     Attributes:
-        title: what stands at its top.
-        lacking: what a certificate needs and this report has not; empty where it is one.
-        place: where it was measured; None where nobody says.
+        lacking: missing parts; empty for a certificate.
+        place: None if not stated.
     """
 
     title: str
@@ -47,13 +46,12 @@ class CertificateState:
 
 @dataclass(frozen=True)
 class WorstCircle:
-    """The circle with the largest figure that a tolerance is for.
+    """The circle with the largest toleranced figure.
 
     Attributes:
-        direction: `ccw` or `cw`; `both` of both directions together.
-        repeat: counts runs of this test and direction.
-        expanded_um: U = k u of it [µm]; None where not known.
-        why_not: why it is not known; None where it is.
+        direction: `ccw` or `cw`; `both` for both together.
+        expanded_um: U = k u; None if unknown.
+        why_not: None if known.
     """
 
     test: str
@@ -66,19 +64,18 @@ class WorstCircle:
 
 @dataclass(frozen=True, kw_only=True)
 class HeldTolerance:
-    """A tolerance held against circles [ISO 14253-1].
+    """A tolerance against circles [ISO 14253-1].
 
     Attributes:
-        filter: of that figure in words; None where none acts on it.
-        tests: that it holds for; empty for all.
-        directions: that it holds for; empty for both.
-        conformity: `exceeded` where one circle exceeds it, else `cannot tell` where one is within U of it; None where it holds
-            for none.
+        filter: of the figure in words, or None.
+        tests: empty for all.
+        directions: empty for both.
+        conformity: `exceeded` if one circle exceeds it, else `cannot tell` if one is within U; None without circles.
         within: whether no circle exceeds it or is undecided.
-        exceeded: how many circles exceed it.
-        undecided: how many lie within U of it.
-        circles: how many it holds for.
-        worst: the one with the largest figure; None where it holds for none.
+        exceeded: number of circles.
+        undecided: number of circles within U.
+        circles: number that it applies to.
+        worst: circle with the largest figure, or None.
     """
 
     quantity: str
@@ -99,7 +96,7 @@ class ComparedTolerance(HeldTolerance):
     """A tolerance held against circles now, and against those before.
 
     Attributes:
-        before: the same tolerance and the circles before; None where it holds for none of them.
+        before: None without applicable circles.
     """
 
     before: HeldTolerance | None
@@ -107,7 +104,7 @@ class ComparedTolerance(HeldTolerance):
 
 @dataclass(frozen=True, kw_only=True)
 class ToleranceOfTest(ComparedTolerance):
-    """A tolerance held against the circles of one test."""
+    """A tolerance against the circles of one test."""
 
     test: str
 
@@ -117,7 +114,7 @@ class MeasuredSize:
     """A figure of one circle as measured.
 
     Attributes:
-        u_um: its standard uncertainty [µm]; None where a cause of unknown size counts.
+        u_um: standard uncertainty; None if a cause of unknown size counts.
     """
 
     um: float
@@ -126,12 +123,7 @@ class MeasuredSize:
 
 @dataclass(frozen=True)
 class MeasuredFigures:
-    """Figures of one circle as measured, by what they are, beside those of the same test, direction and repeat before.
-
-    Attributes:
-        direction: `ccw` or `cw`.
-        repeat: counts runs of this test and direction.
-    """
+    """Measured figures of one circle, with those of the same run before."""
 
     session: str
     test: str
@@ -151,11 +143,11 @@ class MeanAndLargest:
 
 @dataclass(frozen=True)
 class MeasuredMean:
-    """Mean and largest of a figure over the circles; where there are circles before, over those that were measured both times.
+    """Mean and largest of a figure, over circles measured both times if there are earlier ones.
 
     Attributes:
-        now: over the circles; None without circles.
-        before: over the same circles before; None without those.
+        now: None without circles.
+        before: None without earlier circles.
     """
 
     quantity: str
@@ -166,7 +158,7 @@ class MeasuredMean:
 
 @dataclass(frozen=True)
 class NotEvaluated:
-    """In place of what a model leaves, where that could not be worked out."""
+    """Why a model's residual could not be computed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -174,13 +166,12 @@ class ReportResult(Framed):
     """The numbers of a report, and where it was written.
 
     Attributes:
-        pdf: the same on paper; None where it was not printed.
-        verdict: what the shop's tolerances say.
-        tolerances: of the shop, held against the circles.
+        pdf: None if not printed.
+        verdict: by the shop's tolerances.
         circles: figures after ISO 230-4.
-        causes: what each cause of the model contributes, the greatest first.
-        causes_of: session whose circles they act on; None where there are none.
-        model: what the model leaves; None without a model.
+        causes: contributions, the greatest first.
+        causes_of: session of these circles, or None.
+        model: what it leaves; None without a model.
     """
 
     report: str
@@ -199,7 +190,7 @@ class ReportResult(Framed):
     model: EvaluationResult | NotEvaluated | None
 
     def rows(self) -> list[dict[str, object]]:
-        """Figures of the circles as measured, one row for each; lengths in µm."""
+        """Return one row per circle; lengths in µm."""
         return [
             {
                 "session": one.session,

@@ -1,4 +1,4 @@
-"""From tolerances held against circles to the verdict of a report, with its reasons and what to do."""
+"""The verdict of a report, with reasons and what to do."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def verdict_of(
     """Return the verdict of tolerances held against measured circles.
 
     Args:
-        held: tolerances; empty where the shop has none.
-        identified: a model beside the circles; None where none is given.
-        ranked: its causes, of which the first page names the greatest first; None where none is given.
+        held: empty without tolerances.
+        identified: None without a model.
+        ranked: its causes, the greatest named first; or None.
     """
     said = {one.conformity for one in held}
     repeat = (*_to_repeat(found.circles), *_of_the_model(found, identified))
@@ -82,7 +82,7 @@ def _reason(held: Held, coverage_factor: float) -> str:
 
 
 def _to_repeat(circles: Iterable[MeasuredCircle]) -> list[str]:
-    """What is wrong with runs comes before what is wrong with the machine."""
+    """Return runs to repeat, which comes before repairing the machine."""
     told = []
     for one in circles:
         wrong = () if one.judgement is None else one.judgement.wrong

@@ -1,4 +1,4 @@
-"""What an instrument sees of the circles of a plan."""
+"""What an instrument sees of a plan's circles."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ class SampledCircle:
     """What an instrument sees of one circle.
 
     Attributes:
-        spacing_deg: angle between two readings.
-        enough: whether that is as high as figures need.
+        spacing_deg: between readings.
+        enough: whether figures can be computed.
     """
 
     test: str

@@ -1,4 +1,4 @@
-"""JSON Schemas of what commands print as JSON."""
+"""JSON Schemas of commands' results."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _PROVENANCE = {
 
 
 def result_schema(command: str) -> dict[str, Any]:
-    """Return the JSON Schema of what a command prints with `--json`.
+    """Return the JSON Schema of a command's `--json`.
 
     Raises:
         KeyError: the command has none.

@@ -1,4 +1,4 @@
-"""What is in a session: the results of `session list`, `session log` and `simulate`."""
+"""The results of `session list`, `session log` and `simulate`."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SampleCounts:
-    """What became of the samples of a run.
+    """Counts of a run's samples.
 
     Attributes:
-        received: how many came.
-        lost: how many did not.
-        rejected: how many were not used, by the reason.
+        rejected: unused, by reason.
     """
 
     received: int
@@ -26,12 +24,10 @@ class ListedRun:
     """A run of a session.
 
     Attributes:
-        direction: `ccw` or `cw`.
-        repeat: counts runs of this test and direction.
-        mounting: of the ball; None where nobody counted.
-        started: ISO 8601; None where not noted.
-        reason: why; None for none.
-        file: of its recording, in the session's folder.
+        mounting: of the ball; None if not counted.
+        started: ISO 8601; None if not noted.
+        reason: or None.
+        file: in the session's folder.
     """
 
     run: str
@@ -51,7 +47,7 @@ class ListedSession:
     """The runs of a session.
 
     Attributes:
-        missing: circles of its plan that have no accepted run.
+        missing: planned circles without accepted run.
     """
 
     session: str
@@ -64,8 +60,8 @@ class ListedEvent:
     """An event of a session.
 
     Attributes:
-        at: when, ISO 8601; None where that is not known.
-        about: runs or keys of the session file that it is about.
+        at: ISO 8601; None if unknown.
+        about: its runs or keys of the session file.
     """
 
     event: int
@@ -80,8 +76,8 @@ class SessionEvents:
     """The event log of a session.
 
     Attributes:
-        events: in their order.
-        anchor: link of the last; None without a log.
+        events: in order.
+        anchor: last link; None without a log.
     """
 
     session: str
@@ -91,11 +87,7 @@ class SessionEvents:
 
 @dataclass(frozen=True)
 class SimulatedSession:
-    """A session that was simulated.
-
-    Attributes:
-        tests: of the plan that were run.
-    """
+    """A simulated session."""
 
     session: str
     runs: int

@@ -1,4 +1,4 @@
-"""The shop's settings with where each comes from: the result of `settings`."""
+"""The result of `settings`."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class ShownSetting:
     """One setting.
 
     Attributes:
-        value: in the unit that its key says; None where nobody has set it.
-        origin: file and line, or `dbbstation` for a value of the program's own; None where nobody has set it.
+        value: in the key's unit; None if not set.
+        origin: file and line, or `dbbstation`; None if not set.
     """
 
     value: str | int | float | None
@@ -27,9 +27,9 @@ class ShopTolerance:
     """A tolerance of the shop.
 
     Attributes:
-        filter: of the figure in words; None where none acts on it.
-        tests: that it holds for; empty for all.
-        directions: that it holds for; empty for both.
+        filter: of the figure in words, or None.
+        tests: empty for all.
+        directions: empty for both.
     """
 
     quantity: str
@@ -41,11 +41,11 @@ class ShopTolerance:
 
 @dataclass(frozen=True)
 class SettingsResult:
-    """What the shop has set.
+    """The shop's settings.
 
     Attributes:
-        files: that were read, the first that has a key decides.
-        tolerances_from: file that they come from; None where there are none.
+        files: the first with a key decides.
+        tolerances_from: their file, or None.
     """
 
     files: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""What a simulator lacks, and at which port: the result of `mismatch --simulator`."""
+"""The result of `mismatch --simulator`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class SimulatedOutput:
     """An output of the simulator.
 
     Attributes:
-        noise: standard deviation of one row of it, in its unit.
+        noise: standard deviation of one row, in its unit.
     """
 
     name: str
@@ -38,10 +38,10 @@ class SimulatedRun:
 
 @dataclass(frozen=True)
 class SimulationRms:
-    """Root mean square of measured less simulated values.
+    """Rms of measured less simulated values.
 
     Attributes:
-        corrected: with missing terms put in.
+        corrected: with missing terms.
     """
 
     as_simulated: float
@@ -54,7 +54,7 @@ class SimulationNoise:
     """Noise of one row.
 
     Attributes:
-        degrees_of_freedom: of Student's t; None where it is normal.
+        degrees_of_freedom: of Student's t; None for normal noise.
     """
 
     sigma: float
@@ -64,7 +64,7 @@ class SimulationNoise:
 
 @dataclass(frozen=True)
 class HeldOutSimulation(SimulationRms):
-    """Errors of one part that took no part."""
+    """Errors of one held-out part."""
 
     name: str
     rows: int
@@ -75,7 +75,7 @@ class HeldOutSimulations(SimulationRms):
     """Errors of all held-out parts.
 
     Attributes:
-        worse: whether corrected values predict worse than those as simulated.
+        worse: whether corrected values predict worse than simulated ones.
     """
 
     worse: bool
@@ -87,14 +87,14 @@ class PortTerm:
     """What was found of one term.
 
     Attributes:
-        verdict: one of the six words of docs/verdicts.md.
-        about: what the model file says of that.
+        verdict: see docs/verdicts.md.
+        about: from the model file.
         form: how it follows its signals.
-        sigmas: norm of its effect over its standard deviation.
+        sigmas: norm of its effect over the standard deviation.
         confounded: R² of its effect on the parameters.
-        linear_and_true_differ_by: how far the linear answer is from the simulated one; None where not known.
-        gains: in parts that did not choose it; None where these were not asked for.
-        equivalent: terms that these recordings cannot tell from it.
+        linear_and_true_differ_by: distance of linear and simulated answer; None if unknown.
+        gains: in parts that did not choose it; None if not tested.
+        equivalent: terms indistinguishable by these recordings.
     """
 
     name: str
@@ -121,12 +121,12 @@ class SimulatorParameterResult:
     """A parameter of the simulator.
 
     Attributes:
-        stated: as the model file states it.
-        refitted: without any term.
-        corrected: with what was found put in.
-        shift_over_u: in standard uncertainties of the first; None where that is not known.
-        confounded: R² of it on what was found.
-        not_told_apart_from: parameters that the recordings cannot tell from it; None where they can.
+        stated: in the model file.
+        refitted: without terms.
+        corrected: with the found terms.
+        shift_over_u: in standard uncertainties of the first; None if unknown.
+        confounded: R² on the found terms.
+        not_told_apart_from: indistinguishable parameters, or None.
     """
 
     name: str
@@ -142,14 +142,14 @@ class SimulatorParameterResult:
 
 @dataclass(frozen=True)
 class SeparatingInput:
-    """What to record to tell two terms apart.
+    """A recording that would distinguish two terms.
 
     Attributes:
-        part: stretch of the recordings in which they differ most.
-        sigmas: standard deviations by which they differ there.
-        repeats: of that stretch until they are distinguished.
-        input: under which they would differ most, in words; None where none that was tried does better than those recorded.
-        input_sigmas: standard deviations by which they would differ under it, in a recording as long.
+        part: stretch of largest difference.
+        sigmas: difference there in standard deviations.
+        repeats: of that stretch until distinguished.
+        input: best input in words; None if no tried one beats the recorded.
+        input_sigmas: difference under it, for equal length.
     """
 
     text: str
@@ -164,10 +164,10 @@ class SeparatingInput:
 
 @dataclass(frozen=True)
 class SimulationsRun:
-    """How many simulations it took.
+    """Number of simulations.
 
     Attributes:
-        most: that were allowed; None where nobody set a limit.
+        most: allowed; None without limit.
     """
 
     run: int
@@ -181,15 +181,15 @@ class SimulatorResult(Framed):
     """What a simulator lacks.
 
     Attributes:
-        levels: whether anything differs, which signals at which ports it follows, which term it is.
+        levels: existence, signals and ports, and term of a difference.
         settled: whether the search ended at one set of terms.
-        stopped: why it ended early; empty where it did not.
-        held_out_rms: errors of held-out parts; None where not tested.
-        left: whether something is left beyond noise.
-        not_asked: terms that were not compared in the end, and why, by name.
-        out: file of the missing terms as code; absent where none was written.
-        corrected: file of the corrected values; absent where none was written.
-        figure: file of the figure; absent where none was written.
+        stopped: reason of an early end; may be empty.
+        held_out_rms: None if not tested.
+        left: whether anything exceeds noise.
+        not_asked: terms not compared, with reasons by name.
+        out: missing terms as code; absent if none was written.
+        corrected: absent if none was written.
+        figure: absent if none was written.
     """
 
     simulator: str
@@ -215,7 +215,7 @@ class SimulatorResult(Framed):
     figure: Annotated[str | None, Absent] = None
 
     def rows(self) -> list[dict[str, object]]:
-        """One dictionary for each term."""
+        """Return one row per term."""
         return [
             {
                 "name": one.name,

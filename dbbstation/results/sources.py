@@ -1,4 +1,4 @@
-"""The causes of error that are known: the result of `sources`."""
+"""The result of `sources`."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class SourceParameter:
 
 @dataclass(frozen=True)
 class SourceDescription:
-    """Everything that a cause says of itself.
+    """A cause's own description.
 
     Attributes:
         belongs_to: `machine`, `session`, `mounting` or `instrument`.
-        role: what becomes of it: fitted in every calibration, a candidate of the diagnosis, or the keeper of a curve.
-        varies_with: what real machines' departure from its formula follows; None: the pose.
-        form_uncertainty: share of the effect by which real machines depart from the formula, one standard deviation.
-        parameters: on a machine; None where no machine was given.
+        role: always fitted, candidate of the diagnosis, or keeper of a curve.
+        varies_with: variable of real machines' departure from its formula; None: the pose.
+        form_uncertainty: share of that departure, one standard deviation.
+        parameters: None without a machine.
     """
 
     name: str
@@ -50,13 +50,13 @@ class SourceDescription:
 
 @dataclass(frozen=True)
 class SourcesResult:
-    """All causes that are known."""
+    """All known causes."""
 
     sources: tuple[SourceDescription, ...]
 
 
 def source_description(source: ErrorSource, machine: Machine | None = None) -> SourceDescription:
-    """Describe a cause, with its parameters on a machine where one is given.
+    """Describe a cause, with parameters if a machine is given.
 
     Raises:
         ModelError: the machine lacks what the source needs.
@@ -83,7 +83,7 @@ def source_description(source: ErrorSource, machine: Machine | None = None) -> S
 
 
 def role_of(source: ErrorSource) -> str:
-    """What becomes of it: fitted in every calibration, a candidate of the diagnosis, or the keeper of a curve."""
+    """Return its role: always fitted, candidate of the diagnosis, or keeper of a curve."""
     if source.name in {fitted.name for fitted in default_sources()}:
         return "fitted always"
     return "candidate" if source.candidate else "keeps what has no name"

@@ -1,4 +1,4 @@
-"""From measured circles to what the shop's tolerances say of them, uncertainty included."""
+"""Measured circles against the shop's tolerances, with uncertainty."""
 
 from __future__ import annotations
 
@@ -29,10 +29,9 @@ class ToleratedCircle:
     """Figures of one circle that may have a tolerance.
 
     Attributes:
-        direction: `ccw` or `cw`; `both` of both directions together.
-        repeat: counts runs of this test and direction.
-        sizes: by figure; G is about the least-squares circle, up to 30 undulations per revolution. Of both directions: empty.
-        others: further figures that a tolerance is for, by figure and cut-off of their filter.
+        direction: `ccw` or `cw`; `both` for both together.
+        sizes: by figure; G about the least-squares circle, up to 30 undulations per revolution; empty for both directions.
+        others: further toleranced figures, by figure and filter cut-off.
     """
 
     session: str
@@ -43,7 +42,7 @@ class ToleratedCircle:
     others: Mapping[tuple[CircleFigure, int], Size] = field(default_factory=dict)
 
     def size(self, tolerance: Tolerance) -> Size | None:
-        """Return the figure that a tolerance is for; None where this circle has none such."""
+        """Return the figure of a tolerance, or None."""
         own = self.sizes.get(tolerance.figure)
         if own is not None and (tolerance.upr == TOLERATED or tolerance.figure not in FILTERED):
             return own
@@ -51,7 +50,7 @@ class ToleratedCircle:
 
     @property
     def key(self) -> tuple[str, str, int]:
-        """Test, direction and repeat."""
+        """Return test, direction and repeat."""
         return self.test, self.direction, self.repeat
 
 
@@ -60,11 +59,11 @@ class Held:
     """A tolerance held against circles.
 
     Attributes:
-        conformity: exceeded where one circle exceeds it, else undecided where one is; None where it holds for none.
-        worst: the circle with the largest figure; None where it holds for none.
-        exceeded: how many circles exceed it.
-        undecided: how many lie within U of the limit.
-        circles: how many it holds for.
+        conformity: exceeded if one circle exceeds it, else undecided if one is; None without circles.
+        worst: circle with the largest figure, or None.
+        exceeded: number of circles.
+        undecided: number of circles within U of the limit.
+        circles: number that it applies to.
     """
 
     tolerance: Tolerance
@@ -79,10 +78,10 @@ class Held:
 def tolerated_circles(
     circles: Iterable[MeasuredCircle], tolerances: Sequence[Tolerance] = ()
 ) -> tuple[ToleratedCircle, ...]:
-    """Return the figures of measured circles that may have a tolerance; without runs that show no circle.
+    """Return the figures of circles that may have a tolerance.
 
     Args:
-        tolerances: whose figures and filters are worked out too.
+        tolerances: their figures and filters are computed too.
     """
     wanted = [
         (one.figure, one.upr)
@@ -105,7 +104,7 @@ def tolerated_circles(
 
 
 def tolerated_pairs(pairs: Iterable[MeasuredPair], tolerances: Sequence[Tolerance]) -> tuple[ToleratedCircle, ...]:
-    """Return the figures of both directions together that tolerances are for."""
+    """Return the toleranced figures of both directions together."""
     wanted = dict.fromkeys((one.figure, one.upr) for one in tolerances if one.figure in OF_BOTH_DIRECTIONS)
     return tuple(
         ToleratedCircle(
@@ -121,7 +120,7 @@ def tolerated_pairs(pairs: Iterable[MeasuredPair], tolerances: Sequence[Toleranc
 
 
 def _size_of(one: CircleAnalysis, known: SetUpKnowledge, figure: CircleFigure, upr: int) -> Size:
-    """Size of G with another filter, or of F, whichever of its ends is farther out."""
+    """Return the size of G with another filter, or of the farther end of F."""
     filtered = refiltered(one, Filter(upr))
     quantities = (
         (BudgetQuantity.G_LS,)
@@ -151,7 +150,7 @@ TOLERATED = Filter.UPR_30
 
 
 def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, Size]:
-    """Sizes with their uncertainties."""
+    """Return sizes with uncertainties."""
     found = budgets(one, known, (BudgetQuantity.G_LS, BudgetQuantity.MEAN_RADIAL, BudgetQuantity.X, BudgetQuantity.Y))
     g, radial = found[BudgetQuantity.G_LS], found[BudgetQuantity.MEAN_RADIAL]
     return {
@@ -162,7 +161,7 @@ def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, S
 
 
 def _off_centre(x: Budget, y: Budget) -> Size:
-    """Length of a centre offset, less what its uncertainty adds to it; u of both axes along it counts."""
+    """Return a centre offset's length, less what its uncertainty adds; u along it from both axes."""
     off, u = np.array([x.value_um, y.value_um]), np.array([x.known_um, y.known_um])
     length = float(np.hypot(*off))
     # A centre that is not off has no direction: either axis may be the one that counts.
@@ -173,14 +172,14 @@ def _off_centre(x: Budget, y: Budget) -> Size:
 
 
 def filter_words(tolerance: Tolerance) -> str | None:
-    """Return the filter of a tolerance's figure in words; None of a figure that no filter acts on."""
+    """Return the filter of a tolerance in words, or None."""
     return Filter(tolerance.upr).words if tolerance.figure in FILTERED else None
 
 
 def held_against(
     tolerances: Sequence[Tolerance], circles: Sequence[ToleratedCircle], coverage_factor: float
 ) -> tuple[Held, ...]:
-    """Hold every tolerance against the circles that it is for; arguments as of `conformity`."""
+    """Hold every tolerance against its circles; arguments as of `conformity`."""
     return tuple(_held(tolerance, circles, coverage_factor) for tolerance in tolerances)
 
 

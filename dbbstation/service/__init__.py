@@ -1,1 +1,1 @@
-"""What a screen needs: sessions, choices and ports before, a running sequence and its state, work afterwards. Nothing of it knows a screen."""
+"""What a screen needs: sessions, choices, ports, a running sequence and later work, without a screen."""

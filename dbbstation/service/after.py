@@ -1,4 +1,4 @@
-"""What is done with a session once it is measured: calibrate, diagnose, write programs and report. Each is a task of the program."""
+"""Tasks on a measured session: calibrate, diagnose, programs, report."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ ACCEPTANCE = "acceptance.html"
 
 @dataclass
 class Result:
-    """How a step stands.
+    """State of a step.
 
     Attributes:
         progress: None: not begun.
-        passed_s: time since it began, until it ended [s].
-        answer: its result as JSON has it; empty until it is done.
-        failure: what it said where it failed.
-        path: what it wrote; None until it is done.
+        passed_s: from begin to end.
+        answer: JSON of its result; empty until done.
+        failure: error message.
+        path: its output; None until done.
     """
 
     progress: WorkProgress | None = None
@@ -50,16 +50,16 @@ class Result:
 
 
 class After:
-    """Works on one session, one step at a time; results go into a new folder beside it, or stand there from before.
+    """Works on one session step by step; results go into a new folder beside it.
 
     Args:
-        model: of an earlier calibration, that the circles are held against until this one has a model; None: none.
-        settings: file of the shop's settings where one was named; None: those that are found.
-        start: begins a job, in a process of its own.
+        model: of an earlier calibration, for comparison until a new one exists; None: none.
+        settings: named file of the shop's settings; None: search.
+        start: begins a job in a process.
 
     Attributes:
-        former: session that an acceptance holds it against; None: none was chosen.
-        kept: copies of the models in force then.
+        former: session compared by an acceptance, or None.
+        kept: copies of its models.
     """
 
     def __init__(
@@ -89,14 +89,14 @@ class After:
 
     @property
     def folder(self) -> Path:
-        """Folder of the results: made with the first step, never one that was there before."""
+        """Return the results' folder, new with the first step."""
         if self._folder is None:
             self._folder = unused_path(self.session.parent, f"{self.session.name}-results")
         return self._folder
 
     @property
     def outdated(self) -> bool:
-        """Whether the session, or the program, is another now than when the first step was done."""
+        """Return whether session or program changed since the first step."""
         try:
             return self._counted not in {"", counted(self.session)}
         except (InputError, OSError):
@@ -104,24 +104,24 @@ class After:
 
     @property
     def busy(self) -> SessionTask | None:
-        """The step that is being done."""
+        """Return the running step."""
         return None if self._running is None else self._running[0]
 
     @property
     def model(self) -> Path | None:
-        """The best model there is: of the diagnosis, of the calibration, an earlier one."""
+        """Return the best model: of diagnosis, calibration, or earlier."""
         for step in (SessionTask.DIAGNOSE, SessionTask.CALIBRATE):
             if self.results[step].progress is WorkProgress.DONE:
                 return self.results[step].path
         return self._model
 
     def can(self, step: SessionTask) -> bool:
-        """Whether a step can be begun now."""
+        """Return whether a step can begin."""
         lacking = {SessionTask.PROGRAMS: self.model is None, SessionTask.ACCEPTANCE: self.former is None}
         return self.busy is None and not lacking.get(step, False)
 
     def accept(self, former: Former) -> None:
-        """Hold the session against one that was measured before; the models in force then are copied first.
+        """Compare with an earlier session; its models are copied first.
 
         Raises:
             OutputError: a copy cannot be written.
@@ -134,19 +134,19 @@ class After:
         self.do(SessionTask.ACCEPTANCE)
 
     def do(self, *steps: SessionTask) -> None:
-        """Do these steps, one behind the other; a step that fails or is cancelled ends the row."""
+        """Do steps in order; failing or cancelling ends the row."""
         if self.busy is None:
             self._waiting = list(steps)
             self._next()
 
     def cancel(self) -> None:
-        """End what is being done; what was done before stays."""
+        """Cancel the running step; earlier results stay."""
         self._waiting = []
         if self._running is not None:
             self._running[1].cancel()
 
     def look(self) -> None:
-        """Take in how far the work has come; begin the next step where one has ended."""
+        """Take in progress and begin the next step."""
         if self._running is None:
             return
         step, work = self._running
@@ -170,7 +170,7 @@ class After:
             self._waiting = []
 
     def close(self) -> None:
-        """End what is being done, and wait for that."""
+        """Cancel the running step and wait."""
         self._waiting = []
         if self._running is not None:
             self._running[1].close()
@@ -210,7 +210,7 @@ class After:
         return session.plan_path.absolute(), session.machine_path.absolute()
 
     def _done(self) -> dict[str, DoneStep]:
-        """What was done; a comparison is not kept: the session that it is with is chosen anew."""
+        """Return finished steps without comparison, whose session is chosen anew."""
         return {
             step.value: DoneStep(path=one.path.name, passed_s=one.passed_s, answer=one.answer)
             for step, one in self.results.items()

@@ -1,4 +1,4 @@
-"""What the station shows of the results of its steps; a result has more, and files have all of it."""
+"""What the station shows of its steps' results; files have everything."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class TextAnswer:
 
 @dataclass(frozen=True)
 class MisfitAnswer:
-    """Whether physics is missing, and how much is left beyond noise and mountings [µm]."""
+    """Whether physics is missing, and the residual beyond noise and mountings [µm]."""
 
     missing_physics: bool
     rms_um: float
@@ -22,7 +22,7 @@ class MisfitAnswer:
 
 @dataclass(frozen=True)
 class PlanCheckAnswer:
-    """Whether the tests are enough to check their plan, how many there are, and how many degrees of freedom are left for it."""
+    """Whether the tests can check their plan, their number, and degrees of freedom."""
 
     enough: bool
     tests: int
@@ -31,12 +31,11 @@ class PlanCheckAnswer:
 
 @dataclass(frozen=True)
 class CalibrationAnswer:
-    """What is shown of a calibration; lengths in µm.
+    """Shown facts of a calibration; lengths in µm.
 
     Attributes:
         misfit: beyond noise and mountings.
-        gaps: what the plan cannot see, in words.
-        plan_check: whether the tests can show a wrong plan.
+        gaps: what the plan cannot see.
     """
 
     parameters_identified: int
@@ -61,12 +60,11 @@ class CauseAnswer:
 
 @dataclass(frozen=True)
 class DiagnosisAnswer:
-    """What is shown of a diagnosis; lengths in µm.
+    """Shown facts of a diagnosis; lengths in µm.
 
     Attributes:
-        mismatch: whether the calibration leaves more than noise and mountings.
-        unexplained: what no cause explains.
-        next_test: what to measure next; None for nothing.
+        mismatch: whether the residual exceeds noise and mountings.
+        next_test: None for nothing.
     """
 
     mismatch: bool
@@ -79,14 +77,14 @@ class DiagnosisAnswer:
 
 @dataclass(frozen=True)
 class ProgramAnswer:
-    """The greatest correction of a program [µm]; None of a nominal one."""
+    """Greatest correction of a program [µm]; None if nominal."""
 
     greatest_correction_um: float | None
 
 
 @dataclass(frozen=True)
 class ProgramsAnswer:
-    """What is shown of programs: the dialect and each of them."""
+    """The dialect and its programs."""
 
     dialect: str
     programs: tuple[ProgramAnswer, ...]
@@ -94,12 +92,12 @@ class ProgramsAnswer:
 
 @dataclass(frozen=True)
 class VerdictAnswer:
-    """What the tolerances of the shop say.
+    """The verdict by the shop's tolerances.
 
     Attributes:
         kind: `within`, `exceeded`, `cannot tell` or `none`.
-        reasons: one sentence for each tolerance that is not kept.
-        to_do: what to do, in order.
+        reasons: a sentence for each broken tolerance.
+        to_do: in order.
     """
 
     kind: str
@@ -110,7 +108,7 @@ class VerdictAnswer:
 
 @dataclass(frozen=True)
 class WorstAnswer:
-    """The circle with the largest figure, and its U; None where nobody knows it [µm]."""
+    """The circle with the largest figure and its U [µm]; None if unknown."""
 
     test: str
     direction: str
@@ -121,11 +119,11 @@ class WorstAnswer:
 
 @dataclass(frozen=True, kw_only=True)
 class HeldAnswer:
-    """A tolerance held against circles.
+    """A tolerance against circles.
 
     Attributes:
-        conformity: `within`, `exceeded` or `cannot tell`; None where it holds for none.
-        worst: the circle with the largest figure; None likewise.
+        conformity: `within`, `exceeded` or `cannot tell`, or None.
+        worst: circle with the largest figure, or None.
     """
 
     quantity: str
@@ -136,28 +134,28 @@ class HeldAnswer:
 
 @dataclass(frozen=True, kw_only=True)
 class ToleranceAnswer(HeldAnswer):
-    """A tolerance held against circles now, and before; None where it held for none then."""
+    """A tolerance against circles now and before; None if it did not apply."""
 
     before: HeldAnswer | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class ToleranceOfTestAnswer(ToleranceAnswer):
-    """A tolerance held against the circles of one test."""
+    """A tolerance against the circles of one test."""
 
     test: str
 
 
 @dataclass(frozen=True)
 class ReportAnswer:
-    """What is shown of a report."""
+    """Shown facts of a report."""
 
     verdict: VerdictAnswer
 
 
 @dataclass(frozen=True)
 class AcceptanceAnswer(ReportAnswer):
-    """What is shown of a report of two sessions: every tolerance, and every tolerance of each test."""
+    """Tolerances of two sessions, in total and by test."""
 
     tolerances: tuple[ToleranceAnswer, ...]
     tolerances_by_test: tuple[ToleranceOfTestAnswer, ...]

@@ -1,4 +1,4 @@
-"""Work of some seconds in a thread, so that a screen goes on drawing; its outcome is fetched, never delivered."""
+"""Work of some seconds in a thread; its outcome is fetched."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ class Background(Generic[_Outcome]):
 
     @property
     def done(self) -> bool:
-        """Whether it has ended."""
+        """Return whether it has ended."""
         return not self._thread.is_alive()
 
     def outcome(self) -> _Outcome:
-        """Return what it found, waiting for that; raises what it raised."""
+        """Wait for the outcome and return it, or raise its error."""
         self._thread.join()
         if self._error is not None:
             raise self._error
         return self._found[0]
 
     def wait(self) -> None:
-        """Wait for its end, whatever that is."""
+        """Wait for any end."""
         self._thread.join()
 
     def _run(self) -> None:

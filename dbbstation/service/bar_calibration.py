@@ -1,4 +1,4 @@
-"""The bar on its calibrator, live: the instrument is read all the time, and averaged when somebody asks for it."""
+"""The bar on its calibrator: live readings, averaged on request."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ _TICK_S = 0.05
 
 @dataclass(frozen=True)
 class Stated:
-    """What somebody states of bar and calibrator.
+    """Stated facts of bar and calibrator.
 
     Attributes:
-        calibrator: serial number of the block.
-        calibrator_mm: its length at 20 degC [mm].
-        certified: date of its certificate, YYYY-MM-DD.
+        calibrator: serial number.
+        calibrator_mm: length at 20 degC.
+        certified: YYYY-MM-DD.
     """
 
     serial_number: str
@@ -47,8 +47,7 @@ class Calibrated:
     """What was found.
 
     Attributes:
-        path: of the file that was written.
-        long_um: how much the bar reads too long [µm].
+        long_um: excess of the bar's reading.
     """
 
     path: Path
@@ -59,16 +58,16 @@ class Calibrated:
 
 
 class BarCalibration:
-    """Borrows the instrument while the bar is on its calibrator; close it whatever happens.
+    """Borrows the instrument while the bar is on its calibrator; close it in any case.
 
     Args:
-        count: good readings that are averaged.
+        count: good readings to average.
 
     Attributes:
-        latest: the last reading; None before one has come.
-        failure: what ended the reading; None while all is well.
-        found: of the last calibration; None before it is through.
-        done: readings that have come of those that are averaged.
+        latest: None before a reading.
+        failure: that ended the reading, or None.
+        found: last calibration; None before.
+        done: readings averaged so far.
     """
 
     def __init__(self, line: HeldLine, count: int = USUAL_READINGS) -> None:
@@ -85,15 +84,14 @@ class BarCalibration:
 
     @property
     def busy(self) -> bool:
-        """Whether readings are being averaged."""
+        """Return whether readings are being averaged."""
         return self._wanted is not None and self._thread.is_alive()
 
     def begin(self, stated: Stated, path: Path) -> None:
-        """Average from now on, and write the file; does nothing while that goes on.
+        """Average readings and write the file, unless busy.
 
         Args:
-            stated: of bar and calibrator.
-            path: of the file; one that exists is not overwritten.
+            path: an existing file is not overwritten.
         """
         if not self.busy:
             self.failure, self.found, self.done = None, None, 0
@@ -103,7 +101,7 @@ class BarCalibration:
                 self._thread.start()
 
     def close(self) -> None:
-        """Give the instrument back."""
+        """Return the instrument."""
         self._stop.set()
         self._thread.join()
 
@@ -159,4 +157,4 @@ class BarCalibration:
 
 
 class _StoppedError(Exception):
-    """Somebody left while readings were being averaged."""
+    """The averaging was abandoned."""

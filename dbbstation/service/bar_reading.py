@@ -1,4 +1,4 @@
-"""The bar on its calibrator: readings of it, and the file that they become."""
+"""Readings of a bar on its calibrator, and their file."""
 
 from __future__ import annotations
 
@@ -29,15 +29,14 @@ def read_on_calibrator(
     resolution_um: float | None = None,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> Steady:
-    """Return the mean of so many good readings, less those that a bar that stands cannot have.
+    """Return the mean of good readings, without impossible ones of a resting bar.
 
     Args:
-        resolution_um: last digit of the display [µm]; None: as the readings show.
-        progress: told how many of how many have come.
+        resolution_um: display step; None: by the readings.
 
     Raises:
-        InstrumentError: the line, or too many readings that are no length.
-        ValueError: the resolution cannot be told.
+        InstrumentError: the line failed, or too many readings are no length.
+        ValueError: the resolution is unknown.
     """
     lengths: list[float] = []
     for reading in source.readings(2 * count):
@@ -57,15 +56,15 @@ def read_on_calibrator(
 def bar_file(
     found: Steady, of_bar: Mapping[str, object], calibrator: Mapping[str, object], instrument: str, now: datetime
 ) -> BarFile:
-    """Return the calibration as its file has it.
+    """Return the calibration as a file.
 
     Args:
-        of_bar: serial number, temperature with its uncertainty, expansion, as `BarFile` names them.
-        now: the time of day with its zone.
+        of_bar: serial number, temperature with uncertainty, expansion, as in `BarFile`.
+        now: with its zone.
 
     Raises:
         pydantic.ValidationError: a value that no such file may have.
-        InstrumentError: the readings are none of this calibrator.
+        InstrumentError: the readings contradict this calibrator.
     """
     readings = {
         "instrument": instrument,

@@ -1,4 +1,4 @@
-"""What is typed of a bar and its calibrator, checked when it is typed: numbers against their range and the instrument, dates against the calendar."""
+"""Check typed facts of a bar and its calibrator."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _DAYS_PER_YEAR = 365.25
 def fault_of(
     name: str, text: str, reads_mm: float | None = None, stroke_mm: float | None = None, today: date | None = None
 ) -> str:
-    """Return what is wrong with a text that was typed; empty where nothing is.
+    """Return the fault of a typed text, or an empty text.
 
     Args:
-        reads_mm: what the instrument reads on the calibrator [mm]; None: nothing, or only what it was told.
-        stroke_mm: travel of the gauge either way [mm]; None: not known.
-        today: the date; None: that of the computer.
+        reads_mm: reading on the calibrator; None: none, or only relative.
+        stroke_mm: travel of the gauge either way; None: unknown.
+        today: None: this computer's date.
     """
     if name == "certified":
         return _fault_of_day(text, today or datetime.now().astimezone().date())
@@ -53,7 +53,7 @@ def fault_of(
 
 
 def doubt_of(name: str, text: str, today: date | None = None) -> str:
-    """Return what is doubtful about a text in which nothing is wrong; empty where nothing is."""
+    """Return a doubt about a faultless text, or an empty text."""
     if name != "certified":
         return ""
     years = ((today or datetime.now().astimezone().date()) - date.fromisoformat(text)).days / _DAYS_PER_YEAR

@@ -1,4 +1,4 @@
-"""What a screen shows: events folded into the state that is drawn."""
+"""Events folded into the state that a screen draws."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MESSAGES = 50
 
 
 class Mark(StrEnum):
-    """How a planned run stands; the text is what people read beside the sign."""
+    """State of a planned run; its text stands beside the sign."""
 
     OPEN = "open"
     NEXT = "next"
@@ -41,7 +41,7 @@ class Mark(StrEnum):
 
 
 class RunDecision(StrEnum):
-    """What was decided about a recorded run; the text is what people read."""
+    """Decision on a recorded run; its text is shown."""
 
     NONE = ""
     ACCEPTED = "accepted"
@@ -50,12 +50,12 @@ class RunDecision(StrEnum):
 
 @dataclass(frozen=True)
 class SequenceOpened:
-    """Instrument and session are ready; sent by the runner before the first event of a sequence.
+    """Instrument and session are ready; the runner's first event.
 
     Attributes:
-        tasks: runs that the plan asks for, in their order.
-        open: those without an accepted recording.
-        known: what judged runs of the session say, in the order they were recorded.
+        tasks: planned runs in order.
+        open: those without accepted run.
+        known: results of judged runs, in recording order.
     """
 
     tasks: tuple[Task, ...]
@@ -82,26 +82,22 @@ class Board:
     """The state that is drawn.
 
     Attributes:
-        state: of the sequence; None before it began.
-        allowed: commands that it takes now.
-        announced: the run that is next or goes on.
-        tasks: planned runs in their order.
-        virtual: whether machine and instrument are virtual.
-        lost: samples that the line lost during the run that goes on, or went on last.
-        doubtful: samples of that run that may have been damaged on the line.
-        swept_deg: travelled since the feed-in [deg].
-        traces: of the test that was started last, by direction.
-        last: circles of the same test in the session before, by direction; empty where none were found.
-        difference: of their directions; None before both are complete.
-        running: direction of the run that is on its circle; None where none is.
-        results: what completed runs say, the last ones.
-        runs: every run that was recorded whole, also in earlier sittings, by its name.
-        reasons: why some do not count, by their names.
-        completed: the run that waits for a verdict, or waited last.
-        fault: what ended the sequence.
-        finished: the end of the plan.
-        temperature_due: whether a run was begun since the temperature of the shop was noted.
-        messages: the last ones, newest last.
+        state: None before the begin.
+        allowed: commands.
+        announced: next or current run.
+        lost: samples lost in the latest run.
+        doubtful: possibly damaged samples of that run.
+        swept_deg: since the feed-in.
+        traces: of the last started test, by direction.
+        last: its circles in the session before, by direction; may be empty.
+        difference: of the directions; None before both are complete.
+        running: direction on its circle, or None.
+        results: last completed runs.
+        runs: recorded runs of all sittings, by name.
+        reasons: of rejections, by name.
+        completed: run awaiting its verdict, or the last one.
+        temperature_due: whether a run began since the last temperature.
+        messages: newest last.
     """
 
     state: State | None = None
@@ -132,13 +128,13 @@ class Board:
 
     @property
     def circle(self) -> Circle | None:
-        """The circle that the traces are of, before the first run the announced one; None before anything."""
+        """Return the circle of the traces, else the announced one, or None."""
         announced = self.announced.circle if self.announced else None
         return next((trace.circle for trace in self.traces.values()), announced)
 
     @property
     def views(self) -> dict[View, Mapping[Direction, LiveTrace | Derived]]:
-        """What there is to be drawn: traces as measured always, others once they are complete; never beside a circle that runs."""
+        """Return the possible views: measured always, others once complete and not during a circle."""
         views: dict[View, Mapping[Direction, LiveTrace | Derived]] = {View.MEASURED: self.traces}
         if self.state in RECORDING:
             return views
@@ -151,7 +147,7 @@ class Board:
 
     @property
     def beneath(self) -> dict[View, Mapping[Direction, LiveTrace | Derived]]:
-        """What the session before showed of the directions that are drawn; nothing of another test, or beneath a difference."""
+        """Return the session before in the drawn directions, for the same test and no difference."""
         views = self.views
         mine = {way: one for way, one in self.last.items() if one.run.test == self.test}
         return {
@@ -165,27 +161,27 @@ class Board:
 
     @property
     def test(self) -> str:
-        """Name of the test that the traces are of, before the first run of the announced one; empty before anything."""
+        """Return the test of the traces, else the announced one; may be empty."""
         announced = self.announced.run.test if self.announced else ""
         return next((trace.run.test for trace in self.traces.values()), announced)
 
     @property
     def accepted(self) -> int:
-        """Planned runs that have an accepted recording."""
+        """Return planned runs with an accepted recording."""
         return self.marks.count(Mark.ACCEPTED)
 
     @property
     def left(self) -> tuple[Task, ...]:
-        """Planned runs without an accepted recording."""
+        """Return planned runs without accepted recording."""
         return tuple(task for task, mark in zip(self.tasks, self.marks, strict=True) if mark is not Mark.ACCEPTED)
 
     def runs_of(self, test: str, direction: Direction) -> tuple[events.RunCompleted, ...]:
-        """Return the runs of a test in a direction, in the order they were recorded."""
+        """Return a test's runs in a direction, in recording order."""
         mine = [one for one in self.runs.values() if (one.run.test, one.run.direction) == (test, direction)]
         return tuple(sorted(mine, key=lambda one: one.run.repeat))
 
     def figures_of(self, test: str, direction: Direction) -> CircleFigures | None:
-        """Return the figures of the last run of a test in a direction that shows a circle and was not rejected."""
+        """Return figures of the last run with a circle that was not rejected."""
         standing = [
             one.figures
             for one in self.runs_of(test, direction)
@@ -194,7 +190,7 @@ class Board:
         return standing[-1] if standing else None
 
     def take(self, event: events.Event | SequenceOpened) -> None:  # noqa: C901, PLR0912 - a line per event, nothing nested
-        """Note what happened."""
+        """Take an event."""
         message = message_of(event)
         if message is not None:
             self.messages.append(message)
@@ -257,7 +253,7 @@ class Board:
         self.running = self.announced.run.direction if self.announced and event.state is State.TURNING else None
 
     def _leave(self, before: State | None) -> None:
-        """A run was left: the announcement that follows says whether it is measured again."""
+        """Leave a run; the next announcement shows whether it is repeated."""
         if before is not None and before in _RUN_MARKS and self._announced_mark is not Mark.ACCEPTED:
             self._mark(Mark.PASSED)
 
@@ -296,7 +292,7 @@ class Board:
             self.difference = None if ccw is None or cw is None else difference(ccw, cw)
 
     def _judge(self, run: events.RunId, verdict: RunDecision, reason: str = "") -> None:
-        """Note a verdict; on the announced run as its mark, on an earlier one wherever its task stands."""
+        """Note a verdict on the announced or an earlier run."""
         self.verdicts[run.label], self.reasons[run.label] = verdict, reason
         announced = self.announced.run if self.announced else None
         if announced is not None and announced.label == run.label:

@@ -1,4 +1,4 @@
-"""Files to choose from: machines, plans and calibrations of bars in the working folder, and those of the package."""
+"""Files to choose: machines, plans and bar calibrations of working folder and package."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class CandidateFormat(StrEnum):
-    """Formats that are chosen from; the text is how the `format` key begins."""
+    """Formats to choose from, by the begin of their `format` key."""
 
     MACHINE = "dbb-machine/"
     PLAN = "dbb-plan/"
@@ -37,10 +37,10 @@ _SHIPPED = {
 
 
 def candidates(kind: CandidateFormat, under: Path, *, shipped: bool = True) -> tuple[Path, ...]:
-    """Return the files of a format, those under a folder first; copies inside sessions are left out.
+    """Return files of a format, those under a folder first, without session copies.
 
     Args:
-        shipped: whether those of the package are offered too.
+        shipped: include those of the package.
     """
     own = [path for path in _files(under, DEPTH) if _is(kind, path)]
     if not shipped or kind not in _SHIPPED:

@@ -1,4 +1,4 @@
-"""What somebody chose to measure, what is missing of that, and what it becomes: a job that is checked and ready to be opened."""
+"""What somebody chose to measure, what is missing, and the checked job."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ PROGRAMS = "programs"
 
 
 class SetUpPart(StrEnum):
-    """What has to be chosen for a new session."""
+    """Choices for a new session."""
 
     MACHINE = "machine"
     PLAN = "plan"
@@ -59,12 +59,12 @@ class SetUpPart(StrEnum):
 
 @dataclass(frozen=True)
 class Limits:
-    """What the shop allows.
+    """The shop's limits.
 
     Attributes:
-        largest_bar_age_h: age of a calibration of the bar beyond which it is stale [h].
-        largest_loss_percent: share of a run's samples that may be lost [%]; None: what the plan says.
-        loss_over_plan: whether that holds also where the plan says something.
+        largest_bar_age_h: beyond which a calibration is stale.
+        largest_loss_percent: of a run's samples; None: the plan's.
+        loss_over_plan: whether it overrides the plan.
     """
 
     largest_bar_age_h: float = USUAL_AGE_H
@@ -74,20 +74,19 @@ class Limits:
 
 @dataclass(frozen=True)
 class Choice:
-    """A session to be made, or to be gone on with.
+    """A session to make or continue.
 
     Attributes:
-        folder: of the session; None: not chosen.
-        machine: file of the nominal machine; None: not chosen; a session that exists has its own.
-        plan: file of the plan, likewise.
-        line: instrument and port.
-        bar: file of the bar's calibration; None: none.
-        bar_waiver: why it is measured without; empty: it is not.
-        programs: folder of NC programs; None: plain nominal circles.
+        folder: None: not chosen.
+        machine: nominal; None: not chosen, or the session's own.
+        plan: likewise.
+        bar: calibration file; None: none.
+        bar_waiver: why none; may be empty.
+        programs: folder; None: plain nominal circles.
         job: job or order number.
-        ambient_temp_c: temperature of the shop now [degC]; None: not read. A session that exists gets it as a note.
-        order: of the tests; a session that exists keeps its own.
-        gate: what is repeated at the end.
+        ambient_temp_c: now; None: not read. An existing session gets a note.
+        order: of a new session's tests.
+        gate: repeated at the end.
     """
 
     folder: Path | None = None
@@ -106,11 +105,11 @@ class Choice:
 
     @property
     def goes_on(self) -> bool:
-        """Whether the session exists."""
+        """Return whether the session exists."""
         return self.folder is not None and (self.folder / SESSION_FILE).is_file()
 
     def missing(self) -> tuple[SetUpPart, ...]:
-        """Return what has still to be chosen, in the order in which it is asked for."""
+        """Return missing choices in asking order."""
         given = {
             SetUpPart.MACHINE: self.goes_on or self.machine is not None,
             SetUpPart.PLAN: self.goes_on or self.plan is not None,
@@ -124,15 +123,14 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A choice that was read and checked.
+    """A choice, read and checked.
 
     Attributes:
-        line: instrument and port.
-        runs: that are left to be measured; of a new session all of the plan.
-        circles_s: time that their circles take at their planned feeds [s].
-        mountings: how often a ball is put up for them.
-        first: the circle that comes first; None where nothing is left.
-        height_and_drift: how far the height of the plan's tests follows a steady drift, from 0 (not at all) to 1.
+        runs: left to measure.
+        circles_s: their time at planned feeds.
+        mountings: set-ups of balls for them.
+        first: None if nothing is left.
+        height_and_drift: correlation of test height with a steady drift, 0 to 1.
     """
 
     job: Job
@@ -146,19 +144,19 @@ class Prepared:
 
     @property
     def mixes_drift(self) -> bool:
-        """Whether a drift can be taken for an effect of height."""
+        """Return whether drift and height could be confused."""
         return self.height_and_drift > LARGEST_LEAK
 
 
 def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel | None = None) -> Prepared:
-    """Read what was chosen and dry-run it; nothing is opened or written.
+    """Read the choice and dry-run it without opening or writing.
 
     Args:
-        model: that circles are judged by; None: the nominal machine.
+        model: for judging circles; None: the nominal machine.
 
     Raises:
-        StationError: faults of files, a circle that leaves the travel, a bar of unknown length, an unknown instrument.
-        ValueError: something is missing.
+        StationError: faults of files, travel, bar or instrument.
+        ValueError: a choice is missing.
     """
     limits = limits or Limits()
     if choice.missing() or choice.folder is None:
@@ -207,7 +205,7 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
 
 
 def _recorded(folder: Path, instrument: ReadBy | None) -> tuple[RunEntry, ...]:
-    """Return the runs of a session that goes on.
+    """Return the runs of a continued session.
 
     Raises:
         InputError: faults of the session; virtual and real circles would be mixed.

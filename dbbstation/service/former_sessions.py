@@ -1,4 +1,4 @@
-"""Sessions measured before this one on the same machine, plan and jig, and what the circles ran by then."""
+"""Earlier sessions on the same machine, plan and jig, and their programs."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class InForce:
-    """What the accepted circles of a session ran by.
+    """What commanded a session's accepted circles.
 
     Attributes:
-        compensated: how many of them ran a compensated program.
-        programs: folder of the session's copies of the programs; None where the control ran plain circles.
-        models: files that the programs were compensated with, as far as they were found.
-        lost: SHA-256 of models that were not found.
+        compensated: number of compensated runs.
+        programs: folder of program copies; None for plain circles.
+        models: found model files of the programs.
+        lost: SHA-256 of missing models.
     """
 
     circles: int
@@ -45,7 +45,7 @@ class Former:
     """A session measured before.
 
     Attributes:
-        measured: start of its last accepted run.
+        measured: last accepted run.
     """
 
     folder: Path
@@ -58,8 +58,8 @@ class BeforeAndNow:
     """What an acceptance can compare.
 
     Attributes:
-        now: what the circles of the session ran by.
-        formers: sessions before it, the last first.
+        now: of this session.
+        formers: the last first.
     """
 
     now: InForce
@@ -67,7 +67,7 @@ class BeforeAndNow:
 
 
 def before_and_now(folder: Path) -> BeforeAndNow:
-    """Return the sessions that one can be held against: those beside it, as `former_sessions`.
+    """Return comparable sessions beside this one, as `former_sessions`.
 
     Raises:
         InputError: the session cannot be read.
@@ -82,14 +82,14 @@ def before_and_now(folder: Path) -> BeforeAndNow:
 def former_sessions(
     now: SessionFolder, under: Path, tests: set[str] | None = None
 ) -> list[tuple[datetime, SessionFolder]]:
-    """Return sessions of the same machine, plan and jig that ended before this one began, the last first.
+    """Return earlier sessions of the same machine, plan and jig, the last first.
 
-    Both are of a real machine or both of a virtual one. The nominal machines are the same, serial numbers do not differ, and every test of this session's accepted runs was run there
-    about the same ball in the same place. Before it has an accepted run, that holds for every test of its plan.
+    Both are real or both virtual, with the same nominal machine and serial number. Every accepted test of this session,
+    else of its plan, was run there at the same place.
 
     Args:
-        under: folder to search, and the folders in it.
-        tests: that must have been run there; None: those above.
+        under: searched with subfolders.
+        tests: required there; None: as above.
     """
     accepted = now.in_state(RunState.ACCEPTED)
     began = min((run.started for run in accepted if run.started is not None), default=None)
@@ -111,10 +111,10 @@ def former_sessions(
 
 
 def in_force(session: SessionFolder, models: dict[str, Path]) -> InForce:
-    """Return what the accepted circles of a session ran by.
+    """Return what commanded a session's accepted circles.
 
     Args:
-        models: model files by their SHA-256.
+        models: files by SHA-256.
     """
     runs = session.in_state(RunState.ACCEPTED)
     programs = [run.program for run in runs if run.program is not None]
@@ -129,9 +129,9 @@ def in_force(session: SessionFolder, models: dict[str, Path]) -> InForce:
 
 
 def keep_models(former: Former, folder: Path) -> tuple[Path, ...]:
-    """Copy the models of a former session into a folder, so that the way back stays; return the copies.
+    """Copy a former session's models into a folder and return the copies.
 
-    A copy is named after its content and never overwritten.
+    A copy is named by its content and never overwritten.
 
     Raises:
         OutputError: one cannot be written.

@@ -1,4 +1,4 @@
-"""The front desk of the station: which sessions there are, what can be chosen, what answers; opens and closes jobs."""
+"""The station's front desk: sessions, choices, ports; opens and closes jobs."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ USUAL_VIRTUAL = "streaming-encoder"
 
 @dataclass(frozen=True, eq=False)
 class Opened:
-    """A job whose sequence can be started."""
+    """A job ready to start."""
 
     prepared: Prepared
     runner: Runner
@@ -57,15 +57,14 @@ class Opened:
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """Finds, checks and opens; one job at a time.
+    """Finds, checks and opens one job at a time.
 
     Attributes:
-        under: working folder, in which sessions and files are looked for.
-        memory: of last choices.
-        observers: told of everything that happens in a sequence.
-        model: that circles are judged by; None: the nominal machine.
-        given: what the command line or the shop's settings say; holds over what is remembered.
-        settings: file of the shop's settings where one was named.
+        under: working folder.
+        observers: of the sequence.
+        model: for judging circles; None: the nominal machine.
+        given: by command line or settings; overrides the memory.
+        settings: named file of the shop's settings.
     """
 
     under: Path
@@ -79,11 +78,11 @@ class Front:
     _held: HeldOpen = field(default_factory=HeldOpen)
 
     def sessions(self) -> tuple[SessionLine, ...]:
-        """Return sessions under the working folder and those that were open lately, the last first."""
+        """Return sessions of the working folder and remembered ones, the last first."""
         return list_sessions(self.under, [folder for folder, _ in self.memory.read().sessions])
 
     def first_choice(self) -> Choice:
-        """Return what was chosen last, for a new session: files that are gone are left out."""
+        """Return the last choice for a new session, without missing files."""
         last = self.memory.read()
         line = self._with_given(last.line)
         given = self.given
@@ -100,7 +99,7 @@ class Front:
         return replace(choice, folder=self.new_folder())
 
     def virtual_choice(self) -> Choice:
-        """Return a choice with which anybody can try everything: nothing is missing, and no hardware is needed."""
+        """Return a complete choice without hardware."""
         machine = candidates(CandidateFormat.MACHINE, self.under)[-1]
         plan = next(
             path for path in candidates(CandidateFormat.PLAN, self.under) if path.name == "ten-minute-check.yaml"
@@ -110,16 +109,16 @@ class Front:
         return Choice(self.new_folder("virtual"), machine, plan, line, **said)
 
     def goes_on_with(self, folder: Path) -> Choice:
-        """Return the choice to go on with a session: plan and machine lie in its folder, the instrument is remembered."""
+        """Return the choice to continue a session."""
         line = self.memory.read().line_of(folder)
         return Choice(folder, line=line_to_go_on(folder, line, self._with_given(line)))
 
     def new_folder(self, name: str = "session") -> Path:
-        """Return a folder for a new session that is not there yet."""
+        """Return a free folder for a new session."""
         return unused_path(self.under, name)
 
     def files(self, part: SetUpPart) -> tuple[Path, ...]:
-        """Return the files that can be chosen for a part."""
+        """Return candidate files for a part."""
         kinds = {
             SetUpPart.MACHINE: CandidateFormat.MACHINE,
             SetUpPart.PLAN: CandidateFormat.PLAN,
@@ -128,15 +127,15 @@ class Front:
         return candidates(kinds[part], self.under)
 
     def instruments(self) -> list[tuple[str, str]]:
-        """Return name and profile of the instruments that are known, the usual profile of each first."""
+        """Return name and profile of known instruments, usual profiles first."""
         return [(name, one.profile) for name in known_instruments() for one in load_variants(name)]
 
     def ports(self) -> list[tuple[str, str]]:
-        """Return name and description of what can be chosen as port: those of the computer, and virtual machines."""
+        """Return name and description of ports, with virtual machines."""
         return [*ports(), *((name, "no hardware, to try it") for name in VIRTUAL)]
 
     def probe(self, line: Line) -> ProbeOutcome:
-        """Return what answers at a port; takes some seconds."""
+        """Return what answers at a port; takes seconds."""
         if line.virtual:
             return ProbeOutcome(line.port, answers=True, text="is switched on when it is needed")
         try:
@@ -149,27 +148,27 @@ class Front:
         return probe(protocol, line.port, line.baud)
 
     def hold(self, protocol: Protocol, line: Line) -> HeldLine | None:
-        """Return the instrument, which stays open from now on until another one is asked for; None of a virtual one."""
+        """Return the instrument, kept open until another is asked for; None if virtual."""
         return None if line.virtual else self._held.line(protocol, line.port, line.baud)
 
     def release(self) -> None:
-        """Close the instrument that is held open, where one is."""
+        """Close the held instrument."""
         self._held.release()
 
     def prepare(self, choice: Choice) -> Prepared:
-        """Read and check what was chosen; raises as `choice.prepare`."""
+        """Check a choice; raises as `choice.prepare`."""
         return prepare(choice, self.limits, self.model)
 
     def models(self) -> tuple[Path, ...]:
-        """Return the models that programs can be compensated with, the last written first."""
+        """Return compensating models, the latest first."""
         return tuple(sorted(candidates(CandidateFormat.MODEL, self.under), key=lambda path: -path.stat().st_mtime))
 
     def write_programs(self, choice: Choice, model: Path | None = None) -> tuple[int, Path]:
-        """Write NC programs of all circles into a new folder beside the session; return how many, and where.
+        """Write NC programs into a new folder beside the session; return number and folder.
 
         Args:
-            choice: says plan, machine and session.
-            model: that they are compensated with; None: nominal programs.
+            choice: with plan, machine and session.
+            model: None: nominal programs.
 
         Raises:
             StationError: what the task says.
@@ -201,15 +200,14 @@ class Front:
             work.close()
 
     def bar_calibration(self, line: Line, values: Mapping[str, str]) -> BarCalibration:
-        """Begin to read the bar on its calibrator; close it whatever happens.
+        """Begin to read the bar on its calibrator; close it in any case.
 
         Args:
-            line: instrument and port.
-            values: what is stated, as `stated_bar` takes it; a relative instrument shows zero at the calibrator's length.
+            values: as in `stated_bar`; a relative instrument shows zero at the calibrator's length.
 
         Raises:
             StationError: no such instrument.
-            NoNumberError: a relative instrument, and the calibrator's length is no number.
+            NoNumberError: a relative instrument needs the calibrator's length.
         """
         protocol = load_instrument(line.instrument, line.profile or None)
         zero_mm = line.zero_mm
@@ -219,42 +217,42 @@ class Front:
         return BarCalibration(self._held.line(protocol, line.port, line.baud))
 
     def stated_bar(self, values: Mapping[str, str]) -> Stated:
-        """Return what is stated of bar and calibrator.
+        """Return the stated facts of bar and calibrator.
 
         Args:
             values: texts by the names of `Stated`.
 
         Raises:
-            NoNumberError: one that should be a number is none.
+            NoNumberError: a text is no number.
         """
         numbers = {name: _number(values, name) for name in ("calibrator_mm", "calibrator_u_um", "temp_c")}
         return Stated(values["serial_number"], values["calibrator"], certified=values["certified"], **numbers)
 
     def fault_of_stated(self, name: str, text: str, line: Line, reads_mm: float | None) -> str:
-        """Return what is wrong with a text that was typed of bar or calibrator; empty where nothing is.
+        """Return the fault of a typed text, or an empty text.
 
         Args:
-            line: instrument; one that shows what it was told says nothing of the calibrator's length.
-            reads_mm: what it reads now [mm]; None: nothing.
+            line: relative instruments do not show the calibrator's length.
+            reads_mm: current reading, or None.
         """
         length = load_instrument(line.instrument, line.profile or None).length
         return fault_of(name, text, None if length.relative else reads_mm, length.stroke_mm)
 
     def off_calibrator_um(self, length_mm: float, values: Mapping[str, str]) -> float | None:
-        """Return how much longer a reading is than the calibrator [µm]; None where its length is not stated yet."""
+        """Return a reading's excess over the calibrator [µm]; None if its length is not stated."""
         try:
             return 1e3 * (length_mm - _number(values, "calibrator_mm"))
         except ValueError:
             return None
 
     def new_bar_file(self) -> Path:
-        """Return a file for a calibration of the bar that is not there yet."""
+        """Return a free file for a bar calibration."""
         return unused_path(self.under, f"bar-{datetime.now().astimezone():%Y-%m-%d}", ".yaml")
 
     def open(self, choice: Choice, prepared: Prepared) -> Opened:
-        """Switch on what is virtual, remember the choice, and return what runs the sequence.
+        """Start virtual parts, remember the choice and return the sequence's runner.
 
-        A session that goes on gets the present temperature as a note.
+        A continued session gets the temperature as a note.
 
         Raises:
             StationError: the virtual machine refuses, or another process writes into the session.
@@ -286,16 +284,16 @@ class Front:
         return Opened(replace(prepared, job=job), runner)
 
     def close(self) -> None:
-        """End the sequence that is open, switch off what is virtual, and close the instrument."""
+        """End the sequence, virtual parts and instrument."""
         self._open.close()
         self.release()
 
     def after(self, session: Path) -> After:
-        """Return what can be done with a session that is measured."""
+        """Return the tasks on a measured session."""
         return After(session, self.last_model(session), self.settings)
 
     def last_model(self, session: Path) -> Path | None:
-        """Return the model that was made last beside a session, by this program's names; None where there is none."""
+        """Return the latest model beside a session, by its usual name, or None."""
         found = [
             (path.stat().st_mtime, path.name == JOINT, path)
             for name in (KINEMATIC, JOINT)
@@ -324,7 +322,7 @@ class Front:
 
 
 class NoNumberError(ValueError):
-    """A text that should be a number is none."""
+    """A text that should be a number."""
 
     def __init__(self, name: str, text: str) -> None:
         self.name, self.text = name, text

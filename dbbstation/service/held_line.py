@@ -1,4 +1,4 @@
-"""An instrument that stays open while one after the other needs it: the checklist, the bar, the circles, what follows."""
+"""An instrument that stays open for checklist, bar and circles."""
 
 from __future__ import annotations
 
@@ -35,22 +35,20 @@ _JOIN_S = 10.0
 
 
 class HeldLine:
-    """Owns an instrument from the moment it is made until it is closed.
+    """Owns an instrument until it is closed.
 
-    While nobody has borrowed the instrument its readings are only seen; what came before is not handed to a borrower.
-    An instrument that fails meanwhile is opened again, as often as it takes.
+    Readings are only shown while it is not lent, and not passed to a borrower. A failed instrument is reopened.
 
     Args:
         port: name or URL.
-        baud: where the instrument is not set to the usual rate.
-        clock: what stamps the readings [s].
-        time_scale: how much faster than real time that goes.
-        log: where every byte is written down; the caller closes it.
+        baud: if not the usual rate.
+        clock: of the readings [s].
+        time_scale: speed of that time.
+        log: of all bytes; the caller closes it.
 
     Attributes:
-        latest: the last reading seen; None before one came, and while none comes.
-        failure: why none comes; None while all is well.
-        rate: of the readings seen.
+        latest: None before a reading and during failure.
+        failure: or None.
     """
 
     def __init__(
@@ -83,7 +81,7 @@ class HeldLine:
 
     @contextmanager
     def lent(self) -> Iterator[Instrument]:
-        """Give the started instrument to one borrower at a time; it stays open afterwards.
+        """Lend the started instrument to one borrower.
 
         Raises:
             InstrumentError: it cannot be opened.
@@ -96,7 +94,7 @@ class HeldLine:
             yield self._instrument
 
     def seen(self) -> tuple[Sample, ...]:
-        """Return what came since the last call while nobody had borrowed the instrument."""
+        """Return readings since the last call while not lent."""
         came = []
         with suppress(IndexError):
             while True:
@@ -104,7 +102,7 @@ class HeldLine:
         return tuple(came)
 
     def close(self) -> None:
-        """Close the instrument, once its borrower has given it back."""
+        """Close the instrument after its return."""
         self._stop.set()
         self._thread.join(_JOIN_S)
 
@@ -130,7 +128,7 @@ class HeldLine:
             self._seen.extend(samples)
 
     def _ready(self) -> None:
-        """Open the instrument where it is not open, and again where it failed."""
+        """Open the instrument, again after failure."""
         if not self._instrument.reading:
             with suppress(StationError):
                 self._instrument.close()
@@ -138,20 +136,20 @@ class HeldLine:
 
 
 class HeldOpen:
-    """The instrument that is held open: one at most."""
+    """At most one open instrument."""
 
     def __init__(self) -> None:
         self._line: HeldLine | None = None
 
     def line(self, protocol: Protocol, port: str, baud: int | None) -> HeldLine:
-        """Return the instrument; another one that was held open is closed before."""
+        """Return the instrument, after closing another one."""
         if self._line is None or not self._line.is_of(protocol, port, baud):
             self.release()
             self._line = HeldLine(protocol, port, baud)
         return self._line
 
     def release(self) -> None:
-        """Close the instrument, where one is held open."""
+        """Close the held instrument."""
         line, self._line = self._line, None
         if line is not None:
             line.close()

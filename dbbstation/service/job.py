@@ -1,4 +1,4 @@
-"""What is to be done with a session once it is measured, in a form that another process can be told."""
+"""Tasks on a measured session, in a form for another process."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 
 class SessionTask(StrEnum):
-    """What can be done, in the order in which it is usual."""
+    """Tasks in their usual order."""
 
     CALIBRATE = "calibrate"
     DIAGNOSE = "diagnose"

@@ -1,4 +1,4 @@
-"""Circles of the last session of the same machine and plan, to be drawn beneath those that are measured now."""
+"""Circles of the last session of the same machine and plan, drawn beneath the present ones."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 
 def last_traces(folder: Path, test: str) -> dict[Direction, LiveTrace]:
-    """Return the last accepted circles of a test in the last session before, by direction; empty where there is none.
+    """Return a test's last accepted circles in the session before, by direction; may be empty.
 
-    A circle that cannot be read or cut is left out: it is only looked at beside the new one.
+    Unreadable circles are left out.
 
     Args:
-        folder: of the session that is measured now; the former ones lie beside it.
+        folder: of the present session; former ones are beside it.
 
     Raises:
-        InputError: the session that is measured now cannot be read.
+        InputError: the present session cannot be read.
     """
     formers = former_sessions(read_session(folder), folder.absolute().parent, {test})
     if not formers:

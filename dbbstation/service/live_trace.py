@@ -1,7 +1,4 @@
-"""The traces that are drawn: one per direction of a test, as many points as can be told apart, however many samples come.
-
-As measured; about their own centre once they are complete; centred, one direction less the other once both are.
-"""
+"""Drawn traces of a test, with bounded points: measured, centred, and the directions' difference."""
 
 from __future__ import annotations
 
@@ -33,7 +30,7 @@ screen. A turn has at most three points a step then, whatever the sampling rate 
 
 
 class View(StrEnum):
-    """What is drawn of a test; the text is what people read."""
+    """Views of a test; the text is shown."""
 
     MEASURED = "as measured"
     CENTRED = "centred"
@@ -41,10 +38,9 @@ class View(StrEnum):
 
 
 class LiveTrace:
-    """Angles and deviations of one run, as far as they are known live.
+    """Live angles and deviations of one run.
 
-    Only the full turn is kept, not the overshoots; samples that are no length on the circle break the line. Of samples that lie
-    closer than can be drawn, the extremes are kept.
+    Only the full turn is kept; samples off the circle break the line. Of close samples the extremes are kept.
     """
 
     def __init__(self, run: RunId, circle: Circle) -> None:
@@ -58,7 +54,7 @@ class LiveTrace:
 
     @classmethod
     def of(cls, run: RunId, turn: RawCircle) -> LiveTrace:
-        """Return the trace of a recorded turn, centred too; every sample of it is kept."""
+        """Return the trace of a recorded turn, with all samples, centred too."""
         trace = cls(run, turn.circle)
         deviation_um = 1e3 * (turn.length_mm - turn.circle.bar_mm)
         trace._append(turn.circle.theta_deg(turn.phi_deg), deviation_um)
@@ -71,16 +67,16 @@ class LiveTrace:
 
     @property
     def theta_deg(self) -> NDArray[np.float64]:
-        """Angles from +X towards +Y, shape (n,) [deg]."""
+        """Return angles from +X towards +Y, shape (n,) [deg]."""
         return self._data[0, : self._count]
 
     @property
     def deviation_um(self) -> NDArray[np.float64]:
-        """Bar length minus nominal; not a number where the line breaks, shape (n,) [µm]."""
+        """Return bar length minus nominal, shape (n,) [µm]; NaN breaks the line."""
         return self._data[1, : self._count]
 
     def centre(self) -> None:
-        """Take the least-squares circle out of what is there, so that the form can be seen on a scale of its own."""
+        """Subtract the least-squares circle, for a scale of the form."""
         known = np.isfinite(self.deviation_um)
         height_mm = self.circle.bar_mm * np.sin(np.radians(self.circle.elevation_deg))
         radius_mm = np.sqrt((self.circle.bar_mm + self.deviation_um[known] / 1e3) ** 2 - height_mm**2)
@@ -92,7 +88,7 @@ class LiveTrace:
         self.centred = Derived(View.CENTRED, self, left_um, float(np.abs(left_um[known]).max()))
 
     def add(self, samples: Sequence[Sample]) -> None:
-        """Take samples in time order."""
+        """Add samples in time order."""
         # Strictly inside what is travelled: at its very ends stands the bar while it feeds in and out.
         first, last = -self.circle.overshoot_deg, _TURN_DEG + self.circle.overshoot_deg
         on_turn = [
@@ -118,7 +114,7 @@ class LiveTrace:
             self.largest_um = max(self.largest_um, float(np.abs(deviation[usable]).max()))
 
     def _take(self, step: int, theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]) -> None:
-        """Add points of one step of the travel, which may have some already."""
+        """Add points to one step of the travel."""
         if step == self._step:
             kept = self._data[:, self._step_from : self._count]
             theta_deg = np.concatenate([kept[0], theta_deg])
@@ -144,12 +140,11 @@ class LiveTrace:
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """A complete trace less something, drawn as one that was measured.
+    """A complete trace less its circle or the other direction.
 
     Attributes:
-        view: less what: its least-squares circle, or then also the other direction.
-        deviation_um: what is left of it; not a number where the line breaks, shape (n,) [µm].
-        largest_um: greatest of them, without sign [µm].
+        deviation_um: shape (n,); NaN breaks the line.
+        largest_um: absolute.
     """
 
     view: View
@@ -162,7 +157,7 @@ class Derived:
 
     @property
     def run(self) -> RunId:
-        """Which run."""
+        """Return the run."""
         return self.measured.run
 
     @property
@@ -172,19 +167,18 @@ class Derived:
 
     @property
     def theta_deg(self) -> NDArray[np.float64]:
-        """Angles from +X towards +Y, shape (n,) [deg]."""
+        """Return angles from +X towards +Y, shape (n,) [deg]."""
         return self.measured.theta_deg[: len(self)]
 
 
 def difference(ccw: Derived, cw: Derived) -> Derived | None:
-    """Return what counter-clockwise shows more than clockwise at the same angles; None where they share none.
+    """Return counter-clockwise less clockwise at equal angles, or None without common ones.
 
-    Of circles about their own centres: live angles are good to a degree or two, with opposite signs in the two directions,
-    and a centre that is off by 200 µm would show 7 µm of difference for each degree. Centres and means stand among the figures.
-    Between the points of the clockwise trace a straight line is taken, also over samples that the line lost.
+    Both are centred: live angles err by a degree or two, opposite in both directions, and a centre off by 200 µm would
+    give 7 µm per degree. The clockwise trace is interpolated linearly.
 
     Args:
-        ccw: one complete trace, centred.
+        ccw: complete and centred.
     """
     placed = np.isfinite(cw.theta_deg)
     if not placed.any():

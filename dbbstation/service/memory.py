@@ -1,4 +1,4 @@
-"""What was chosen last, and which sessions were open: kept in the user's folder for states, so that the next start offers it."""
+"""Last choices and open sessions, kept in the user's state folder."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST = 20
 
 
 class Line(BaseModel):
-    """Which instrument answers where."""
+    """Which instrument is where."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -46,7 +46,7 @@ class Line(BaseModel):
 
     @property
     def time_scale(self) -> float:
-        """How much faster than real time it goes."""
+        """Return its speed relative to real time."""
         return time_scale_of(self.port) or 1.0
 
 
@@ -72,10 +72,9 @@ class Remembered:
     """Last choices.
 
     Attributes:
-        machine: file of the nominal machine; None: none yet.
-        plan: file of the plan; None: none yet.
-        line: instrument and port.
-        sessions: folders, the last first, each with what it was measured by.
+        machine: file; None: none yet.
+        plan: file; None: none yet.
+        sessions: folders, the last first, with their lines.
     """
 
     machine: Path | None = None
@@ -86,11 +85,11 @@ class Remembered:
     sessions: tuple[tuple[Path, Line], ...] = ()
 
     def line_of(self, folder: Path) -> Line:
-        """Return what a session was measured by; the last choice where it is not remembered."""
+        """Return a session's remembered instrument, else the last choice."""
         return dict(self.sessions).get(folder.absolute(), self.line)
 
     def with_session(self, folder: Path, line: Line) -> Remembered:
-        """Return the same with a session that was opened just now; a virtual machine is the last choice of no other session."""
+        """Return the memory with a session just opened; a virtual line stays with its session."""
         folder = folder.absolute()
         others = [(other, by) for other, by in self.sessions if other != folder]
         last = self.line if line.virtual else line
@@ -101,7 +100,7 @@ class Memory:
     """The file of last choices.
 
     Args:
-        path: of the file; None: that of the user.
+        path: None: the user's.
     """
 
     def __init__(self, path: Path | None = None) -> None:
@@ -117,7 +116,7 @@ class Memory:
         return self._path
 
     def read(self) -> Remembered:
-        """Return the last choices; none where the file is missing or not understood: it is only a convenience."""
+        """Return the last choices; none if missing or unreadable."""
         try:
             file = _File.model_validate_json(content_of(self.path, LARGEST_BYTES))
         except (OSError, ValidationError):
@@ -128,7 +127,7 @@ class Memory:
         return Remembered(machine, plan, last, file.operator, file.serial_number, sessions)
 
     def write(self, remembered: Remembered) -> None:
-        """Keep the last choices; where they cannot be kept, nothing else suffers."""
+        """Keep the last choices if possible."""
         file = _File(
             machine=str(remembered.machine or ""),
             plan=str(remembered.plan or ""),

@@ -1,4 +1,4 @@
-"""Which events are worth a line of text, and how much they matter."""
+"""Messages of events and their importance."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dbbstation.station import events
 
 
 class Weight(StrEnum):
-    """How much a message matters."""
+    """Importance of a message."""
 
     NOTE = "note"
     WARNING = "warning"
@@ -18,18 +18,14 @@ class Weight(StrEnum):
 
 @dataclass(frozen=True)
 class Message:
-    """Something to be read.
-
-    Attributes:
-        weight: how much it matters.
-    """
+    """Something to be read."""
 
     weight: Weight
     text: str
 
 
 def message_of(event: object) -> Message | None:  # noqa: C901, PLR0911 - a line per event, nothing nested
-    """Return what an event has to say; None where the screen shows it in other ways."""
+    """Return an event's message, or None."""
     match event:
         case events.RunAccepted():
             return Message(Weight.NOTE, f"{event.run.label} accepted")
@@ -58,5 +54,5 @@ def message_of(event: object) -> Message | None:  # noqa: C901, PLR0911 - a line
 
 
 def problem_alone(completed: events.RunCompleted) -> str:
-    """Return a run's problem without the run's name, which some begin with and every text here says already."""
+    """Return a run's problem without its name."""
     return completed.problem.removeprefix(f"{completed.run.label}: ")

@@ -1,4 +1,4 @@
-"""Opening the session for a sequence, each time anew, with an instrument that stays open."""
+"""Open the session for each sequence, with an instrument that stays open."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 
 def opener(job: Job, line: HeldLine, *, observers: Sequence[Observer] = ()) -> Opener:
-    """Return what borrows the instrument and opens the session, each time anew.
+    """Return a function that borrows the instrument and opens the session anew.
 
     Args:
-        observers: told of everything after storage, before the screen.
+        observers: after storage, before the screen.
     """
 
     @contextmanager

@@ -1,4 +1,4 @@
-"""A job that an operator runs: the session that it is measured into, and the one answer at its end."""
+"""An operator's job: its session and final answer."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Operated:
-    """A job and where its file is.
+    """A job and its file.
 
     Attributes:
-        path: of the file; what it names lies beside it.
+        path: its other files are relative to it.
     """
 
     path: Path
@@ -47,11 +47,11 @@ class Operated:
 
     @property
     def sessions(self) -> Path:
-        """Folder that sessions are made in."""
+        """Return the folder of its sessions."""
         return self._beside(self.job.sessions)
 
     def choice(self) -> Choice:
-        """Return what is measured now: the last session of the job where it is not complete and has the same plan, else a new one."""
+        """Return what to measure: the last session if incomplete with the same plan, else a new one."""
         job = self.job
         line = Line(instrument=instrument_of(self.path, job), profile=job.profile, port=job.port, baud=job.baud)
         return Choice(
@@ -67,7 +67,7 @@ class Operated:
         )
 
     def tolerances_file(self, session: Path) -> Path:
-        """Write the job's tolerances as a settings file beside a session, and return it.
+        """Write the job's tolerances as settings beside a session and return the file.
 
         Raises:
             OutputError: it cannot be written.
@@ -101,8 +101,8 @@ class Answered:
     """The answer on a session.
 
     Attributes:
-        to_do: what to do, in order.
-        report: of everything; None where none could be made.
+        to_do: in order.
+        report: None if none was made.
     """
 
     word: Conformity
@@ -112,11 +112,11 @@ class Answered:
 
 
 class JobAnswer:
-    """Holds the circles of a session against the job's tolerances, by a report.
+    """Judges circles by the job's tolerances with a report.
 
     Args:
-        missing: runs of the plan that have no accepted recording, as people read them.
-        start: begins a job, in a process of its own.
+        missing: planned runs without accepted recording, in words.
+        start: begins a job in a process.
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class JobAnswer:
         self._after.do(SessionTask.REPORT)
 
     def look(self) -> Answered | None:
-        """Return the answer; None while it is worked out."""
+        """Return the answer; None until known."""
         self._after.look()
         result = self._after.results[SessionTask.REPORT]
         if result.progress in {None, WorkProgress.RUNNING}:
@@ -141,17 +141,14 @@ class JobAnswer:
         return answer_of(read_plain(ReportAnswer, result.answer).verdict, self._missing, result.path)
 
     def close(self) -> None:
-        """End what is being worked out."""
+        """Cancel the work."""
         self._after.close()
 
 
 def answer_of(verdict: VerdictAnswer, missing: Sequence[str], report: Path | None) -> Answered:
-    """Return the answer of a report's verdict; one that is complete needs every run of the plan.
+    """Return the answer of a verdict, which is complete only with every planned run.
 
-    What exceeds a limit does so whatever is missing; what is within says nothing of circles that were not measured.
-
-    Args:
-        missing: runs of the plan without an accepted recording.
+    A limit is exceeded whatever is missing.
     """
     kinds = {str(one): one for one in Conformity}
     word = kinds.get(verdict.kind, Conformity.UNDECIDED)
@@ -169,13 +166,13 @@ _WITHIN = "Every circle is within the limits of the job, with its uncertainty."
 
 
 def instrument_of(path: Path, job: JobFile) -> str:
-    """Return the name of a job's instrument, or the path of its protocol file, which lies beside the job."""
+    """Return a job's instrument name or protocol path, relative to the job."""
     named = job.instrument
     return str((path.parent / named).absolute()) if Path(named).suffix in {".yaml", ".yml"} else named
 
 
 def instrument_faults(path: Path) -> list[Problem]:
-    """Return what is wrong with the instrument that a job names: there is none of that name, or no such variant."""
+    """Return faults of a job's instrument or variant."""
     faults: list[Problem] = []
     document = read_document(path, JobFile, faults)
     job = None if document is None else validate(document, JobFile, faults)
@@ -194,7 +191,7 @@ def read_operated(path: Path) -> Operated:
     """Read a job.
 
     Raises:
-        InputError: every fault of it and of the files that it names.
+        InputError: every fault of it and its files.
     """
     if not path.is_file():
         raise InputError([Problem(str(path), 0, 0, "there is no such file", "check the path")])

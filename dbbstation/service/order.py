@@ -1,4 +1,4 @@
-"""In which order the tests of a plan are measured, and which are measured again at its end."""
+"""The order of a plan's tests, and repeats at its end."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Order(StrEnum):
 
 
 class Gate(StrEnum):
-    """What is measured a second time at the end: how far that differs is what the machine drifted by."""
+    """Tests repeated at the end, which show the drift."""
 
     PLAN = "plan"
     """What the plan names in `repeat_at_end`."""
@@ -35,10 +35,10 @@ class Gate(StrEnum):
 
 
 def ordered(plan: InlinePlan, order: Order, gate: Gate = Gate.PLAN) -> InlinePlan:
-    """Return the plan with its tests in an order.
+    """Return the plan with ordered tests.
 
     Args:
-        gate: what is repeated at the end; a plan that names tests to repeat keeps its own.
+        gate: repeated at the end; a plan's own repeats stay.
     """
     domain = plan.to_domain()
     choose = {Order.PLAN: lambda one: tuple(one.tests), Order.HOLDER: by_holder, Order.DRIFT: against_drift}

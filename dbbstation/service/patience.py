@@ -1,4 +1,4 @@
-"""How patient a driver is with the computer it runs on, in real and in scaled time."""
+"""A driver's patience in real and scaled time."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class DriverPatience(TypedDict):
 
 
 def driver_patience(time_scale: float, *, waits: bool = False) -> DriverPatience:
-    """Return what `Instrument` takes on a clock that runs `time_scale` times faster than real.
+    """Return arguments of `Instrument` on a clock `time_scale` times faster than real.
 
     Args:
-        waits: the machine sends nothing between runs.
+        waits: the machine is silent between runs.
     """
     if waits:
         return {"memory_s": _MEMORY_S, "timeout_s": _WAITING_TIMEOUT_S}

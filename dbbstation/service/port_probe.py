@@ -1,4 +1,4 @@
-"""What answers at a port: opened, one reading waited for, closed again."""
+"""Probe a port for one reading."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class ProbeOutcome:
 
     Attributes:
         port: name or URL.
-        answers: whether readings came that the protocol understands.
-        text: the reading, what the instrument says in place of one, or what is wrong and what helps.
+        answers: whether the protocol understood readings.
+        text: reading, status, or fault with remedy.
     """
 
     port: str
@@ -35,7 +35,7 @@ class ProbeOutcome:
 
 
 def ports() -> list[tuple[str, str]]:
-    """Return name and description of every serial port of this computer."""
+    """Return name and description of every serial port."""
     return [(name, description) for name, description, _ in connected_ports()]
 
 
@@ -44,7 +44,7 @@ def probe(protocol: Protocol, port: str, baud: int | None = None, patience_s: fl
 
     Args:
         port: name or URL.
-        baud: where the instrument is not set to the usual rate.
+        baud: if not the usual rate.
     """
     try:
         with Instrument(protocol, port, baud=baud, timeout_s=patience_s) as source:

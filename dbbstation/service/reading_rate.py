@@ -1,4 +1,4 @@
-"""How many readings come per second, and whether any come at all."""
+"""Readings per second."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _FEWEST = 3
 
 
 class ReadingRate:
-    """Counts samples over the last seconds, in the time of the samples."""
+    """Counts samples over the last seconds of their own time."""
 
     def __init__(self) -> None:
         self._batches: deque[tuple[float, int]] = deque()
         self.total = 0
 
     def add(self, samples: Sequence[Sample]) -> None:
-        """Count samples in time order; a run has a clock of its own, and where clocks change the count begins anew."""
+        """Count samples in time order; a changed clock resets the count."""
         last_s = samples[-1].t_s
         if self._batches and not 0.0 <= samples[0].t_s - self._batches[-1][0] <= _WINDOW_S:
             self._batches.clear()
@@ -34,12 +34,12 @@ class ReadingRate:
             self._batches.popleft()
 
     def forget(self) -> None:
-        """Begin anew: another line."""
+        """Reset for another line."""
         self._batches.clear()
 
     @property
     def per_s(self) -> float | None:
-        """Readings per second; None where too few came to tell."""
+        """Return readings per second; None for too few."""
         if len(self._batches) < _FEWEST:
             return None
         span_s = self._batches[-1][0] - self._batches[0][0]

@@ -1,4 +1,4 @@
-"""Runs the sequence in a thread of its own; the screen looks into the mailbox when it draws, and never makes it wait."""
+"""Run the sequence in a thread; the screen polls its mailbox."""
 
 from __future__ import annotations
 
@@ -29,11 +29,10 @@ _JOIN_S = 10.0
 
 @dataclass(frozen=True)
 class OpenStation:
-    """A station ready to run, its storage subscribed.
+    """A station ready to run, with storage.
 
     Attributes:
-        known: what judged runs of the session say, from disk.
-        virtual: whether machine and instrument are virtual.
+        known: results of judged runs.
     """
 
     station: Station
@@ -48,14 +47,14 @@ Opener: TypeAlias = "Callable[[], AbstractContextManager[OpenStation]]"
 
 
 class Runner:
-    """One sequence after the other, until the screen closes.
+    """Runs one sequence after another.
 
     Args:
         opener: called in the runner's thread.
-        line: the instrument, whose readings go on being shown when no sequence is being run; None: they are not.
+        line: shows readings between sequences; None: none.
 
     Attributes:
-        crash: what ended the thread and should not have: a mistake in the program.
+        crash: programming error that ended the thread.
     """
 
     def __init__(self, opener: Opener, line: HeldLine | None = None) -> None:
@@ -74,7 +73,7 @@ class Runner:
         return self._thread is not None and self._thread.is_alive()
 
     def start(self) -> None:
-        """Borrow the instrument, open the session and run; does nothing while a sequence is being run."""
+        """Open instrument and session and run, unless running."""
         if self.alive:
             return
         self._told = False
@@ -82,7 +81,7 @@ class Runner:
         self._thread.start()
 
     def send(self, command: Command) -> bool:
-        """Pass a command on; return whether anybody is there to take it."""
+        """Send a command; return whether it was taken."""
         station = self._station
         if station is None:
             return False
@@ -102,12 +101,12 @@ class Runner:
         return came
 
     def wait(self) -> None:
-        """Wait for the end of a sequence that is over, until it has let go of the session."""
+        """Wait until an ended sequence has released the session."""
         if self._thread is not None:
             self._thread.join(_JOIN_S)
 
     def close(self) -> None:
-        """End the sequence, also one that is only about to begin, and wait for that."""
+        """End any sequence and wait."""
         self._closing.set()
         self.send(Quit())
         self.wait()

@@ -1,4 +1,4 @@
-"""Whether the bar stands where a run begins, before anything is recorded."""
+"""Check the bar's place before a run."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ class BarAtFeedIn:
     """How the bar stands at the feed-in point.
 
     Attributes:
-        long_mm: reading less what it reads there, bar and feed-in [mm].
-        seated: whether the sequence takes it for standing there: on the far side of the middle of the feed-in,
-            by the margin of its detector.
-        backwards: whether it stands as far on the other side of the circle: where a gauge that counts the wrong way round has it.
+        long_mm: reading less the feed-in point's.
+        seated: whether the sequence accepts it: beyond the middle of the feed-in by the detector's margin.
+        backwards: on the opposite side, as with an inverted gauge.
     """
 
     long_mm: float
@@ -31,7 +30,7 @@ def seat(length_mm: float, circle: Circle) -> BarAtFeedIn:
     """Return how the bar stands at the feed-in point of a circle.
 
     Args:
-        circle: that is run next.
+        circle: the next.
     """
     long_mm = length_mm - (circle.bar_mm + circle.feed_in_mm)
     margin_mm = (0.5 - HYSTERESIS) * circle.feed_in_mm

@@ -1,4 +1,4 @@
-"""By what a session is gone on with: the instrument that is remembered of it, where session and memory are of the same world."""
+"""The instrument to continue a session with, both real or both virtual."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 def line_to_go_on(folder: Path, remembered: Line, given: Line) -> Line:
-    """Return instrument and port for a session that exists.
+    """Return instrument and port for an existing session.
 
-    A virtual session goes on with a virtual machine, whatever the shop's settings name; a real one never does.
+    A virtual session continues on a virtual machine; a real one never does.
 
     Args:
-        remembered: what it was measured by last, as this computer remembers.
-        given: the same with what command line and settings say.
+        remembered: of this computer.
+        given: by command line and settings.
     """
     try:
         session = read_session(folder)

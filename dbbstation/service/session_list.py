@@ -1,4 +1,4 @@
-"""Which sessions there are to go on with: found under a folder, or remembered."""
+"""Sessions to continue, in a folder or remembered."""
 
 from __future__ import annotations
 
@@ -30,13 +30,11 @@ class SessionLine:
     """One session.
 
     Attributes:
-        changed: when its file was written last.
-        accepted: runs of the plan that have an accepted recording.
-        planned: runs of the plan.
-        unjudged: runs that wait for a verdict.
-        left_s: time that the circles take that are left [s].
-        problem: why it cannot be gone on with; empty where it can.
-        virtual: whether its circles are of a virtual machine, as it says itself.
+        changed: last writing of its file.
+        accepted: planned runs with accepted recording.
+        unjudged: runs without verdict.
+        left_s: time of the remaining circles.
+        problem: why it cannot continue; may be empty.
     """
 
     folder: Path
@@ -52,22 +50,22 @@ class SessionLine:
 
     @property
     def complete(self) -> bool:
-        """Whether nothing is left to measure."""
+        """Return whether nothing is left to measure."""
         return not self.problem and self.accepted == self.planned
 
 
 def list_sessions(under: Path, remembered: Iterable[Path] = ()) -> tuple[SessionLine, ...]:
-    """Return sessions, those that were written last first.
+    """Return sessions, last written first.
 
     Args:
-        under: folder to search, and the folders in it.
-        remembered: further session folders; those that are gone are left out.
+        under: searched with subfolders.
+        remembered: further folders; missing ones are ignored.
     """
     return tuple(_line(folder, datetime.fromtimestamp(at, UTC)) for at, folder in dated_folders(under, remembered))
 
 
 def dated_folders(under: Path, remembered: Iterable[Path] = ()) -> list[tuple[float, Path]]:
-    """Return session folders with the time that their files were written [s since 1970]; arguments as of `list_sessions`."""
+    """Return session folders with their files' times [s since 1970]; arguments as of `list_sessions`."""
     folders = {folder.absolute() for folder in (*_found(under, DEPTH), *remembered)}
     dated = []
     for folder in folders:
@@ -113,5 +111,5 @@ def _line(folder: Path, changed: datetime) -> SessionLine:
 
 
 def schedule_of(session: SessionFolder) -> Schedule:
-    """Return what is done and left of a session that is only read."""
+    """Return done and left runs of a session, read only."""
     return Schedule(session.plan, lambda _test, _direction: 1, session.runs)

@@ -1,4 +1,4 @@
-"""The temperature of the shop: as somebody types it, and noted in a session that nothing is being recorded into."""
+"""The shop's temperature, typed and noted."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NOTED: TypeAdapter[float] = TypeAdapter(TemperatureDegc)
 
 
 def shop_degc(text: str) -> float | None:
-    """Return the temperature that a text is [degC], also with a decimal comma; None where no session file may hold it."""
+    """Return a text's temperature [degC], decimal comma allowed; None if not allowed in a session."""
     try:
         return _NOTED.validate_python(float(text.replace(",", ".")))
     except (ValueError, ValidationError):
@@ -27,7 +27,7 @@ def shop_degc(text: str) -> float | None:
 
 
 def note_temperature(folder: Path, degc: float) -> None:
-    """Note the present temperature; while a sequence runs, it takes an `AddNote` instead.
+    """Note the temperature in a session without running sequence, which takes an `AddNote`.
 
     Args:
         degc: temperature of the shop [degC].

@@ -1,4 +1,4 @@
-"""Another verdict on a run of a session that nobody writes into: the plan is through, and its sequence is over."""
+"""Change verdicts of a session after its sequence."""
 
 from __future__ import annotations
 
@@ -19,12 +19,9 @@ PATIENCE_S = 5.0
 def give_verdict(folder: Path, command: Judge) -> None:
     """Note another verdict in the session.
 
-    Args:
-        command: the run, and whether it counts.
-
     Raises:
         InputError: faults of the session.
-        OutputError: there is no such run, another process writes into the session, or the disk refuses.
+        OutputError: no such run, another process writes into the session, or the disk refuses.
     """
     with SessionWriter.open(folder, PATIENCE_S) as writer:
         key = (command.test, command.direction, command.repeat)

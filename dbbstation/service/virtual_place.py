@@ -1,4 +1,4 @@
-"""A machine and an instrument to try the screen on: both in this process, the line between them a real one."""
+"""A virtual machine and instrument in this process, over a real line."""
 
 from __future__ import annotations
 
@@ -29,12 +29,10 @@ if TYPE_CHECKING:
 
 
 class Helper:
-    """Stands at the virtual machine: puts balls up and starts circles when the station is ready for them.
-
-    An observer of the station.
+    """Mounts balls and starts circles for the station; an observer.
 
     Args:
-        programs: NC programs that command runs, by test and direction; those that have none are plain circles.
+        programs: NC programs by test and direction; else plain circles.
     """
 
     def __init__(self, cell: VirtualCell, programs: Mapping[tuple[str, Direction], RunProgram] | None = None) -> None:
@@ -64,12 +62,12 @@ class Helper:
 
 @dataclass(frozen=True)
 class VirtualPlace:
-    """Where the virtual things are.
+    """The virtual parts.
 
     Attributes:
         clock: their time [s].
-        helper: to be subscribed to the station.
-        wire: the instrument, for showing what faults look like.
+        helper: subscribe it to the station.
+        wire: the instrument, for simulated faults.
     """
 
     port: str
@@ -88,11 +86,11 @@ def virtual_place(
     seed: int = 0,
     programs: Mapping[tuple[str, Direction], RunProgram] | None = None,
 ) -> Iterator[VirtualPlace]:
-    """Switch on a machine with errors drawn at random, and an instrument that reads the bar on it.
+    """Start a machine with random errors and an instrument on it.
 
     Args:
-        time_scale: how much faster than real time it goes.
-        programs: NC programs that command runs, by test and direction.
+        time_scale: speed relative to real time.
+        programs: NC programs by test and direction.
 
     Raises:
         TravelError: a circle leaves the travel.

@@ -1,4 +1,4 @@
-"""Long work in a process of its own, which can be ended at any time; what it writes is written whole or not at all."""
+"""Long work in a process that can be ended; its outputs are whole or absent."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _POLITE_S = 3.0
 
 
 class WorkProgress(StrEnum):
-    """How work stands."""
+    """State of the work."""
 
     RUNNING = "running"
     DONE = "done"
@@ -48,7 +48,7 @@ class BackgroundWork:
     """One job, begun at once.
 
     Attributes:
-        stage: what it does now, as it says itself; empty before it says anything.
+        stage: by its own report; empty at first.
     """
 
     def __init__(self, job: SessionJob, folder: Path) -> None:
@@ -78,7 +78,7 @@ class BackgroundWork:
 
     @property
     def progress(self) -> WorkProgress:
-        """How it stands."""
+        """Return its state."""
         code = self._process.poll()
         if code is None:
             return WorkProgress.RUNNING
@@ -89,7 +89,7 @@ class BackgroundWork:
 
     @property
     def passed_s(self) -> float:
-        """Time since it began, until it ended [s]."""
+        """Return the time from begin to end [s]."""
         return (self._ended_s or time.monotonic()) - self._begun_s
 
     def wait(self) -> WorkProgress:
@@ -98,25 +98,25 @@ class BackgroundWork:
         return self.progress
 
     def answer(self) -> dict[str, object]:
-        """Return the result as JSON has it, once it is done."""
+        """Return the JSON result once done."""
         self._answer.seek(0)
         found: dict[str, object] = json.loads(self._answer.read())
         return found
 
     def failure(self) -> str:
-        """Return why it failed, once it has."""
+        """Return the failure, if any."""
         self._listener.join(_POLITE_S)
         return "\n".join(self._said[-4:])
 
     def cancel(self) -> None:
-        """Ask it to end, as Ctrl-C does; does nothing once it has ended. It ends when its input does, on every system."""
+        """Ask it to end, as Ctrl-C does, by ending its input."""
         self._cancelled = self._cancelled or self._process.poll() is None
         if self._process.stdin is not None:
             with suppress(OSError):
                 self._process.stdin.close()
 
     def close(self) -> None:
-        """End it, and wait for that."""
+        """End it and wait."""
         self.cancel()
         try:
             self._process.wait(_POLITE_S)
@@ -128,7 +128,7 @@ class BackgroundWork:
         self._answer.close()
 
     def _tell(self) -> None:
-        """Tell the process its job; one that has ended already says why by itself."""
+        """Send the process its job."""
         if self._process.stdin is None:
             return
         with suppress(OSError):

@@ -1,4 +1,4 @@
-"""What was worked out of a session before, so that it stands there when the session is opened again."""
+"""Earlier results of a session, shown when it is reopened."""
 
 from __future__ import annotations
 
@@ -55,10 +55,10 @@ class StepsBefore:
 
 
 def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
-    """Keep what was done beside its results; where that cannot be written, only the next start lacks it.
+    """Keep finished steps beside their results, if possible.
 
     Args:
-        key: of the session, as `counted` has it.
+        key: from `counted`.
     """
     with suppress(OSError, OutputError):
         file = _File(key=key, steps=steps)
@@ -66,9 +66,9 @@ def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
 
 
 def steps_before(session: Path) -> StepsBefore | None:
-    """Return the last folder of results of a session that is still the same, and what was done; None where none is.
+    """Return the last results of an unchanged session, or None.
 
-    A step whose file is gone is left out.
+    Steps with missing files are left out.
     """
     session = session.absolute()
     kept = sorted(session.parent.glob(f"{session.name}-results*/{FILE}"), key=lambda file: -file.stat().st_mtime)
@@ -89,11 +89,11 @@ def steps_before(session: Path) -> StepsBefore | None:
 
 
 def counted(session: Path) -> str:
-    """Return the key of what is worked out of a session: its files, and the program.
+    """Return the key of a session's results: its files and the program.
 
     Raises:
         InputError: faults of the session.
-        OSError: one of its files cannot be read.
+        OSError: a file cannot be read.
     """
     found = read_session(session)
     return key_of({"task": "steps"}, digests_of(files_of_session(found), found.folder))

@@ -1,8 +1,7 @@
-"""The process that does a task for the station: `python -m dbbstation.service.worker`, which can be ended at any time.
+"""The process of a station's task: `python -m dbbstation.service.worker`.
 
-It is told its job as one line of JSON on standard input and is interrupted when that input ends. It tells stages and what it notices on standard error, and prints the result as
-JSON on standard output. What it writes is written whole or not at all. It runs the tasks that commands run, and is the one part of the
-service that knows what is computed: the station itself never loads this module.
+It reads its job as one line of JSON and is interrupted when its input ends. Stages and notes go to standard error, the
+JSON result to standard output. Only this module of the service loads tasks.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ _LOG = logging.getLogger(__name__)
 
 
 class _Marked(logging.Formatter):
-    """Begins every line of a record with the mark of the log."""
+    """Marks every line of a log record."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return a record's lines."""
@@ -47,7 +46,7 @@ class _Marked(logging.Formatter):
 
 
 def main() -> None:
-    """Do the job that standard input says, and leave with a code."""
+    """Do the job on standard input and exit with a code."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_Marked())
     logging.basicConfig(level=logging.INFO, handlers=[handler])
@@ -73,7 +72,7 @@ def main() -> None:
 
 
 def _interrupted_at_the_end() -> None:
-    """Interrupt the work when the input ends: the station asks for that, or is gone."""
+    """Interrupt the work when the input ends."""
     # Not by `sys.stdin`: its lock would be held when the interpreter ends.
     while os.read(sys.stdin.fileno(), 1):
         pass
@@ -81,11 +80,11 @@ def _interrupted_at_the_end() -> None:
 
 
 def done(job: SessionJob) -> Mapping[str, object]:
-    """Do a job in the working folder; return its result as JSON has it.
+    """Do a job in the working folder; return its JSON result.
 
     Raises:
-        StationError: whatever the task raises.
-        ValueError: the job lacks a file that its task needs.
+        StationError: as of the task.
+        ValueError: the job lacks a file.
     """
     from dbbstation.facts.serialise import plain  # noqa: PLC0415 - the job is read before half a second of imports
 
@@ -100,7 +99,6 @@ def done(job: SessionJob) -> Mapping[str, object]:
 
 
 def _fitted(job: SessionJob) -> object:
-    """Calibrate or diagnose, and write the model."""
     from dbbstation.files.formats.model import write_model  # noqa: PLC0415 - the same
     from dbbstation.tasks.calibrate import calibrate  # noqa: PLC0415 - the same
     from dbbstation.tasks.diagnose import diagnose  # noqa: PLC0415 - the same
@@ -113,7 +111,7 @@ def _fitted(job: SessionJob) -> object:
 
 
 def _programs(job: SessionJob, settings: Settings) -> object:
-    """Write the NC programs of all circles, in the shop's dialect."""
+    """Write the circles' NC programs in the shop's dialect."""
     from dbbstation.tasks.circle_programs import write_circle_programs  # noqa: PLC0415 - the same
 
     plan, machine = _needed(job.plan, "plan"), _needed(job.machine, "machine")
@@ -168,7 +166,7 @@ def _needed(path: Path | None, what: str) -> Path:
 
 
 def _provenance(*words: str | Path) -> Provenance:
-    """Return where an output comes from: the command that does the same, files without folders, and the inputs so far."""
+    """Return the provenance: equivalent command, files without folders, inputs so far."""
     command = shlex.join(["dbbstation", *(name_of(word) if isinstance(word, Path) else word for word in words)])
     return Provenance(f"dbbstation {__version__}", command, inputs_so_far())
 

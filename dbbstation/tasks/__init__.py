@@ -1,1 +1,1 @@
-"""One file a task: paths or loaded objects go in, a typed result comes out. Commands, the station and Python scripts call these."""
+"""One file a task: paths or objects in, a typed result out, for commands, station and scripts."""

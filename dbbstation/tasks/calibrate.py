@@ -1,4 +1,4 @@
-"""Calibrate: from recorded sessions to a model of the machine, outliers kept out."""
+"""Calibrate: from recorded sessions to a model of the machine."""
 
 from __future__ import annotations
 
@@ -56,30 +56,30 @@ def calibrate(
 ) -> CalibrationResult:
     """Fit the machine's errors to the raw circles of one or more sessions.
 
-    The scatter of mountings, CMM and bar enters as random effects. Combinations of parameters that the tests cannot identify are
-    named and held at nominal. Balls and runs that are outliers are named and kept out of the fit.
+    Scatter of mountings, CMM and bar enters as random effects. Unidentifiable combinations of parameters are named and
+    held at nominal. Outlying balls and runs are named and left out.
 
     Args:
-        sessions: session folders, or what `load` returned of them.
-        sources: names of the error sources to fit; None: reference lengths of the struts and base joints.
-        method: how ball positions are known: from a CMM sheet (`jig`), not at all (`conv-a`), from micrometer readings (`conv-b`).
-        prescribe: parameters to hold at nominal, as `source.parameter`, as many as the tests cannot identify; None: with `jig` the
-            directions themselves are held, else the program chooses.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        law_over_time: fit thermal growth as a function of time, even where temperatures were logged.
-        known: every error source by name; None: the package's and those of installed packages.
-        progress: told each stage as it begins.
-        stop: asked at each stage whether to stop.
-        say: told what is noticed in the files.
+        sessions: folders, or the result of `load`.
+        sources: names; None: reference lengths of the struts and base joints.
+        method: ball positions: from a CMM sheet (`jig`), unknown (`conv-a`), from micrometer readings (`conv-b`).
+        prescribe: parameters to hold, as `source.parameter`, as many as are unidentifiable; None: `jig` holds the directions
+            themselves, else the program chooses.
+        tests: names; empty for all.
+        exclude: names of tests.
+        law_over_time: fit thermal growth over time, despite logged temperatures.
+        known: error sources by name; None: those of package and installed packages.
+        progress: called with each stage.
+        stop: asked at each stage.
+        say: called with notes.
 
     Returns:
         The model with the figures of its fit; `drawing` draws them.
 
     Raises:
         InputError: faults of files and traces.
-        ModelError: no source has that name; none of them belongs to the machine and shows in circles.
-        CalibrationError: the tests are too few, or the fit does not converge.
+        ModelError: an unknown source, or one that belongs to no machine or does not show in circles.
+        CalibrationError: too few tests, or the fit does not converge.
         StoppedError: `stop` returned True.
     """
     telling = Telling(progress, stop, say)
@@ -125,7 +125,7 @@ def _drawn(calibration: Calibration, wanted: object) -> bytes:
 
 
 def _prescribed(names: Sequence[str] | None, method: Method) -> list[Name] | None:
-    """Parameters named, or nobody's choice: the directions themselves on a jig, the program's choice otherwise."""
+    """Return named parameters, or by method the directions themselves or the program's choice."""
     if names is None:
         return None if method is Method.JIG else []
     parts = [name.partition(".") for name in names]
@@ -135,7 +135,7 @@ def _prescribed(names: Sequence[str] | None, method: Method) -> list[Name] | Non
 def _following_thermometers(
     fitted: tuple[ErrorSource, ...], recorded: Recorded, telling: Telling
 ) -> tuple[ErrorSource, ...]:
-    """Sources that grow with time by their thermometers where those were logged; noted, since it is another model."""
+    """Return sources that grow with logged temperatures instead of time, with a note."""
     forms = following_thermometers(fitted, Motions(recorded.observations))
     telling.note(
         *(

@@ -1,4 +1,4 @@
-"""Which tests of a plan were chosen."""
+"""The chosen tests of a plan."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 def chosen_of(plan: str, known: Iterable[str], tests: Sequence[str], exclude: Sequence[str]) -> list[str]:
-    """Return the tests of a plan that were chosen: those named, in that order, or all; without those left out.
+    """Return the named tests in that order, or all, without the excluded.
 
     Raises:
-        StationError: a name that the plan does not have; nothing is left.
+        StationError: an unknown name, or none is left.
     """
     names = list(known)
     unknown = [name for name in (*tests, *exclude) if name not in names]

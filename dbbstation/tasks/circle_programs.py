@@ -1,4 +1,4 @@
-"""Circle programs: from a plan to one NC program for each test and direction, nominal or compensated."""
+"""From a plan to one NC program for each test and direction."""
 
 from __future__ import annotations
 
@@ -58,30 +58,25 @@ def write_circle_programs(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> ProgramsResult:
-    """Write the programs of a plan's circles, all or none; each is checked against the machine's travel first.
+    """Write the programs of a plan's circles, all or none, checked against the travel.
 
     Args:
-        dialect: language of the control: a name, or the path of a Python file.
-        model: file of the model to compensate with; None: nominal programs.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        clearance_mm: height of rapid moves above the first point [mm]; None: the bar stays on, without rapids and stops.
-        chord_um: greatest distance between a straight move and the circle, of compensated programs [µm].
-        prefer: what to keep where chord error and feed cannot both be kept.
-        accept_chord_um: chord error that is accepted where the one asked for is missed [µm].
-        time_s: start of the programs after the session's start [s], for models that depend on time.
-        largest_correction_mm: a model that shifts any point by more is refused [mm].
-        known: every error source by name, for the file of the model.
-        provenance: asked, when all is read, where the programs come from.
-        progress: told how many programs are done.
-        say: told of causes in the model that nobody knows.
+        dialect: a name, or a Python file.
+        model: file; None: nominal programs.
+        tests: names; empty for all.
+        clearance_mm: height of rapids above the first point; None: the bar stays on, without rapids and stops.
+        chord_um: greatest distance of a compensated move from the circle.
+        prefer: what to keep if chord and feed cannot both be kept.
+        accept_chord_um: accepted if the requested one is missed.
+        time_s: start of the programs after the session's, for models that depend on time.
+        largest_correction_mm: models that shift a point by more are refused.
 
     Raises:
         InputError: every fault of the files.
         TravelError: a program leaves the machine's travel.
         ModelError: the model is of another machine, or has a source that needs what a program lacks.
-        StationError: a circle whose chord and feed cannot both be kept.
-        OutputError: a program exists and `force` is not given.
+        StationError: a circle cannot keep both chord and feed.
+        OutputError: a program exists without `force`.
         StoppedError: `stop` returned True; nothing was written.
     """
     telling = Telling(progress, stop, say)

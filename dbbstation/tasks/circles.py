@@ -1,4 +1,4 @@
-"""From session folders to the figures of their circles, with what the sessions state of bar and balls."""
+"""From session folders to the figures of their circles."""
 
 from __future__ import annotations
 
@@ -47,22 +47,22 @@ def circle_figures(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> CirclesResult:
-    """Work out the figures of measured circles, in the words of ISO 230-4:2005; no model is needed.
+    """Compute the figures of measured circles after ISO 230-4:2005; no model is needed.
 
     Args:
-        sessions: session folders or session files.
-        undulations: cut-off of the filter of G, F and H: 15, 30, 50 or 150 undulations per revolution; 0: none.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        findings: judge every run too.
+        sessions: folders or session files.
+        undulations: filter of G, F and H: 15, 30, 50 or 150 undulations per revolution; 0: none.
+        tests: names; empty for all.
+        exclude: names of tests.
+        findings: judge every run.
         quick_look: look for signatures of serial axes.
-        model: says where findings expect circles; None: the nominal machine.
-        progress: told how far it is.
-        stop: asked after each run whether to stop.
-        say: told what is noticed.
+        model: gives expected circles to findings; None: the nominal machine.
+        progress: called with each stage.
+        stop: asked after each run.
+        say: called with notes.
 
     Raises:
-        InputError: every fault of every file; no accepted run; a test that is named and that no session has.
+        InputError: every fault of every file; no accepted run; an unknown test.
         StoppedError: `stop` returned True.
         ValueError: there is no such filter.
     """
@@ -91,20 +91,18 @@ def load_circles(
     model: IdentifiedModel | None = None,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> Circled:
-    """Read sessions and work out the figures of their accepted runs.
+    """Read sessions and compute the figures of accepted runs.
 
-    Findings are made beside all accepted runs of a session, also of tests that are left out: they show what is usual.
+    Findings compare with all accepted runs, also of excluded tests.
 
     Args:
-        paths: session folders or session files.
+        paths: folders or session files.
         chosen: filter of G, F and H.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        model: where circles are expected; None: by the nominal machine.
-        progress: called with how many of how many runs of a session are done.
+        tests: names; empty for all.
+        model: gives expected circles; None: the nominal machine.
 
     Raises:
-        InputError: every fault of every file; no accepted run; a test that is named and that no session has.
+        InputError: every fault of every file; no accepted run; an unknown test.
     """
     sessions = [read_session(path) for path in paths]
     every = {test for session in sessions for test in session.plan.tests}
@@ -137,7 +135,7 @@ def load_circles(
 
 
 def _many(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
-    """Say which circle has so many accepted runs that one of them may be a mistake: the plan asks for one of each direction."""
+    """Return notes on circles with unplanned accepted runs, one of which may be a mistake."""
     of: dict[str, list[str]] = {}
     for run in runs:
         of.setdefault(f"{run.test} {run.direction}", []).append(str(run.repeat))
@@ -177,7 +175,7 @@ def _measured(
 
 
 def _corrected(session: SessionFolder, recording: Recording) -> Recording:
-    """Return a recording less what its bar reads too long, as a fit takes it into account (`Setup.bar_reads_long_mm`)."""
+    """Return a recording less the bar's excess, as a fit treats it (`Setup.bar_reads_long_mm`)."""
     if session.bar is None:
         return recording
     long_mm, _ = session.bar.reads_long_mm(session.bar_temp_c(recording.temperature_degc))
@@ -200,13 +198,13 @@ def _known(session: SessionFolder, run: RunEntry, recording: Recording) -> SetUp
 
 
 def _not_absolute(bar: Bar | None, measured_c: float | None) -> str:
-    """Why lengths that a bar measured are not absolute; empty where they are."""
+    """Return why a bar's lengths are not absolute, or an empty text."""
     lacks = ("calibrated length of the bar",) if bar is None else bar.lacks(measured_c)
     return f"not absolute, because the session does not state: {', '.join(lacks)}" if lacks else ""
 
 
 def _pairs(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[MeasuredPair]:
-    """Both directions of each test, repeat and mounting."""
+    """Return both directions of each test, repeat and mounting."""
     first: dict[tuple[str, int, str], MeasuredCircle] = {}
     pairs = []
     for circle in circles:

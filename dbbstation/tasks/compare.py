@@ -1,4 +1,4 @@
-"""Compare: two sessions side by side, where they differ and by which cause."""
+"""Compare two sessions: where they differ and by which cause."""
 
 from __future__ import annotations
 
@@ -39,23 +39,19 @@ def compare(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> ComparisonResult:
-    """Put two sessions side by side: where they differ, in what form, and by which cause. Differences are B less A.
+    """Compare two sessions: where they differ, in what form, by which cause, as B less A.
 
     Args:
-        a: session folder; its readings are the simulation of B.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        hold_out: choose everything anew without each group of tests, which asks whether causes predict others.
-        progress: told each stage.
-        stop: asked at each stage whether to stop.
-        say: told what is noticed in the files.
+        a: its readings serve as the simulation of B.
+        tests: names; empty for all.
+        hold_out: choose anew without each group of tests, to check predictions.
 
     Returns:
         What was found; `drawing` draws it.
 
     Raises:
-        InputError: faults of files; one session given twice.
-        TraceError: no run in common; circles whose centres were removed.
+        InputError: faults of files; one session twice.
+        TraceError: no common run; circles with removed centres.
         StoppedError: `stop` returned True.
     """
     telling = Telling(progress, stop, say)

@@ -1,4 +1,4 @@
-"""Compensate: any NC program through the inverse of a calibrated model."""
+"""Compensate any NC program with a calibrated model."""
 
 from __future__ import annotations
 
@@ -54,36 +54,35 @@ def compensate(
     provenance: Callable[[], Provenance] = from_python,
     say: Callable[[str], None] = silent,
 ) -> ProgramsResult:
-    """Compensate an NC program: what is written takes the real machine where `program` means to go.
+    """Compensate an NC program, so that the real machine follows `program`.
 
     Args:
-        program: file in machine coordinates; it must be whole, not compensated yet, and of no other machine.
-        model: a model, a file of one, or the result of `calibrate` or `diagnose`.
-        out: file to write; None: none, the text stands in the result.
-        dialect: language to write: a name, or a Python file.
-        written_in: language of `program`, likewise; None: by its extension.
+        program: file in machine coordinates, whole, not compensated, of no other machine.
+        model: a model, its file, or the result of `calibrate` or `diagnose`.
+        out: file; None: only the text in the result.
+        dialect: to write: a name, or a Python file.
+        written_in: dialect of `program`; None: by its extension.
         start: pose before the program, X, Y, Z [mm], A, B, C [deg]; None: its first move names all six.
-        chord_um: greatest distance between a straight move and the path [µm].
-        prefer: what to keep where chord error and feed cannot both be kept: `accuracy`, `feed` or `position-only`; None: the
-            program is refused then.
-        accept_chord_um: chord error that is accepted where `chord_um` is missed [µm].
-        time_s: start of the program after the session's start, for models that depend on time [s].
-        largest_correction_mm: a model that shifts any point by more is refused [mm].
+        chord_um: greatest distance of a move from the path.
+        prefer: if chord and feed cannot both be kept: `accuracy`, `feed` or `position-only`; None: refuse the program.
+        accept_chord_um: accepted if `chord_um` is missed.
+        time_s: start of the program after the session's, for models that depend on time.
+        largest_correction_mm: models that shift a point by more are refused.
         force: overwrite `out`.
-        known: every error source by name, for a file of a model.
-        provenance: asked for the header, when all is read.
-        say: told what is noticed.
+        known: error sources by name, for a model file.
+        provenance: called for the header after all reading.
+        say: called with notes.
 
     Raises:
         InputError: faults of files.
-        OutputError: `out` exists and `force` is not given.
+        OutputError: `out` exists without `force`.
         TravelError: the compensated path leaves the travel.
         KinematicsError: a pose that the machine cannot take.
         ModelError: the model has a source that needs what a program lacks.
         MachineError: a feed that the machine does not reach.
-        StationError: the program is compensated already or for another machine, its corrections are too large, or chord and feed
-            cannot both be kept.
-        ValueError: `prefer` is none of its words; `start` is no pose.
+        StationError: the program is compensated or for another machine, corrections are too large, or chord and feed cannot both
+            be kept.
+        ValueError: an unknown `prefer`, or `start` is no pose.
     """
     source = Path(program)
     pose = None if start is None else np.asarray(start, dtype=np.float64).reshape(6)

@@ -1,4 +1,4 @@
-"""Diagnose: from recorded sessions to the physics that a kinematic calibration of them leaves out."""
+"""Diagnose: from recorded sessions to physics beyond a kinematic calibration."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Diagnosed:
     """Recorded sessions with their diagnosis.
 
     Attributes:
-        lacking: why further candidates could not be looked at, by name.
+        lacking: reasons against further candidates, by name.
     """
 
     recorded: Recorded
@@ -61,12 +61,12 @@ class Diagnosed:
     lacking: Mapping[str, str]
 
     def summary(self) -> dict[str, object]:
-        """Everything that is said, as plain numbers."""
+        """Return all results as plain numbers."""
         return plain(diagnosis_figures(self.diagnosis, self.lacking))
 
 
 def default_candidates(known: Mapping[str, ErrorSource]) -> list[str]:
-    """Names of all error sources that are not fitted anyway."""
+    """Return the error sources that are not always fitted."""
     fitted = {source.name for source in default_sources()}
     return [name for name, source in known.items() if name not in fitted and source.candidate]
 
@@ -81,21 +81,17 @@ def diagnose_sessions(
     reading: Callable[[int, int], None] = lambda _done, _of: None,
     only: Sequence[str] = (),
 ) -> Diagnosed:
-    """Read sessions of one machine and find what a kinematic calibration of them leaves out.
+    """Read sessions of one machine and find physics beyond a kinematic calibration.
 
     Args:
-        paths: session folders or session files.
-        candidates: names of the error sources to look for; all that are known if None.
-        exclude: names of tests to leave out.
-        say: told what was noticed in the files.
-        known: every error source by name; those of the package if None.
-        progress: told each stage of the work as it begins.
-        reading: told how many runs of a session, of how many, are read.
-        only: names of tests to take; empty for all.
+        paths: folders or session files.
+        candidates: source names; None: all.
+        known: sources by name; None: the package's.
+        only: names of tests; empty for all.
 
     Raises:
         InputError: faults of files and traces.
-        ModelError: a name that no source has, or that of a source that is no cause.
+        ModelError: an unknown source, or one that is no cause.
         CalibrationError: the kinematic model cannot be fitted.
     """
     telling = Telling(_staged(progress, reading), say=lambda text: say(f"note: {text}"))
@@ -125,26 +121,26 @@ def diagnose(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> DiagnosisResult:
-    """Find the physics that a kinematic calibration of these recordings leaves out, name it and model it.
+    """Find, name and model the physics that a kinematic calibration leaves out.
 
     Args:
-        sessions: session folders, or what `load` returned of them.
-        sources: names of the error sources to compare; None: all.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        hold_out: choose everything anew without each group of tests, which asks whether causes predict others.
-        keep_unexplained: keep an unmodelled effect in the model, as a curve: compensated, cause unknown.
-        known: every error source by name; None: the package's and those of installed packages.
-        progress: told each stage as it begins.
-        stop: asked at each stage whether to stop.
-        say: told what is noticed.
+        sessions: folders, or the result of `load`.
+        sources: names; None: all.
+        tests: names; empty for all.
+        exclude: names of tests.
+        hold_out: choose anew without each group of tests, to check predictions.
+        keep_unexplained: keep an unmodelled effect as a compensated curve.
+        known: error sources by name; None: those of package and installed packages.
+        progress: called with each stage.
+        stop: asked at each stage.
+        say: called with notes.
 
     Returns:
         Causes with their verdicts, and the joint model; `drawing` draws them.
 
     Raises:
         InputError: faults of files and traces.
-        ModelError: a name that no source has, or that of a source that is no cause.
+        ModelError: an unknown source, or one that is no cause.
         CalibrationError: the kinematic model cannot be fitted.
         StoppedError: `stop` returned True.
     """
@@ -193,7 +189,7 @@ def _diagnosed(
 
 
 def _kept(found: Diagnosis, telling: Telling) -> JointFitWithCurve | None:
-    """Unmodelled effect to be kept in the model; None where it cannot be kept, with a note of the reason."""
+    """Return the unmodelled effect to keep, or None with a note."""
     try:
         return keeping(found.unexplained.curve, found.after)
     except ModelError as error:

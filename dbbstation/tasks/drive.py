@@ -1,4 +1,4 @@
-"""Drive: from recordings of one strut drive to its mass and friction, and what a model of these leaves out."""
+"""Identify a strut drive's mass and friction, and physics beyond them."""
 
 from __future__ import annotations
 
@@ -35,25 +35,22 @@ def drive(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> DriveResult:
-    """Identify one strut drive from position and force, and find the physics that mass and viscous friction leave out.
+    """Identify one strut drive from position and force, and find what mass and viscous friction leave out.
 
     Args:
-        recordings: CSV files with `t_s`, `position_mm` and `force_n` or `motor_current_a`, of one drive.
-        force_per_ampere: force of the drive at 1 A, where currents were recorded [N/A].
-        sources: names of the causes to compare; None: all.
-        cutoff_hz: bandwidth in which force and model are compared [Hz]; None: chosen from the recording.
-        hold_out: check on parts that causes were not chosen from, which takes most of the time.
-        progress: told each stage.
-        stop: asked at each stage whether to stop.
-        say: told what is noticed in the files.
+        recordings: CSV files with `t_s`, `position_mm` and `force_n` or `motor_current_a`.
+        force_per_ampere: force at 1 A [N/A], for currents.
+        sources: names of causes; None: all.
+        cutoff_hz: bandwidth of the comparison; None: chosen from the recording.
+        hold_out: check on parts that took no part in the choice; takes most of the time.
 
     Returns:
         What was found; `drawing` draws it, and `table` has what was compared.
 
     Raises:
         InputError: faults of the files.
-        ModelError: no cause has that name.
-        CalibrationError: the recordings are no strokes to and fro.
+        ModelError: an unknown cause.
+        CalibrationError: the recordings have no strokes to and fro.
         StoppedError: `stop` returned True.
     """
     telling = Telling(progress, stop, say)

@@ -1,4 +1,4 @@
-"""Evaluate: from recorded sessions and a model to what the model leaves of them, circle by circle."""
+"""Evaluate: what a model leaves of recordings, circle by circle."""
 
 from __future__ import annotations
 
@@ -41,25 +41,25 @@ def evaluate(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> EvaluationResult:
-    """Compare recordings with the nominal machine (before) and with a model (after), which must be of the same machine.
+    """Compare recordings with the nominal machine (before) and a model of it (after).
 
-    After is what the model leaves of the recordings, not a new measurement.
+    After is a residual, not a new measurement.
 
     Args:
-        sessions: session folders, or what `load` returned of them.
-        model: a model, a file of one, or the result of `calibrate` or `diagnose`.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        tolerances: to hold against every circle.
-        known: every error source by name, for a file; None: the package's and those of installed packages.
-        progress: told each stage.
-        stop: asked after each run whether to stop.
-        say: told what is noticed in the files.
+        sessions: folders, or the result of `load`.
+        model: a model, its file, or the result of `calibrate` or `diagnose`.
+        tests: names; empty for all.
+        exclude: names of tests.
+        tolerances: for every circle.
+        known: error sources by name, for a file; None: those of package and installed packages.
+        progress: called with each stage.
+        stop: asked after each run.
+        say: called with notes.
 
     Raises:
         InputError: faults of files and traces.
         TraceError: a run that is no circle.
-        ModelError: the model is of another machine; a source needs what the runs do not give.
+        ModelError: the model is of another machine; a source needs unknown data.
         KinematicsError: the plane of flatness lies outside the workspace.
         StoppedError: `stop` returned True.
     """

@@ -1,4 +1,4 @@
-"""Where pieces of work are done: in processes of this computer, or by the workers of a Dask scheduler. One way for both."""
+"""Run work in processes of this computer or by a Dask scheduler's workers."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ REACHED_S = 10.0
 
 
 class SchedulerError(StationError):
-    """A scheduler is not there, has no workers, or workers with another program."""
+    """A scheduler is missing, has no workers, or workers with another program."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """A piece of work whose process ended before it was done, also where it worked alone."""
+    """A piece of work whose process was ended, even alone."""
 
     why: str
 
@@ -40,8 +40,8 @@ class WorkPool(Generic[Item, Result]):
     """Where work is done.
 
     Attributes:
-        count: processes of this computer.
-        scheduler: address of a Dask scheduler, such as `tcp://server:8786`; empty for this computer.
+        count: of processes on this computer.
+        scheduler: such as `tcp://server:8786`; empty for this computer.
     """
 
     count: int = 1
@@ -49,13 +49,13 @@ class WorkPool(Generic[Item, Result]):
 
     @contextmanager
     def executor(self, count: int) -> Iterator[Executor]:
-        """Yield an executor; all that it does ends where this process is interrupted.
+        """Yield an executor, which ends when this process is interrupted.
 
         Args:
-            count: of processes, where they are this computer's.
+            count: of processes on this computer.
 
         Raises:
-            SchedulerError: there is no such scheduler; its workers have another program, or several threads.
+            SchedulerError: no such scheduler; its workers have another program or several threads.
         """
         if self.scheduler:
             with _of_dask(self.scheduler) as pool:
@@ -65,18 +65,17 @@ class WorkPool(Generic[Item, Result]):
                 yield pool
 
     def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> Generator[tuple[int, Result | Ended]]:
-        """Yield the place of an item and what was worked out of it, each once, as they are done.
+        """Yield the place and result of items, each once, as they are done.
 
-        A process that ends while it works takes nothing with it but what it worked on: that is done anew. Dask does so by
-        itself. A pool of this computer is begun anew; what may have ended it is done piece by piece, one process for each, and
-        what ends that, too, is `Ended`.
+        If a process ends, only its item is done anew. A local pool restarts and tries suspects singly; an item that ends
+        its process again is `Ended`.
 
         Args:
-            work: can be sent to another process: a function of a module.
-            items: can be sent too.
+            work: can be pickled.
+            items: can be pickled.
 
         Raises:
-            SchedulerError: as `executor`; the scheduler went away.
+            SchedulerError: as `executor`; or the scheduler disappeared.
             Exception: whatever `work` raises.
         """
         left = deque(range(len(items)))
@@ -115,7 +114,7 @@ class WorkPool(Generic[Item, Result]):
 
 
 def _is_killed(error: Exception) -> bool:
-    """Whether Dask gave a piece up because every worker that took it ended."""
+    """Return whether Dask gave up because every worker of a piece ended."""
     return type(error).__name__ == "KilledWorker"
 
 
@@ -164,7 +163,7 @@ def _check_workers(client: Any, address: str) -> None:  # noqa: ANN401 - distrib
 
 
 def refuse_other_program(identity: dict[str, str], whose: str) -> None:
-    """Refuse a program that differs from this one: its numbers would not be those of this one.
+    """Refuse another program, whose numbers may differ.
 
     Raises:
         SchedulerError: it differs.

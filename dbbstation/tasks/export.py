@@ -1,4 +1,4 @@
-"""Sessions as one tidy table: one row per sample, run after run, so that the memory it takes is that of one run."""
+"""Sessions as a tidy table, a row per sample, in the memory of one run."""
 
 from __future__ import annotations
 
@@ -56,23 +56,18 @@ def export(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> ExportResult:
-    """Write sessions as one tidy table: one row per sample, with test, direction, repeat, state, time, angle, length, deviation.
+    """Write sessions as a table with test, direction, repeat, state, time, angle, length, deviation.
 
     Args:
-        sessions: session folders or session files.
-        out: CSV or Parquet file to write.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        states: of runs to take; empty for all.
-        provenance: asked, when all is read, where the table comes from.
-        progress: told how many runs are done.
-        stop: asked after each run whether to stop.
-        say: told of what is missing.
+        sessions: folders or session files.
+        out: CSV or Parquet.
+        tests: names; empty for all.
+        states: of runs; empty for all.
 
     Raises:
-        InputError: a run cannot be read; no run is left.
-        OutputError: the file's ending is another; a file exists and `force` is not given; pyarrow is not installed.
-        StationError: a test that a plan does not have.
+        InputError: a run cannot be read, or none is left.
+        OutputError: another extension; a file exists without `force`; pyarrow is missing.
+        StationError: an unknown test.
         StoppedError: `stop` returned True; nothing was written.
     """
     path = Path(out)
@@ -121,22 +116,22 @@ class Exporting:
     """What is exported.
 
     Attributes:
-        runs: sessions with their runs, in order.
+        runs: with sessions, in order.
     """
 
     runs: tuple[tuple[SessionFolder, RunEntry], ...]
     names: tuple[str, ...]
 
     def is_text(self, name: str) -> bool:
-        """Whether a column holds texts."""
+        """Return whether a column holds texts."""
         return name not in _WHOLE and name not in {ANGLE, DEVIATION} and name not in columns.COLUMNS
 
 
 def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
-    """Return what exporting these runs means: every column that any of them has.
+    """Return these runs with every column that any has.
 
     Raises:
-        InputError: no run, or a file that is no run.
+        InputError: no run, or a file is no run.
     """
     faults: list[Problem] = []
     found: dict[str, None] = {}
@@ -159,13 +154,13 @@ def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
 
 
 def angles_deg(recording: Recording, circle: Circle) -> NDArray[np.float64]:
-    """Return the commanded angle of each sample on the full turn, from 0 up to 360, NaN for others, shape (n,) [deg].
+    """Return each sample's commanded angle on the full turn, 0 to 360, NaN for others, shape (n,) [deg].
 
     Args:
-        recording: of a whole run, or cut to the circle already.
+        recording: a whole run, or cut to its circle.
 
     Raises:
-        TraceError: neither angles nor the edges of a circle.
+        TraceError: neither angles nor edges of a circle.
     """
     if recording.theta_deg is not None:
         return np.mod(recording.theta_deg, FULL_TURN_DEG)
@@ -177,11 +172,7 @@ def angles_deg(recording: Recording, circle: Circle) -> NDArray[np.float64]:
 def blocks(
     what: Exporting, progress: Callable[[int, int], None], say: Callable[[str], None]
 ) -> Iterator[dict[str, NDArray[np.float64] | list[str]]]:
-    """Yield the columns of one run after the other: numbers with NaN where there are none, texts as lists.
-
-    Args:
-        progress: told how many of how many runs are done.
-        say: told of runs whose angles cannot be computed.
+    """Yield the columns of each run: numbers with NaN for gaps, texts as lists.
 
     Raises:
         InputError: a run cannot be read.
@@ -241,19 +232,13 @@ def write_csv(
     *,
     force: bool,
 ) -> int:
-    """Write the table as CSV, and beside it where it comes from; return the number of rows.
+    """Write the table as CSV with its provenance file; return the number of rows.
 
-    Numbers have as many digits as it takes to read back the same bits; a number that is not there is an empty cell.
-
-    Args:
-        provenance: asked when all is read.
-        progress: told how many runs are done.
-        say: told of what is missing.
-        force: replace files that exist.
+    Numbers read back the same bits; gaps are empty cells.
 
     Raises:
         InputError: a run cannot be read.
-        OutputError: a file exists and `force` is not given, or the disk refuses; nothing is replaced then.
+        OutputError: a file exists without `force`, or the disk refuses; nothing is replaced.
     """
     rows = 0
     with streamed(path, force=force) as file:
@@ -276,17 +261,11 @@ def write_parquet(
     *,
     force: bool,
 ) -> int:
-    """Write the table as Parquet, one row group per run, with provenance and meanings in its metadata; return the number of rows.
-
-    Args:
-        provenance: asked when all is read.
-        progress: told how many runs are done.
-        say: told of what is missing.
-        force: replace a file that exists.
+    """Write the table as Parquet, a row group per run, with provenance and meanings; return the number of rows.
 
     Raises:
         InputError: a run cannot be read.
-        OutputError: pyarrow is not installed; or as `write_csv`.
+        OutputError: pyarrow is missing; or as `write_csv`.
     """
     try:
         import pyarrow as pa  # noqa: PLC0415 - an extra of 100 MB that only this needs

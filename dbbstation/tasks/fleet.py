@@ -1,4 +1,4 @@
-"""Fleet: the same task on many sessions, each once, on this computer or on those of a Dask scheduler."""
+"""Do one task on many sessions, each once, on this computer or by a Dask scheduler."""
 
 from __future__ import annotations
 
@@ -53,10 +53,10 @@ class _Named:
     """A session of the fleet.
 
     Attributes:
-        session: what its file says; None where that cannot be read.
-        inputs: SHA-256 of the files that decide what comes out of it.
-        problem: why it cannot be read; empty where it can.
-        apart: whether it is a machine of its own where it has no serial number.
+        session: None if unreadable.
+        inputs: SHA-256 of files that decide its result.
+        problem: why it is unreadable, or empty.
+        apart: whether it counts as an own machine without a serial number.
     """
 
     name: str
@@ -68,14 +68,14 @@ class _Named:
 
     @property
     def machine(self) -> str:
-        """Serial number of the machine, or the name in its file; with the session where each is a machine of its own."""
+        """Return the serial number, or the name in the machine's file, with the session if it counts apart."""
         if self.session is None or self.session.serial_number:
             return "" if self.session is None else self.session.serial_number
         return f"{self.session.machine.name} ({self.name})" if self.apart else self.session.machine.name
 
     @property
     def started(self) -> str | None:
-        """Start of the first run that says when it started."""
+        """Return the first noted start of a run."""
         moments = () if self.session is None else [run.started for run in self.session.runs if run.started is not None]
         return min(moments).isoformat() if moments else None
 
@@ -102,27 +102,24 @@ def fleet(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> FleetResult:
-    """Do one task on every session of some folders, and hold the machines against one another.
+    """Do one task on every session of some folders and compare the machines.
 
-    Each result is written whole as soon as it is there. What has the same inputs, options and program as one that is kept is not
-    worked out again. A session that fails is named, and the others are done.
+    Results are written at once and reused while inputs, options and program are equal. A failing session is named, and
+    the others are done.
 
     Args:
-        folders: that hold session folders, at most four folders deep, or session folders.
+        folders: of sessions, at most four levels deep, or sessions.
         task: `calibrate`, `circles`, `diagnose` or `report`.
-        scheduler: address of a Dask scheduler whose workers do it in place of them; empty for none.
-        false_alarms: probability that like machines show any value as unlike.
-        apart: each session without a serial number is of a machine of its own; else those of one name are of one machine.
-        anew: work everything out again.
-        provenance: asked, when all is done, where table and page come from.
-        progress: told how many sessions are done.
-        say: told what is noticed.
+        scheduler: address of a Dask scheduler; empty for none.
+        false_alarms: probability that like machines show any unlike value.
+        apart: sessions without serial number are different machines; else machines of one name are one.
+        anew: ignore kept results.
 
     Raises:
         InputError: a folder holds no session.
-        OutputError: the folder of the results holds something else, or cannot be written.
-        SchedulerError: there is no such scheduler, or its workers have another program.
-        StoppedError: `stop` returned True; what was done is kept.
+        OutputError: the results' folder holds something else, or cannot be written.
+        SchedulerError: no such scheduler, or its workers have another program.
+        StoppedError: `stop` returned True; finished results are kept.
     """
     if task not in TASKS:
         raise StationError(f"there is no task {task!r} for a fleet", remedy=f"it is one of {', '.join(TASKS)}")
@@ -174,7 +171,7 @@ def fleet(
 
 
 def _sessions(folders: Sequence[Path], telling: Telling) -> Iterator[_Named]:
-    """Yield every session that some folders hold, in the order in which people count."""
+    """Yield the sessions of some folders in counting order."""
     for folder in folders:
         if (folder / SESSION_FILE).is_file() or folder.name == SESSION_FILE:
             place = folder.parent if folder.name == SESSION_FILE else folder
@@ -189,7 +186,7 @@ def _sessions(folders: Sequence[Path], telling: Telling) -> Iterator[_Named]:
 
 
 def _read(name: str, folder: Path) -> _Named:
-    """Read what a session says of itself, and hash what decides its results."""
+    """Read a session's own statements and hash what decides its results."""
     name = text_of_name(name)
     try:
         session = read_session(folder)
@@ -202,7 +199,7 @@ def _read(name: str, folder: Path) -> _Named:
 
 
 def _once(sessions: Iterator[_Named], telling: Telling) -> list[_Named]:
-    """Return each session once, whatever folder it was found by, and its copies not at all; names are distinguished."""
+    """Return each session once, without copies, under distinct names."""
     first: dict[str, _Named] = {}
     names: dict[str, int] = {}
     kept = []
@@ -221,7 +218,7 @@ def _once(sessions: Iterator[_Named], telling: Telling) -> list[_Named]:
 
 
 def _plain(options: FleetOptions) -> dict[str, object]:
-    """Return options as what decides results: files by their content, which stands beside, and settings by their tolerances."""
+    """Return options that decide results: settings by their tolerances."""
     data = {key: value for key, value in vars(options).items() if key not in {"source_files", "settings"}}
     return {**data, "tolerances": [asdict(one) for one in options.settings.tolerances]}
 
@@ -270,7 +267,7 @@ def _failed(one: _Named, problem: str) -> _Outcome:
 
 
 def _without_number(named: Sequence[_Named]) -> tuple[str, ...]:
-    """Say which sessions of one name were taken for one machine, or for several, since nobody noted a serial number."""
+    """Return notes on sessions without serial number that count as one machine or several."""
     of_name: dict[str, list[_Named]] = {}
     for one in named:
         if one.session is not None and not one.session.serial_number:
@@ -293,7 +290,7 @@ def _result(
     false_alarms: float,
     notes: tuple[str, ...],
 ) -> FleetResult:
-    """Put the outcomes together, and compare the last session of each machine."""
+    """Return the outcomes with a comparison of each machine's last session."""
     last: dict[str, int] = {}
     for place, outcome in enumerate(outcomes):
         if outcome.found is None:

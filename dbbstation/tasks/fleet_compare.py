@@ -1,4 +1,4 @@
-"""Machines of a fleet, held against one another in what they share."""
+"""Compare the machines of a fleet."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ CLAIMED = frozenset({"identified", "happened"})
 
 @dataclass(frozen=True, eq=False)
 class Sister:
-    """One machine of a fleet, by its last session.
+    """One machine, by its last session.
 
     Attributes:
-        name: serial number, or the name in its machine file.
+        name: serial number, or the name in its file.
     """
 
     name: str
@@ -44,13 +44,12 @@ _Key = tuple[str, ...]
 
 
 def compared(sisters: Sequence[Sister], false_alarms: float) -> FleetComparison:
-    """Hold machines against one another.
+    """Compare machines.
 
-    Figures are compared between all machines that drove the same circle. Parameters, and those of causes, are departures from
-    the nominal machine: they are compared between machines of one nominal geometry only.
+    Figures compare between machines with the same circle. Parameters and causes compare only within one nominal geometry.
 
     Args:
-        false_alarms: probability that like machines show any value as unlike.
+        false_alarms: probability that like machines show any unlike value.
     """
     kinds, notes = _geometries(sisters)
     rows: dict[_Key, dict[int, FleetValue]] = defaultdict(dict)
@@ -112,7 +111,7 @@ _LARGEST_LOG = 300.0
 
 
 def _geometries(sisters: Sequence[Sister]) -> tuple[list[int], list[str]]:
-    """Return which kind each machine is of, by its nominal geometry, and say what differs where there are several."""
+    """Return each machine's kind by nominal geometry, and differences in words."""
     first: list[int] = []
     kinds: list[int] = []
     for place, sister in enumerate(sisters):
@@ -149,7 +148,7 @@ def _named(names: Sequence[str]) -> str:
 
 
 def _causes(sisters: Sequence[Sister]) -> tuple[SharedCause, ...]:
-    """Return causes that were found anywhere, those of the fewest machines first."""
+    """Return the found causes, those of the fewest machines first."""
     there: dict[str, dict[str, float]] = defaultdict(dict)
     asked: dict[str, int] = defaultdict(int)
     for sister in sisters:

@@ -1,4 +1,4 @@
-"""Every value of a fleet as one tidy table, CSV or Parquet."""
+"""A fleet's values as one tidy table, CSV or Parquet."""
 
 from __future__ import annotations
 
@@ -28,11 +28,8 @@ _YES_OR_NO = frozenset({"unlike"})
 def write_fleet_table(path: Path, result: FleetResult, provenance: Provenance, *, force: bool = False) -> None:
     """Write every value of a fleet, one row for each.
 
-    Args:
-        path: of the table, .csv or .parquet.
-
     Raises:
-        OutputError: the ending is another; the file exists and `force` is not given; pyarrow is not installed.
+        OutputError: another extension; the file exists without `force`; pyarrow is missing.
     """
     rows = result.rows()
     if path.suffix.lower() == FORMATS[0]:

@@ -1,4 +1,4 @@
-"""What is done of one session of a fleet, in whatever process: a task, and what others may compare of it."""
+"""The work on one session of a fleet, in any process."""
 
 from __future__ import annotations
 
@@ -42,12 +42,9 @@ class FleetOptions:
     """What is asked of every session.
 
     Attributes:
-        sources: names of error sources, as `calibrate` and `diagnose` take them; None: as these choose.
-        method: how ball positions are known, as `calibrate` takes it.
-        findings: judge every run, as `circles` does.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        settings: of the shop, for a report.
+        sources: None: the task's choice.
+        method: of ball positions, as in `calibrate`.
+        tests: empty for all.
     """
 
     sources: tuple[str, ...] | None = None
@@ -60,7 +57,7 @@ class FleetOptions:
     settings: Settings = field(default_factory=Settings)
 
     def words(self) -> list[str]:
-        """Return them as the command of one session takes them, in its order."""
+        """Return the options of a single session's command, in order."""
         words = [] if self.sources is None else ["--sources", ",".join(self.sources)]
         for path in self.source_files:
             words += ["--source-file", name_of(path)]
@@ -73,11 +70,11 @@ class FleetOptions:
 
 @dataclass(frozen=True)
 class FleetPiece:
-    """One session that is to be worked on.
+    """One session to work on.
 
     Attributes:
-        inputs: SHA-256 of the files that decide what comes out, by path.
-        program: identity of the program that asks.
+        inputs: SHA-256 by path of the files that decide its result.
+        program: identity of the asking program.
     """
 
     task: str
@@ -92,10 +89,10 @@ class Worked:
     """What came of a piece.
 
     Attributes:
-        problem: why it failed; empty where it did not.
-        found: as plain numbers, what others may compare.
-        result: what the task's command prints as JSON.
-        files: further files of it, by their ending.
+        problem: empty without failure.
+        found: comparable results as plain numbers.
+        result: JSON of the task's command.
+        files: by extension.
     """
 
     problem: str = ""
@@ -105,10 +102,10 @@ class Worked:
 
 
 def worked(piece: FleetPiece) -> Worked:
-    """Do a task on one session, and return what came of it or why nothing did.
+    """Do a task on one session and return its result or failure.
 
     Raises:
-        SchedulerError: this process has another program than the one that asks.
+        SchedulerError: this process runs another program.
     """
     refuse_other_program(piece.program, "the process that asks")
     try:
@@ -222,7 +219,7 @@ TASKS = {"calibrate": _calibrated, "circles": _circles, "diagnose": _diagnosed, 
 
 
 def _provenance(piece: FleetPiece) -> Provenance:
-    """Return where an output comes from: from what a command of this session alone would."""
+    """Return the provenance as of a single session's command."""
     command = shlex.join(["dbbstation", piece.task, name_of(piece.folder), *piece.options.words()])
     return Provenance(f"dbbstation {__version__}", command, inputs_so_far())
 
@@ -236,7 +233,7 @@ def _parameters(model: IdentifiedModel) -> tuple[FleetValue, ...]:
 
 
 def _numbers(model: IdentifiedModel) -> list[tuple[str, str, str, float, float | None]]:
-    """Source, quantity, unit, value and uncertainty of the machine's parameters that were not held."""
+    """Return source, quantity, unit, value and uncertainty of the machine's free parameters."""
     return [
         (one.source, f"{one.source}: {one.name}", one.unit, one.value, one.u)
         for one in machine_parameters(model)
@@ -252,7 +249,7 @@ COMPARED = ("G", "X", "Y", "R")
 
 
 def _of_circles(runs: Sequence[RunFigures]) -> tuple[FleetValue, ...]:
-    """Means over the repeats of each test and direction; what is common to repeats is not averaged out of u."""
+    """Return means over repeats; u keeps what is common to them."""
     grouped: dict[tuple[str, str, str, str], list[tuple[float, float]]] = defaultdict(list)
     for run in runs:
         for figure in run.figures:

@@ -1,4 +1,4 @@
-"""From a folder of sessions to the histories of its machines, by an index of what was worked out of each session before."""
+"""Histories of the machines in a folder of sessions, through an index."""
 
 from __future__ import annotations
 
@@ -48,21 +48,19 @@ def history(
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
 ) -> HistoryResult:
-    """Return the histories of all machines whose sessions lie in a folder, at most four folders deep.
+    """Return the histories of all machines with sessions in a folder, at most four levels deep.
 
-    A session is read where one of its files has another time or size than in the index, and they have another content than any
-    that is known. One that cannot be read is left out and named.
+    A session is read again only if its files' stamps and contents are unknown to the index. Unreadable sessions are named
+    and left out.
 
     Args:
-        folder: that holds session folders, and models of `calibrate` or `diagnose`.
-        rebuild: read everything anew.
-        now: the time; None: the clock's.
-        progress: told how many of how many files are done.
-        stop: asked after each file whether to stop.
+        folder: with sessions, and models of `calibrate` or `diagnose`.
+        rebuild: ignore the index.
+        now: None: the clock's time.
 
     Raises:
-        InputError: there is no session in it, or none that can be used; a test that none of them has.
-        StoppedError: `stop` returned True; what was read until then is in the index.
+        InputError: no usable session; an unknown test.
+        StoppedError: `stop` returned True; what was read is indexed.
     """
     folder = Path(folder)
     counted = Telling(progress, stop).counted(READING)
@@ -123,7 +121,7 @@ _Kind = TypeVar("_Kind", SessionFigures, ModelFigures)
 
 @dataclass(frozen=True)
 class _File:
-    """A file of the folder: its path in it, its path, and its stamp before it was read."""
+    """A file with its relative path and stamp."""
 
     name: str
     path: Path
@@ -138,7 +136,7 @@ class _Unreadable:
 
 
 class _Reading:
-    """Reads sessions and models, from the index where it knows them."""
+    """Reads sessions and models through the index."""
 
     def __init__(self, kept: Kept, progress: Callable[[int, int], None], of: int) -> None:
         self.of = of
@@ -156,12 +154,12 @@ class _Reading:
         others: Callable[[Path], Sequence[Path]],
         processes: Callable[[Sequence[Path]], int] = lambda _paths: 1,
     ) -> dict[str, _Kind]:
-        """Return the figures of all files that can be read by their names, in their order; the name in them may be another.
+        """Return the figures of readable files in order.
 
         Args:
-            work: works them out, or says why it cannot.
-            others: further files that decide what comes out.
-            processes: how many to work such files out with.
+            work: computes them, or says why not.
+            others: further files that decide the result.
+            processes: number.
         """
         found: dict[str, _Kind] = {}
         reasons: dict[str, str] = {}
@@ -208,14 +206,14 @@ class _Reading:
 
 
 def _beside(session_file: Path) -> list[Path]:
-    """Return all other files of a session: machine, plan, runs, seal."""
+    """Return a session's other files: machine, plan, runs, seal."""
     folder = session_file.parent
     names = sorted(os.path.join(place, name) for place, _, here in os.walk(folder) for name in here)  # noqa: PTH118 - hundreds of folders
     return [Path(name) for name in names if name != str(session_file) and os.path.isfile(name)]  # noqa: PTH113 - the same
 
 
 def _contents(path: Path, others: Sequence[Path]) -> list[tuple[str, str]]:
-    """Return names and SHA-256 of a file and others; of one of these that cannot be read its name only."""
+    """Return names and SHA-256 of files; of an unreadable one only the name."""
     found = [("", digest_of(path))]
     for other in others:
         name = os.path.relpath(other, path.parent)
@@ -231,13 +229,13 @@ RUNS_WORTH_PROCESSES = 300
 
 
 def _processes_for(sessions: Sequence[Path]) -> int:
-    """Return how many processes are worth starting for sessions that have to be worked out."""
+    """Return how many processes are worth starting."""
     runs = sum(1 for path in sessions for _ in path.parent.glob("runs/*.csv"))
     return min(os.cpu_count() or 1, len(sessions)) if runs >= RUNS_WORTH_PROCESSES else 1
 
 
 def _session_data(path: Path) -> SessionFigures | _Unreadable:
-    """Return what is kept of a session, or why it cannot be read."""
+    """Return the kept facts of a session, or its fault."""
     from dbbstation.tasks.session_figures import session_figures  # noqa: PLC0415 - whoever opens an index does not wait for the compiler
 
     try:
@@ -247,7 +245,6 @@ def _session_data(path: Path) -> SessionFigures | _Unreadable:
 
 
 def _model_data(path: Path, source_files: Sequence[Path]) -> ModelFigures | _Unreadable:
-    """Return what is kept of a model, or why it cannot be read."""
     from dbbstation.tasks.session_figures import model_figures  # noqa: PLC0415 - the same
 
     try:
@@ -265,7 +262,7 @@ def _called(name: str) -> str:
 
 
 def _understood(kind: type[_Kind], text: str | None) -> _Kind | None:
-    """Return what a kept text says; None where there is none, or where somebody else wrote it."""
+    """Return the content of a kept text, or None."""
     try:
         return None if text is None else read_json(kind, text)
     except ValueError:
@@ -273,7 +270,7 @@ def _understood(kind: type[_Kind], text: str | None) -> _Kind | None:
 
 
 def _first_of(error: StationError) -> str:
-    """Return what is wrong on one line; of many faults the first, and how many more there are."""
+    """Return an error on one line, with the count of further ones."""
     lines = str(error).splitlines()
     return lines[0] + (f" (and {len(lines) - 1} more)" if len(lines) > 1 else "")
 

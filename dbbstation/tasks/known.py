@@ -1,4 +1,4 @@
-"""What is known by its name: error sources and instruments."""
+"""Known error sources and instruments by name."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 def known_sources(
     *, source_files: Sequence[str | PathLike[str]] = (), machine: str | PathLike[str] | None = None
 ) -> tuple[SourceDescription, ...]:
-    """Return the causes of error that are known: the package's, those of installed packages, those of Python files.
+    """Return the known causes: those of package, installed packages and Python files.
 
     Args:
-        source_files: Python files with error sources of one's own; they are executed.
-        machine: file of a machine, on which each says its parameters; None: parameters are left out.
+        source_files: own error sources; they are executed.
+        machine: file whose parameters are shown; None: without parameters.
 
     Raises:
         InputError: every fault of every file and entry point.
-        ModelError: the machine lacks what a source needs.
+        ModelError: the machine lacks data of a source.
     """
     nominal = None if machine is None else read_machine(Path(machine))
     every = every_source([Path(file) for file in source_files])

@@ -1,4 +1,4 @@
-"""Recorded sessions as observations: where files, traces and NC programs come together for calibration."""
+"""Recorded sessions as observations: files, traces and NC programs together."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class Recorded:
     """Accepted runs of one or more sessions of one machine.
 
     Attributes:
-        machine: nominal machine, the same in all sessions but for its name, which is that of the first.
-        observations: accepted runs in the order they were recorded.
+        machine: nominal, equal in all sessions but for its name (the first's).
+        observations: accepted runs in recording order.
         sessions: SHA-256 of each session file by session name.
-        warnings: what was found that does not spoil anything, and runs left out.
+        warnings: harmless findings, and omitted runs.
     """
 
     machine: Machine
@@ -62,33 +62,31 @@ def load(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> Recorded:
-    """Read sessions of one machine: their accepted runs, cut to circles, with what was commanded.
+    """Read sessions of one machine: accepted runs cut to circles, with their commands.
 
     Args:
-        sessions: session folders or session files.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        progress: told how far it is.
-        stop: asked after each run whether to stop.
-        say: told what is noticed in the files.
+        sessions: folders or session files.
+        tests: names; empty for all.
+        exclude: names of tests.
+        progress: called with each stage.
+        stop: asked after each run.
+        say: called with notes.
 
     Raises:
-        InputError: every fault of every file and trace; as `load_sessions`.
+        InputError: as `load_sessions`.
         StoppedError: `stop` returned True.
     """
     return loaded(sessions, tests, exclude, Telling(progress, stop, say))
 
 
 def loaded(sessions: Sessions | Recorded, tests: Sequence[str], exclude: Sequence[str], telling: Telling) -> Recorded:
-    """Return sessions, read where they are not yet; of those that are, the tests that were chosen.
+    """Return sessions, read if they are paths, with the chosen tests.
 
     Args:
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        telling: told how far it is and what was noticed.
+        tests: names; empty for all.
 
     Raises:
-        InputError: as `load_sessions`; no run of loaded sessions is left.
+        InputError: as `load_sessions`; or no run is left.
     """
     if not isinstance(sessions, Recorded):
         found = load_sessions(paths_of(sessions), exclude, telling.counted(READING), tests)
@@ -115,17 +113,14 @@ def load_sessions(
     progress: Callable[[int, int], None] = lambda _done, _of: None,
     only: Sequence[str] = (),
 ) -> Recorded:
-    """Read sessions, cut their accepted runs to circles and attach what was commanded.
+    """Read sessions, cut accepted runs to circles and attach commands.
 
     Args:
-        paths: session folders or session files.
-        exclude: names of tests to leave out.
-        progress: told how many runs of a session, of how many, are read.
-        only: names of tests to take; empty for all.
+        paths: folders or session files.
+        only: tests; empty for all.
 
     Raises:
-        InputError: every fault of every file and trace; a session that is given twice; sessions of different
-            machines; no accepted run; a test that is named and that no session has.
+        InputError: every fault of every file and trace; a session twice; different machines; no accepted run; an unknown test.
     """
     sessions = _unique_names([read_session(path) for path in paths])
     warnings = _check_one_machine(sessions)
@@ -186,7 +181,7 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
 
 
 def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
-    """Say which centres tell nothing of the machine's place: those about balls put up under the spindle [CAL III-A]."""
+    """Return a note on centres about balls under the spindle, which do not show the machine's place [CAL III-A]."""
     tests = dict.fromkeys(run.test for run in runs if not session.plan.tests[run.test].ball.place_known)
     if not tests:
         return []
@@ -199,7 +194,7 @@ def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str
 
 
 def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[SessionFolder]) -> list[Observation]:
-    """Give a ball that two sessions have from one CMM sheet one name, so that it has one error in both of them."""
+    """Name a ball of one CMM sheet alike in all sessions, so that it has one error."""
     names: dict[tuple[object, ...], str] = {}
     of = {session.name: session for session in sessions}
     shared = []
@@ -214,11 +209,11 @@ def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[S
 def _with_thermometers(
     observations: Sequence[Observation], logs: Mapping[str, Sequence[tuple[float, Recording]]]
 ) -> list[Observation]:
-    """Tell every run what the thermometers of its session showed in all runs: those that all runs in use have.
+    """Tell every run the thermometers of its session that all used runs have.
 
     Args:
-        logs: of each session, when runs with thermometers began [s] and what they hold, those that were left out too: leaving one
-            out must not change where growth is counted from.
+        logs: per session, begins [s] and content of all runs with thermometers, also omitted ones: growth counts from the same
+            start.
     """
     of = {}
     for session, runs in logs.items():
@@ -234,7 +229,7 @@ def _thermometer(name: str, runs: Sequence[tuple[float, Recording]]) -> Thermome
 
 
 def _left_out(session: SessionFolder, exclude: Sequence[str]) -> list[tuple[float, Recording]]:
-    """Accepted runs of tests that are left out, as far as they can be read, for their thermometers."""
+    """Return readable runs of excluded tests, for their thermometers."""
     found = []
     for run in session.in_state(RunState.ACCEPTED):
         began = session.started_s(run)
@@ -248,7 +243,7 @@ def _left_out(session: SessionFolder, exclude: Sequence[str]) -> list[tuple[floa
 
 
 def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:
-    """Number sessions whose folders have one name, so that their mountings are not taken for the same."""
+    """Number sessions with equal folder names, to keep their mountings apart."""
     names = [session.name for session in sessions]
     return [
         replace(session, name=f"{session.name} ({names[: k + 1].count(session.name)})")
@@ -259,7 +254,7 @@ def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:
 
 
 def _check_no_copies(sessions: Sequence[SessionFolder]) -> None:
-    """Refuse a session and its copy: they would count as two measurements, and uncertainties come out too small."""
+    """Refuse a session and its copy, which would halve the variance wrongly."""
     first: dict[str, SessionFolder] = {}
     for session in sessions:
         other = first.setdefault(session.sha256, session)
@@ -269,11 +264,7 @@ def _check_no_copies(sessions: Sequence[SessionFolder]) -> None:
 
 
 def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
-    """Refuse sessions whose machine files disagree; only the name may differ, and that is told.
-
-    Whatever the file holds decides something: joints and reference lengths the prediction, masses and compliance what
-    gravity does, tolerances the prior, travel what is proposed and exported.
-    """
+    """Refuse sessions with different machine files; a different name is only noted."""
     first = sessions[0]
     told, faults = [], []
     for other in sessions[1:]:
@@ -299,7 +290,7 @@ def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
 
 
 def check_named(sessions: Sequence[SessionFolder], every: set[str], named: Sequence[str], why: str = "") -> None:
-    """Refuse names of tests that no session has."""
+    """Refuse unknown names of tests."""
     unknown = [name for name in named if name not in every]
     if unknown:
         what = f"no session has a test {', '.join(unknown)}{why}"

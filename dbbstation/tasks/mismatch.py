@@ -1,4 +1,4 @@
-"""Mismatch: from a table of measured and simulated values to where they differ, and what was left out of the simulation."""
+"""Mismatch: where measured and simulated values of a table differ, and what the simulation lacks."""
 
 from __future__ import annotations
 
@@ -56,36 +56,36 @@ def mismatch(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> MismatchResult:
-    """Find where a simulation and a recording differ, in what form, and what was left out of the simulation.
+    """Find where simulation and recording differ, in what form, and what the simulation lacks.
 
-    A row of the table is one measured value beside the simulated one, with everything that was known then. Columns `d_NAME` are
-    derivatives of the simulated value by a parameter NAME, which is then fitted anew.
+    Each row has a measured and a simulated value with known conditions. Columns `d_NAME` are derivatives of the simulated
+    value by NAME, which is refitted.
 
     Args:
         data: CSV files.
-        measured: column of the measured values.
-        simulated: column of the simulated values, in the same unit.
-        variables: columns that the difference may follow, each with its unit or kind where its name does not say it; None: all.
-        run: column that tells runs apart; several files are several runs anyway.
-        time: column that says when; `rows`: the rows are in the order of measuring; None: it is guessed.
-        source_files: Python files with physics of your own, which are executed.
-        known_u: standard uncertainty to which parameters were known before, by name, in their own units.
-        free: parameters of which nothing is known, such as initial states.
-        has_offset: whether a constant of no interest may lie between measured and simulated values.
-        matters: size of an effect that matters, root mean square in the unit of the values; None: what refitted parameters leave.
-        hold_out: repeat everything for each held-out part, which takes most of the time.
-        numbers: how numbers are written; None: with a dot, and the separator that the header has most of.
-        progress: told each stage.
-        stop: asked at each stage whether to stop.
-        say: told what is noticed in the files.
+        measured: column.
+        simulated: column, in the same unit.
+        variables: columns that the difference may follow, each with unit or kind if its name has none; None: all.
+        run: column that separates runs; several files are several runs anyway.
+        time: column of time; `rows`: in the order of rows; None: guess.
+        source_files: own physics as Python, which is executed.
+        known_u: prior standard uncertainty of parameters by name, in their units.
+        free: parameters without prior, such as initial states.
+        has_offset: allow a constant difference of no interest.
+        matters: rms size that matters, in the unit of the values; None: what refitted parameters leave.
+        hold_out: repeat for each held-out part; takes most of the time.
+        numbers: notation; None: decimal point and the header's most frequent separator.
+        progress: called with each stage.
+        stop: asked at each stage.
+        say: called with notes.
 
     Returns:
         What was found; `drawing` draws it, and `table` has the corrected simulation.
 
     Raises:
         InputError: every fault of every file; too few rows.
-        StationError: the size that matters is none.
-        CalibrationError: the difference is so much larger than its noise that rounding hides what it follows.
+        StationError: `matters` is not above zero.
+        CalibrationError: rounding hides what so large a difference follows.
         StoppedError: `stop` returned True.
     """
     require_size(matters)
@@ -114,7 +114,7 @@ def mismatch(
 
 
 def require_size(matters: float | None) -> None:
-    """Refuse a size that matters of zero, which no recording could say "no" to.
+    """Refuse a size of zero, which no recording could exclude.
 
     Raises:
         StationError: it is not above zero.
@@ -128,7 +128,7 @@ def require_size(matters: float | None) -> None:
 def _meanings(
     variables: Mapping[str, Meaning | str | None] | Sequence[str] | None,
 ) -> dict[str, Meaning | None] | None:
-    """Return what columns are, by name; None where it is to be guessed."""
+    """Return meanings of columns by name; None to guess."""
     if variables is None:
         return None
     given = dict(variables) if isinstance(variables, Mapping) else dict.fromkeys(variables)
@@ -139,7 +139,7 @@ def _meanings(
 
 
 def _corrected(tabulated: Tabulated, found: Mismatch) -> dict[str, tuple[str | float, ...]]:
-    """Return the columns of the files with the corrected simulation and what it leaves."""
+    """Return the files' columns with the corrected simulation and the residual."""
     corrected = found.table.simulated + found.explained
     columns: dict[str, tuple[str | float, ...]] = {name: tabulated.columns[name] for name in tabulated.names}
     unit = f"_{found.table.unit.replace('µ', 'u')}" if found.table.unit else ""

@@ -1,4 +1,4 @@
-"""Models as tasks take them: loaded, as a file, or as part of a result."""
+"""Models for tasks: loaded, as file, or within a result."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class HasModel(Protocol):
-    """A result with a model, such as that of `calibrate`."""
+    """A result with a model."""
 
     @property
     def model(self) -> IdentifiedModel:
@@ -31,13 +31,13 @@ Model = str | PathLike[str] | IdentifiedModel | HasModel
 
 
 def model_of(model: Model, known: Mapping[str, ErrorSource] | None = None) -> IdentifiedModel:
-    """Return a model, read where it is a file.
+    """Return a model, read if it is a file.
 
     Args:
-        known: every error source by name; None: the package's and those of installed packages.
+        known: error sources by name; None: those of package and installed packages.
 
     Raises:
-        InputError: every fault of the file with its place.
+        InputError: every fault with its place.
     """
     if isinstance(model, str | PathLike):
         return read_model_file(Path(model), every_source() if known is None else known)
@@ -45,11 +45,11 @@ def model_of(model: Model, known: Mapping[str, ErrorSource] | None = None) -> Id
 
 
 def read_model(path: str | PathLike[str], *, source_files: Sequence[str | PathLike[str]] = ()) -> IdentifiedModel:
-    """Read a model that `calibrate` or `diagnose` wrote.
+    """Read a model of `calibrate` or `diagnose`.
 
     Args:
         path: of the file.
-        source_files: Python files with error sources of one's own that it names; they are executed.
+        source_files: own error sources that it names; they are executed.
 
     Raises:
         InputError: every fault of the files with its place.
@@ -65,10 +65,10 @@ def write_model(
     Args:
         path: of the file.
         model: a model, or the result of `calibrate` or `diagnose`.
-        provenance: where it comes from; None: the file does not say.
+        provenance: None: not stated.
         force: overwrite an existing file.
 
     Raises:
-        OutputError: the file exists and `force` is not given, or the disk refuses.
+        OutputError: the file exists without `force`, or the disk refuses.
     """
     write_model_file(Path(path), model_of(model), provenance=provenance, force=force)

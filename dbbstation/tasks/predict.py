@@ -1,4 +1,4 @@
-"""Predict: actual poses for commanded ones, with their uncertainties."""
+"""Predict actual poses for commanded ones, with uncertainties."""
 
 from __future__ import annotations
 
@@ -51,24 +51,24 @@ def predict(
     """Predict the actual poses for commanded ones, with standard uncertainties.
 
     Args:
-        model: a model, a file of one, or the result of `calibrate` or `diagnose`.
-        poses: commanded X, Y, Z [mm] and A, B, C [deg]: numbers of any type, shape (n, 6) or (6,), or a CSV file with the columns
-            x_mm, y_mm, z_mm, a_deg, b_deg, c_deg.
-        out: CSV file to write; None: none.
+        model: a model, its file, or the result of `calibrate` or `diagnose`.
+        poses: commanded X, Y, Z [mm] and A, B, C [deg], shape (n, 6) or (6,), or a CSV file with x_mm, y_mm, z_mm, a_deg, b_deg,
+            c_deg.
+        out: CSV file; None: none.
         force: overwrite it.
-        numbers: how numbers of a CSV file are written.
-        known: every error source by name, for a file of a model; None: the package's and those of installed packages.
-        provenance: asked, when all is read, where the file comes from.
-        progress: told each stage.
-        stop: asked at each stage whether to stop.
+        numbers: notation of a CSV file.
+        known: error sources by name, for a file; None: those of package and installed packages.
+        provenance: called after all reading.
+        progress: called with each stage.
+        stop: asked at each stage.
 
     Raises:
         InputError: faults of files.
         TravelError: a pose outside the machine's travel.
         KinematicsError: a pose that the actual machine cannot take.
         ModelError: a source needs more than poses.
-        OutputError: `out` exists and `force` is not given.
-        ValueError: numbers of another shape.
+        OutputError: `out` exists without `force`.
+        ValueError: another shape.
         StoppedError: `stop` returned True.
     """
     telling = Telling(progress, stop)

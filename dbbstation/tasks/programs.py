@@ -1,4 +1,4 @@
-"""What writing compensated programs shares: the model with its origin, files by hash, the text of a program."""
+"""Common parts of writing compensated programs."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ def inverse_of(
     prefer: str | None,
     accept_chord_um: float | None,
 ) -> Inverse:
-    """Return the model to compensate with; the header of programs will name its file and its sessions by hash.
+    """Return the model to compensate with; the header names its file and sessions by hash.
 
     Args:
-        largest_mm: greatest correction that is applied [mm].
-        prefer: what to keep where chord error and feed cannot both be kept.
-        accept_chord_um: chord error that is accepted where the one asked for is missed [µm].
+        largest_mm: greatest correction.
+        prefer: what to keep if chord and feed cannot both be kept.
+        accept_chord_um: accepted if the requested one is missed.
 
     Raises:
-        InputError: every fault of the file with its place.
-        ValueError: `prefer` is none of its words.
+        InputError: every fault with its place.
+        ValueError: an unknown `prefer`.
     """
     identified = model_of(model, known)
     origin = {"model file": hashed(Path(model))} if isinstance(model, str | PathLike) else {}
@@ -52,10 +52,10 @@ def inverse_of(
 
 
 def origin_of(named: Mapping[str, Path], inverse: Inverse | None, provenance: Provenance) -> dict[str, str]:
-    """Return what the header of a program says of its origin: files by their part in it, program, command, other inputs.
+    """Return a program's origin for its header: files by role, program, command, other inputs.
 
     Args:
-        inverse: the model to compensate with, which says in the header where it comes from by itself.
+        inverse: states its own origin.
 
     Raises:
         InputError: a file cannot be read.
@@ -65,7 +65,7 @@ def origin_of(named: Mapping[str, Path], inverse: Inverse | None, provenance: Pr
 
 
 def hashed(path: Path) -> str:
-    """Return a file's name and SHA-256, without its folder: the same file gives the same program anywhere.
+    """Return a file's name without folder and its SHA-256.
 
     Raises:
         InputError: it cannot be read.
@@ -74,7 +74,7 @@ def hashed(path: Path) -> str:
 
 
 def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file; raises InputError where it cannot be read."""
+    """Return the SHA-256 of a file; raises InputError if unreadable."""
     return hashlib.sha256(_content(path)).hexdigest()
 
 

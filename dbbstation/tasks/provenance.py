@@ -1,4 +1,4 @@
-"""Where outputs come from that a script asked for."""
+"""Provenance of a script's outputs."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from dbbstation.files.provenance import Provenance
 
 
 def from_python() -> Provenance:
-    """Return the provenance of an output that a Python script asked for: its command is not known."""
+    """Return the provenance of a Python script's output, without command."""
     return Provenance(f"dbbstation {__version__}", "from Python", inputs_so_far())

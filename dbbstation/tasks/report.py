@@ -1,4 +1,4 @@
-"""Report: measured circles against the shop's tolerances, as one HTML file."""
+"""Report measured circles against the shop's tolerances, as one HTML file."""
 
 from __future__ import annotations
 
@@ -72,27 +72,22 @@ def report(
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
 ) -> ReportResult:
-    """Write a report of measured circles: one HTML file that opens anywhere, without network, and prints to A4.
+    """Write a report as one HTML file that needs no network and prints to A4.
 
     Args:
-        settings: of the shop, with its tolerances.
-        before: session that was measured before, to put beside.
-        model: a model, a file of one, or the result of `calibrate` or `diagnose`, to put beside.
-        job: what was measured for, where the session does not say it or says something else.
-        certificate: refuse a report that lacks what a certificate needs.
-        pdf: file to print to, by an installed Chromium; None: none.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        known: every error source by name, for a file of a model.
-        provenance: asked, when all is read, where the report comes from.
-        progress: told each stage.
-        stop: asked at each stage whether to stop.
+        settings: with tolerances.
+        before: earlier session for comparison.
+        model: a model, its file, or the result of `calibrate` or `diagnose`.
+        job: if the session states none or another.
+        certificate: refuse a report that is no certificate.
+        pdf: file, printed by an installed Chromium; None: none.
+        tests: names; empty for all.
 
     Raises:
         InputError: faults of files.
-        OutputError: a file exists and `force` is not given; no browser prints.
+        OutputError: a file exists without `force`; no browser prints.
         ModelError: the model is of another machine.
-        StationError: `certificate`, and something is lacking; nothing was written.
+        StationError: `certificate` is set and something is missing; nothing was written.
         StoppedError: `stop` returned True; nothing was written.
     """
     page, paper = Path(out), None if pdf is None else Path(pdf)
@@ -146,11 +141,7 @@ _PHYSICS_MISSING = (
 def _read(
     paths: Sequence[Path], chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
 ) -> Recorded | StationError:
-    """Return the runs of sessions, read once for all parts of a report, or why they cannot be read.
-
-    Args:
-        chosen: tests to take, and to leave out.
-    """
+    """Return the runs of sessions, read once for all parts, or why they cannot be read."""
     try:
         return loaded(paths, *chosen, telling)
     except StoppedError:
@@ -160,7 +151,7 @@ def _read(
 
 
 def _modelled(runs: Recorded | StationError, identified: IdentifiedModel, telling: Telling) -> Modelled:
-    """Return what a model leaves; a run that it cannot take leaves the report without that, and says so."""
+    """Return what a model leaves, with a note on runs that it cannot take."""
     if isinstance(runs, StationError):
         return Modelled(identified, None, str(runs))
     try:
@@ -175,10 +166,10 @@ def _modelled(runs: Recorded | StationError, identified: IdentifiedModel, tellin
 def _ranked(
     recorded: Recorded | StationError, names: Sequence[str], identified: IdentifiedModel, telling: Telling
 ) -> Ranked:
-    """Return what each cause of a model contributes to circles under nominal programs; a session that it cannot take has none, and says so.
+    """Return each cause's contribution under nominal programs, with a note on sessions that the model cannot take.
 
     Args:
-        recorded: runs: those before, where there are some; or why they cannot be read.
+        recorded: runs before, if given; or why unreadable.
     """
     telling.stage("effects of causes")
     try:

@@ -1,4 +1,4 @@
-"""From one session folder, or one model file, to what a history knows of it."""
+"""A history's facts of one session folder or model file."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 
 
 def session_figures(folder: Path) -> SessionFigures:
-    """Read a session and work out the figures of its accepted runs.
+    """Read a session and compute the figures of accepted runs.
 
     Raises:
-        InputError: every fault of its files; no accepted run.
+        InputError: every fault of its files; or no accepted run.
     """
     with input_book():  # recordings are inputs of what is kept, not of the command that happens to read them
         found = load_circles([folder], TOLERATED)
@@ -64,7 +64,7 @@ def session_figures(folder: Path) -> SessionFigures:
 
 
 def run_figures(circles: Sequence[MeasuredCircle]) -> tuple[RunFigures, ...]:
-    """Return what a history, and a comparison of machines, know of circles; those whose recording shows no circle are left out."""
+    """Return the comparable figures of circles, without runs that show none."""
     shown = [one for one in circles if one.analysis is not None]
     return tuple(map(_figures, shown, tolerated_circles(shown)))
 
@@ -95,7 +95,7 @@ def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
 
 
 def _as_printed(parameter: ModelParameter) -> ModelParameter:
-    """Return a parameter as `calibrate` prints it: lengths in micrometres, its name without its unit."""
+    """Return a parameter as `calibrate` prints it: in micrometres, name without unit."""
     name = parameter.name.removesuffix("_mm").replace("_", " ")
     if parameter.unit != "mm":
         return replace(parameter, name=name)
@@ -104,7 +104,7 @@ def _as_printed(parameter: ModelParameter) -> ModelParameter:
 
 
 def _in_words(circle: Circle) -> str:
-    """Return what two circles share where their figures are comparable: place, bar, tilt, elevation and feed."""
+    """Return what comparable circles share: place, bar, tilt, elevation, feed."""
     place = " ".join(f"{axis}{round(value)}" for axis, value in zip("XYZ", circle.ball_mm, strict=True))
     tilt = " ".join(f"{axis}{value:g}" for axis, value in zip("ABC", circle.tilt_deg, strict=True) if value)
     raised = f", bar raised {circle.elevation_deg:g}°" if circle.elevation_deg else ""
@@ -112,7 +112,7 @@ def _in_words(circle: Circle) -> str:
 
 
 def _programs(runs: Iterable[RunEntry]) -> str:
-    """Return a hash over what was commanded instead of the plan's circles: models of the programs, or themselves."""
+    """Return a hash over commanded programs, by their models or content."""
     found = sorted({run.program.model_sha256 or run.program.sha256 for run in runs if run.program is not None})
     return hashlib.sha256("\n".join(found).encode()).hexdigest()[:16] if found else ""
 
@@ -153,7 +153,7 @@ def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures
 
 
 def machine_parameters(identified: IdentifiedModel) -> tuple[ModelParameter, ...]:
-    """Return the machine's parameters of a model, with uncertainties for their difference from those of another session."""
+    """Return the machine's parameters, with uncertainties of differences between sessions."""
     u = identified.uncertainties_between_sessions
     parameters = []
     for fitted in identified.model.sources:

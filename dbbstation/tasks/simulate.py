@@ -1,4 +1,4 @@
-"""Simulate: noise-free recordings of a plan, as a model predicts them."""
+"""Simulate noise-free recordings of a plan by a model."""
 
 from __future__ import annotations
 
@@ -47,25 +47,21 @@ def simulate(
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
 ) -> SimulatedSession:
-    """Write the session that a ball bar would record on the machine of a model, without noise.
+    """Write the session that a ball bar would record on a model's machine, without noise.
 
-    Balls are at the positions of the plan; balls under the spindle are at the tool tip of the model. Only the machine's own error
-    sources act. Samples have commanded angles; lengths are written to 1 nm.
+    Balls are at the plan's positions, balls under the spindle at the model's tool tip. Only the machine's own sources
+    act. Lengths are written to 1 nm.
 
     Args:
-        model: a model, a file of one, or the result of `calibrate` or `diagnose`.
-        out: session folder to make.
-        tests: names of tests to take; empty for all.
-        exclude: names of tests to leave out.
-        interval_s: time from the start of one run to the next [s].
-        known: every error source by name, for a file of a model.
-        progress: told each run.
-        stop: asked at each run whether to stop.
+        model: a model, its file, or the result of `calibrate` or `diagnose`.
+        out: new session folder.
+        tests: names; empty for all.
+        interval_s: between starts of runs.
 
     Raises:
         InputError: faults of files.
-        OutputError: the folder exists already.
-        StationError: a test that the plan does not have; a circle that the machine cannot travel.
+        OutputError: the folder exists.
+        StationError: an unknown test; a circle that the machine cannot travel.
         StoppedError: `stop` returned True; nothing was written.
     """
     folder, telling = Path(out), Telling(progress, stop)

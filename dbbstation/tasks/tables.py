@@ -1,4 +1,4 @@
-"""Tables of measured and simulated values, from their files to what is compared: one way in for command and studies."""
+"""Read tables of measured and simulated values, for command and studies."""
 
 from __future__ import annotations
 
@@ -46,15 +46,15 @@ class TableOptions:
     """What is asked of the files.
 
     Attributes:
-        measured: name of the column.
-        simulated: name of the column.
-        variables: meaning by name of the columns that the difference may follow; None: all that qualify.
-        run: column that tells runs apart; None where there is none.
-        time: column that says when, `ROWS` for the order of the rows; None: it is guessed.
-        numbers: how numbers are written; None: a dot in them, and the separator that the header has most of.
-        known: standard uncertainty to which parameters were known before, by name.
-        free: parameters of which nothing is known.
-        has_offset: whether measured and simulated values may differ by a constant that is of no interest.
+        measured: column.
+        simulated: column.
+        variables: meaning by name of columns that the difference may follow; None: all that qualify.
+        run: column that separates runs, or None.
+        time: column of time, `ROWS` for row order; None: guess.
+        numbers: notation; None: decimal point and the header's most frequent separator.
+        known: prior standard uncertainty of parameters, by name.
+        free: parameters without prior.
+        has_offset: whether a constant difference is of no interest.
     """
 
     measured: str
@@ -73,8 +73,8 @@ class Tabulated:
     """Files read.
 
     Attributes:
-        columns: texts by name, rows as they are in `table`.
-        notes: what was left out, and why.
+        columns: texts by name, rows as in `table`.
+        notes: omissions with reasons.
     """
 
     table: Table
@@ -88,12 +88,12 @@ RESULT = "result"
 
 
 def stated_variables(text: str) -> dict[str, Meaning | None]:
-    """Variables as the option gives them: `q1=deg,temperature,torque=N m:result`; None where the meaning is to be guessed.
+    """Return variables of an option: `q1=deg,temperature,torque=N m:result`; None to guess.
 
-    One with `:result` is driven: it results from what is simulated.
+    `:result` marks a variable that results from the simulation.
 
     Raises:
-        InputError: a unit or kind that is not known.
+        InputError: an unknown unit or kind.
     """
     found: dict[str, Meaning | None] = {}
     faults = []
@@ -123,7 +123,7 @@ def stated_variables(text: str) -> dict[str, Meaning | None]:
 
 
 def stated_uncertainties(text: str) -> dict[str, float]:
-    """Standard uncertainties as the option gives them: `mass=0.2,stiffness=300`.
+    """Return standard uncertainties of an option: `mass=0.2,stiffness=300`.
 
     Raises:
         InputError: one that is no positive number.
@@ -147,7 +147,7 @@ def load_tables(paths: Sequence[Path], asked: TableOptions) -> Tabulated:
     """Read tables and put them together.
 
     Raises:
-        InputError: every fault of every file with its line; measured and simulated values in different units; too few rows.
+        InputError: every fault with its line; different units of measured and simulated values; too few rows.
     """
     needed = [asked.measured, asked.simulated, *(asked.variables or ())]
     needed += [name for name in (asked.run, asked.time) if name is not None and name != ROWS]
@@ -184,7 +184,7 @@ millimetres. A difference of which the smaller is the millionth part has no digi
 
 
 def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
-    """Columns whose numbers no quantity has, with the line of the greatest."""
+    """Return columns with impossible numbers, with the line of the greatest."""
     faults = []
     for name in dict.fromkeys(names):
         size = np.abs(np.nan_to_num(file.values[name], nan=0.0, posinf=0.0, neginf=0.0))
@@ -198,7 +198,7 @@ def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
 
 
 def _faults_of_scale(files: Sequence[TableFile], asked: TableOptions) -> list[Problem]:
-    """What is wrong where measured and simulated values cannot be of one quantity."""
+    """Return why measured and simulated values cannot be one quantity."""
     greatest = {name: _greatest(files, name) for name in (asked.measured, asked.simulated)}
     less, more = min(greatest, key=lambda name: greatest[name]), max(greatest, key=lambda name: greatest[name])
     if greatest[less] == 0.0 or greatest[more] <= LARGEST_RATIO * greatest[less]:
@@ -215,7 +215,7 @@ def _greatest(files: Sequence[TableFile], name: str) -> float:
 
 
 def load_sources(files: Sequence[Path], table: Table) -> tuple[list[TableSource], dict[str, str]]:
-    """Physics of one's own that a table has the columns for, and why the others cannot be asked, by name.
+    """Return own physics for which the table has columns, and why others lack them, by name.
 
     Raises:
         InputError: faults of the files.
@@ -232,7 +232,7 @@ def load_sources(files: Sequence[Path], table: Table) -> tuple[list[TableSource]
 
 
 class _Reader:
-    """Puts files together, column by column."""
+    """Joins files column by column."""
 
     def __init__(self, files: Sequence[TableFile], asked: TableOptions, unit: str) -> None:
         self._files, self._asked, self._unit = files, asked, unit
@@ -243,7 +243,7 @@ class _Reader:
             self._notes.append(f"not in every file and left out: {', '.join(elsewhere)}")
 
     def read(self) -> Tabulated:
-        """All of it."""
+        """Return the table."""
         asked = self._asked
         values = {name: np.concatenate([file.values[name] for file in self._files]) for name in self._names}
         chosen, derivatives = self._chosen(values), self._derivatives(values)
@@ -281,7 +281,6 @@ class _Reader:
         return Tabulated(table, tuple(self._names), texts, tuple(self._notes))
 
     def _refuse_unknown(self, table: Table) -> None:
-        """Refuse statements about parameters that the table has no derivative of."""
         there = ", ".join(table.derivatives) or "none"
         remedy = f"name parameters of columns {DERIVATIVE}NAME, here: {there}"
         stated = [("--known", name) for name in self._asked.known] + [("--free", name) for name in self._asked.free]
@@ -300,7 +299,7 @@ class _Reader:
         return [name for name in found if self._is_numeric(name, values[name])]
 
     def _chosen(self, values: Mapping[str, NDArray[np.float64]]) -> list[str]:
-        """Columns that the difference may follow: those that were named, or all that are no other thing."""
+        """Return the named columns that the difference may follow, or all without another role."""
         asked = self._asked
         if asked.variables is not None:
             return list(asked.variables)
@@ -312,7 +311,7 @@ class _Reader:
         return [name for name in others if name not in siblings and self._is_numeric(name, values[name])]
 
     def _is_another_pair(self, name: str) -> bool:
-        """Whether a column belongs to another pair of measured and simulated values, by the word that tells these apart."""
+        """Return whether a column belongs to another measured and simulated pair, by its distinguishing word."""
         measured, simulated = (set(_words(one)) for one in (self._asked.measured, self._asked.simulated))
         marks = (measured - simulated, simulated - measured)
         words = _words(name)
@@ -345,7 +344,7 @@ class _Reader:
     def _order(
         self, values: Mapping[str, NDArray[np.float64]], used: Sequence[str], clock: str | None
     ) -> tuple[NDArray[np.int64], tuple[slice, ...], tuple[str, ...]]:
-        """Rows that have all values, block by block in time order; the blocks and their names."""
+        """Return complete rows, block by block in time order, with the blocks and their names."""
         good = np.all([np.isfinite(values[name]) for name in dict.fromkeys(used)], axis=0)
         if not good.all():
             self._notes.append(f"{int((~good).sum())} of {len(good)} rows lack a number and are left out")
@@ -390,7 +389,7 @@ class _Reader:
         return Meaning(found.unit, Kind.TIME) if name == self._asked.time else found
 
     def _variable(self, name: str, values: NDArray[np.float64], *, quiet: bool = False) -> Variable | None:
-        """Return a variable; None where it is the same in all rows."""
+        """Return a variable, or None for a constant."""
         meaning = self._meaning(name)
         if np.ptp(values) == 0.0:
             if not quiet:
@@ -410,7 +409,7 @@ class _Reader:
         return kept
 
     def _is_the_difference(self, variable: Variable, kept: Mapping[str, NDArray[np.float64]]) -> bool:
-        """Whether a column is made of measured and simulated value, such as their difference."""
+        """Return whether a column derives from measured and simulated value."""
         asked = self._asked
         both = np.column_stack([np.ones(len(variable.values)), kept[asked.measured], kept[asked.simulated]])
         values, *_ = np.linalg.lstsq(both, variable.values, rcond=None)
@@ -422,7 +421,7 @@ class _Reader:
 
 
 def _by_clock(rows: NDArray[np.int64], clock: NDArray[np.float64]) -> list[NDArray[np.int64]]:
-    """Parts of rows, where a clock begins anew only a few times; else all rows as one part."""
+    """Return parts of rows at restarts of a clock; all rows as one if it restarts often."""
     back = np.flatnonzero(np.diff(clock[rows]) < 0.0) + 1
     if len(back) and len(rows) >= MOST_RESETS * (len(back) + 1):
         return np.split(rows, back)

@@ -1,4 +1,4 @@
-"""What every task tells while it works, and how it is asked to stop."""
+"""Progress and stopping of tasks."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ if TYPE_CHECKING:
 
 
 class StoppedError(StationError):
-    """Whoever asked for the work stopped it; nothing was written."""
+    """The caller stopped the work; nothing was written."""
 
 
 class Progress(Protocol):
-    """What is told how far work has come."""
+    """Receives the progress of work."""
 
     def __call__(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Take a stage, and how much of it is done where that can be counted."""
+        """Take a stage, and how much of it is done if countable."""
 
 
 def silent(text: str, done: int = 0, of: int = 0) -> None:
-    """Tell nobody."""
+    """Ignore progress."""
 
 
 def never() -> bool:
@@ -31,11 +31,7 @@ def never() -> bool:
 
 
 class Telling:
-    """Hands on stages and notes, and stops the work at the next stage once that is asked for.
-
-    Args:
-        progress: told each stage as it begins.
-    """
+    """Passes on stages and notes, and stops at the next stage if asked."""
 
     def __init__(
         self, progress: Progress = silent, stop: Callable[[], bool] = never, say: Callable[[str], None] = silent
@@ -56,7 +52,7 @@ class Telling:
         self._progress(text, done, of)
 
     def counted(self, text: str) -> Callable[[int, int], None]:
-        """Return what is to be told how many of how many pieces of a stage are done."""
+        """Return a callback for the pieces done in a stage."""
         return lambda done, of: self.stage(text, done, of)
 
     def note(self, *texts: str) -> None:

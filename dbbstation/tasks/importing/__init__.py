@@ -1,1 +1,1 @@
-"""Recordings made elsewhere, taken into a session: what their columns mean, which runs they are, what had to be computed."""
+"""Recordings made elsewhere as a session: columns, runs, computed values."""

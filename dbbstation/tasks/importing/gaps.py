@@ -1,4 +1,4 @@
-"""Cells without a reading: empty ones, and the words that displays write when a gauge is out of its range. They are gaps, not faults."""
+"""Cells without a reading: empty, or words for an out-of-range gauge. They are gaps, not faults."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _OF_A_SAMPLE = (LENGTH, DEVIATION, ANGLE, TIME)
 
 
 def says_no_reading(cell: str) -> bool:
-    """Return whether a cell says that there is no reading: empty, `NaN`, `OVER`, `-OL-`, `****`, `#N/A`."""
+    """Return whether a cell has no reading: empty, `NaN`, `OVER`, `-OL-`, `****`, `#N/A`."""
     plain = cell.strip().lower()
     return plain in NO_NUMBER or not (bare := plain.strip("+-*#!.= ")) or bare in OUT_OF_RANGE or bare in NO_NUMBER
 
@@ -53,11 +53,10 @@ def says_no_reading(cell: str) -> bool:
 def samples_of(
     table: ForeignTable, rows: NDArray[np.int64], mapping: MappingFile, faults: list[Problem]
 ) -> tuple[NDArray[np.int64], tuple[str, ...]]:
-    """Return the rows of a run that have a reading, and what is to be said of the others.
+    """Return a run's rows with readings, and notes on the others.
 
     Args:
-        mapping: what columns mean.
-        faults: grows by cells that are neither a number nor say that there is none, with line and column.
+        faults: grows by unreadable cells with line and column.
     """
     whole = np.ones(len(rows), dtype=bool)
     words: Counter[str] = Counter()
@@ -90,11 +89,7 @@ def samples_of(
 def held_over_gaps(
     table: ForeignTable, rows: NDArray[np.int64], name: str, faults: list[Problem]
 ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Return the numbers of a slow column, such as a temperature, each gap with the reading before it; of a first gap, behind it.
-
-    Args:
-        faults: grows, as of `samples_of`.
-    """
+    """Return a slow column, such as a temperature; a gap repeats the reading before, a first gap the one after."""
     numbers = table.table.values[name][rows]
     bad = ~np.isfinite(numbers)
     if not bad.any():

@@ -1,4 +1,4 @@
-"""When a run was taken, as other programs write it: in a column, in lines above the table, in the name of the file."""
+"""When a run was taken, by a column, lines above the table, or the file's name."""
 
 from __future__ import annotations
 
@@ -49,11 +49,10 @@ _IN_A_NAME = re.compile(
 
 
 class UnclearMomentError(ValueError):
-    """A date that is no date, or may be two.
+    """A date that is none, or ambiguous.
 
     Args:
-        what: is wrong, in words.
-        key: of the line above the table that says it; empty where none does.
+        key: of the line above the table, or empty.
     """
 
     def __init__(self, what: str, key: str = "") -> None:
@@ -66,7 +65,7 @@ class Moment:
     """When something was taken.
 
     Attributes:
-        assumed: what the text did not say and was taken for granted, in words; empty where it said all.
+        assumed: assumptions beyond the text, in words; may be empty.
     """
 
     at: datetime
@@ -77,7 +76,7 @@ def zone_named(text: str) -> tzinfo:
     """Return the zone `+01:00`, `UTC` or `Europe/Berlin`.
 
     Raises:
-        UnclearMomentError: there is no such zone.
+        UnclearMomentError: an unknown zone.
     """
     offset = re.fullmatch(r"([+-])(\d{2}):?(\d{2})", text)
     if offset:
@@ -92,14 +91,14 @@ def zone_named(text: str) -> tzinfo:
 
 
 def moment_in(text: str, zone: tzinfo | None) -> Moment:
-    """Return the moment that a text says.
+    """Return the moment of a text.
 
     Args:
         text: such as `2026-11-20T08:04:11Z`, `20.11.2026 08:04` or `Nov 20, 2026`.
-        zone: of what has none; None: that of this computer.
+        zone: default; None: this computer's.
 
     Raises:
-        UnclearMomentError: it is no date, or day and month may be either way round.
+        UnclearMomentError: it is no date, or day and month are ambiguous.
     """
     plain = text.strip().strip('"')
     for date in _DATES:
@@ -111,16 +110,15 @@ def moment_in(text: str, zone: tzinfo | None) -> Moment:
 
 
 def moment_of(in_column: str, comments: Mapping[str, str], stem: str, zone: str | None) -> Moment | None:
-    """Return when a run was taken: by its column, else by lines above the table, else by the name of the file; None where none says it.
+    """Return when a run was taken: by column, lines above the table, or file name; else None.
 
     Args:
-        in_column: cell of a column; empty for none.
+        in_column: its cell; may be empty.
         comments: lines above the table, by key in small letters.
-        stem: name of the file without its ending.
-        zone: of dates that have none; None: that of this computer.
+        zone: default; None: this computer's.
 
     Raises:
-        UnclearMomentError: a column or a line says it, and cannot be understood.
+        UnclearMomentError: column or line is unclear.
     """
     known = None if zone is None else zone_named(zone)
     if in_column:
@@ -134,13 +132,13 @@ def moment_of(in_column: str, comments: Mapping[str, str], stem: str, zone: str 
 
 
 def moment_above(comments: Mapping[str, str], zone: tzinfo | None) -> tuple[str, Moment] | None:
-    """Return the key and the moment of the lines above a table; None where none of them is a date.
+    """Return key and moment of the lines above a table, or None.
 
     Args:
         comments: by key in small letters.
 
     Raises:
-        UnclearMomentError: there is such a line, and it cannot be understood.
+        UnclearMomentError: such a line is unclear.
     """
     key = next((one for one in DATE_KEYS if one in comments), None)
     if key is None:
@@ -156,11 +154,7 @@ def moment_above(comments: Mapping[str, str], zone: tzinfo | None) -> tuple[str,
 
 
 def moment_in_name(stem: str, zone: tzinfo | None) -> Moment | None:
-    """Return the moment in the name of a file, such as `a_ccw_2026-11-20_0804`; None where there is no date in it.
-
-    Args:
-        stem: name without its ending.
-    """
+    """Return the moment in a file name, such as `a_ccw_2026-11-20_0804`, or None."""
     found = _IN_A_NAME.search(stem)
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""Which run a recording is: by what somebody types, by the name of its file, by words for directions."""
+"""The run of a recording by words of the user or the file's name."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ WORDS = {
 
 @dataclass(frozen=True)
 class RunName:
-    """Which run a file is, as far as somebody said it.
+    """A run as far as it is named.
 
     Attributes:
-        test: of the plan; empty where not said.
+        test: empty if not named.
         repeat: None: the next.
     """
 
@@ -35,7 +35,7 @@ class RunName:
 
 
 def named_by(pattern: str, stem: str) -> dict[str, str]:
-    """Return what the name of a file says under a pattern such as `{test}_{direction}`; empty where it does not fit."""
+    """Return the run in a file name by a pattern such as `{test}_{direction}`; empty if it does not fit."""
     parts = re.split(r"\{(test|direction|repeat)\}", pattern)
     fields = {
         TEST: r"(?P<test>[A-Za-z0-9][A-Za-z0-9.]*?)",
@@ -51,10 +51,10 @@ def named_by(pattern: str, stem: str) -> dict[str, str]:
 
 
 def run_name(text: str, known: Sequence[str]) -> RunName | None:
-    """Return which run `a`, `a-ccw` or `a-ccw-2` is; None where it is none.
+    """Return the run of `a`, `a-ccw` or `a-ccw-2`, or None.
 
     Args:
-        known: tests of the plan, whose names may have hyphens.
+        known: tests of the plan, which may have hyphens.
     """
     test = max((name for name in known if text == name or text.startswith(f"{name}-")), key=len, default=None)
     if test is None:

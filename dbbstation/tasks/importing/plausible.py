@@ -1,4 +1,4 @@
-"""Whether imported numbers can be what they are said to be: units by what bars and circles can be, centres by what the plan says."""
+"""Check imported numbers: units against bars and circles, centres against the plan."""
 
 from __future__ import annotations
 
@@ -37,11 +37,10 @@ CHANCE = 1e-3
 
 @dataclass(frozen=True)
 class Implausible:
-    """Numbers that cannot be what they are said to be.
+    """Numbers that contradict their meaning.
 
     Attributes:
-        what: is wrong, in words.
-        others: meanings with units that would be plausible, such as `deviation:mm`.
+        others: plausible meanings, such as `deviation:mm`.
     """
 
     what: str
@@ -52,13 +51,13 @@ class Implausible:
 def unlike_a_bar(
     numbers: NDArray[np.float64], means: str, unit: str, zero_mm: float, circle: Circle, feed_in_mm: float | None = None
 ) -> Implausible | None:
-    """Return why readings of a turn cannot be in their unit, where another unit would do; None where they can.
+    """Return why a turn's readings contradict their unit while another fits, or None.
 
     Args:
-        numbers: as the file has them, shape (n,).
+        numbers: as in the file, shape (n,).
         means: `length` or `deviation`.
-        zero_mm: length at which a deviation is 0 [mm].
-        feed_in_mm: that the readings span too [mm]; None of a turn alone.
+        zero_mm: length at deviation 0.
+        feed_in_mm: spanned too; None for a turn alone.
     """
     least_mm = LEAST_RANGE_MM if feed_in_mm is None else max(LEAST_RANGE_MM, 0.5 * feed_in_mm)
 
@@ -84,10 +83,10 @@ def unlike_a_bar(
 
 
 def unlike_a_turn(theta_deg: NDArray[np.float64], unit: str) -> Implausible | None:
-    """Return why angles cannot be in their unit, where another unit makes a turn of them; None where they can.
+    """Return why angles contradict their unit while another gives a turn, or None.
 
     Args:
-        theta_deg: in degrees, as the unit says, in order of time, shape (n,).
+        theta_deg: by the stated unit, in order of time, shape (n,).
     """
     span = float(np.ptp(theta_deg)) / UNITS[ANGLE][unit]
     turns = [
@@ -103,11 +102,11 @@ def unlike_a_turn(theta_deg: NDArray[np.float64], unit: str) -> Implausible | No
 def unlike_the_feed(
     t_s: NDArray[np.float64], theta_deg: NDArray[np.float64], unit: str, circle: Circle
 ) -> Implausible | None:
-    """Return why times cannot be in their unit: times and angles make the plan's feed in another unit; None where they can.
+    """Return why times contradict their unit while another gives the plan's feed, or None.
 
     Args:
-        t_s: in seconds, as the unit says, shape (n,).
-        theta_deg: in order of time, shape (n,) [deg].
+        t_s: by the stated unit, shape (n,).
+        theta_deg: in order of time, shape (n,).
     """
     turned = float(np.sum(np.abs(np.diff(np.unwrap(theta_deg, period=FULL_TURN_DEG)))))
     took = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
@@ -135,14 +134,13 @@ def check_units(
     values: Mapping[str, NDArray[np.float64]],
     circle: Circle,
 ) -> None:
-    """Refuse numbers that cannot be in the unit that they are said to be in, where another unit would do.
+    """Refuse numbers that contradict their unit while another fits.
 
     Args:
-        mapping: what columns mean, with their units.
-        values: numbers of the run by meaning, in units of run files, shape (n,).
+        values: by meaning, in units of run files, shape (n,).
 
     Raises:
-        UnusableTravelError: with the units that would.
+        UnusableTravelError: with the fitting units.
     """
     means = LENGTH if LENGTH in values else DEVIATION
     named = {one: name for one in (means, ANGLE, TIME) if (name := mapping.column(one)) is not None}
@@ -179,11 +177,11 @@ def check_units(
 
 
 def centre_mm(length_mm: NDArray[np.float64], theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the least-squares centre of readings, shape (2,) [mm]: X and Y of the first harmonic.
+    """Return the least-squares centre, shape (2,) [mm], from the first harmonic.
 
     Args:
-        length_mm: shape (n,) [mm].
-        theta_deg: from +X towards +Y, shape (n,) [deg].
+        length_mm: shape (n,).
+        theta_deg: from +X towards +Y, shape (n,).
     """
     angle = np.radians(theta_deg)
     columns = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
@@ -192,14 +190,13 @@ def centre_mm(length_mm: NDArray[np.float64], theta_deg: NDArray[np.float64]) ->
 
 
 def chance_of_centres(centres: Iterable[tuple[Ball, Sequence[NDArray[np.float64]]]]) -> float | None:
-    """Return the probability that raw circles lie as near to their commanded centres as these by chance; None where nobody can say.
+    """Return the probability that raw circles lie as near to their commanded centres by chance; None if unknown.
 
-    A ball lies where CMM and holder leave it: each axis of the centre has at least that standard deviation, and what the machine and noise
-    do comes on top. So a distance r from zero, or less, has a probability of 1 - exp(-r² / (2 sigma²)) at the most. Balls are independent:
-    their probabilities are put together by Fisher's method.
+    Each axis of a centre scatters at least by CMM and holder (sigma). A distance up to r has a probability of at most 1 -
+    exp(-r² / (2 sigma²)). Fisher's method combines independent balls.
 
     Args:
-        centres: of each ball with a known place, the centres of its runs, shape (2,) each [mm].
+        centres: of each ball with known place, its runs' centres, shape (2,) each [mm].
     """
     logs = []
     for ball, found in centres:

@@ -1,4 +1,4 @@
-"""What the columns of a foreign table probably mean, read off their names: a proposal that a person confirms."""
+"""Propose meanings of a foreign table's columns by their names, for a person to confirm."""
 
 from __future__ import annotations
 
@@ -158,10 +158,10 @@ EXPORTED = frozenset({"test", "direction", "repeat", columns.TIME, columns.THETA
 
 @dataclass(frozen=True)
 class Proposed:
-    """What a column probably is.
+    """A column's probable meaning.
 
     Attributes:
-        unit: of its numbers; empty where the name does not tell it and where there is none.
+        unit: empty if not named or none exists.
     """
 
     means: str
@@ -169,15 +169,15 @@ class Proposed:
 
     @property
     def complete(self) -> bool:
-        """Whether a unit is told where one is needed."""
+        """Return whether a needed unit is known."""
         return self.means not in UNITS or bool(self.unit)
 
 
 def proposed(names: Sequence[str], units: Mapping[str, str]) -> dict[str, Proposed]:
-    """Return what columns probably are, by name; no two are the same thing, and what cannot be told is ignored.
+    """Return probable meanings by name, each once; unknown columns are ignored.
 
     Args:
-        units: what stands below the names, by name.
+        units: below the names, by name.
     """
     found: dict[str, Proposed] = {}
     for name in names:
@@ -197,7 +197,7 @@ def proposed(names: Sequence[str], units: Mapping[str, str]) -> dict[str, Propos
 
 
 def stated(text: str) -> tuple[str, Proposed] | None:
-    """Return what `NAME=MEANING` or `NAME=MEANING:UNIT` says; None where it says nothing that a column can be."""
+    """Return the meaning in `NAME=MEANING` or `NAME=MEANING:UNIT`, or None."""
     name, has, meant = text.rpartition("=")
     meaning, _, unit = meant.partition(":")
     known = UNITS.get(meaning, {})
@@ -215,7 +215,7 @@ def _meaning(name: str) -> str | None:
 
 
 def _unit(text: str, meaning: str) -> str:
-    """Unit of a meaning that a name says, in brackets or as its last word; empty where it says none."""
+    """Return the unit in a name, in brackets or as last word; empty if none."""
     bracket = re.search(r"[\[(（]\s*([^\])）]*?)\s*[\])）]", text)
     word = bracket[1] if bracket else re.split(r"[\s_,/]+", text.strip())[-1]
     unit = _UNIT_WORDS.get(_plain(word), "")
@@ -223,5 +223,5 @@ def _unit(text: str, meaning: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """A unit as it is compared: Greek mu as the micro sign, small letters."""
+    """Return a unit for comparison: micro sign, small letters."""
     return text.strip().lower().replace("μ", "µ").replace("μ", "µ")

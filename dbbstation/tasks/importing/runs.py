@@ -1,4 +1,4 @@
-"""From foreign tables to the runs of a plan: which run each row belongs to, units, angles in the machine, times."""
+"""From foreign tables to the runs of a plan: runs, units, angles, times."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class ImportedRun:
     """A run as it will be written.
 
     Attributes:
-        computed: what the file did not say and was computed, in words.
+        computed: values that the file lacks, in words.
     """
 
     file: str
@@ -70,19 +70,18 @@ class ImportedRun:
 
     @property
     def name(self) -> str:
-        """Such as `a-ccw-1`."""
+        """Return the name, such as `a-ccw-1`."""
         return f"{self.run.test}-{self.run.direction}-{self.run.repeat}"
 
 
 @dataclass
 class Reader:
-    """Turns tables into runs, one after the other, and gathers every fault.
+    """Turns tables into runs and gathers every fault.
 
     Args:
-        mapping: what the columns mean.
-        started: when the first run of a file was taken, by the file, where somebody says so.
-        trusted: what is taken although it does not look like what it is said to be: `unit`.
-        left_out: grows: runs that are not taken, and why.
+        started: of each file's first run, if stated.
+        trusted: doubtful properties to accept: `unit`.
+        left_out: grows by skipped runs with reasons.
     """
 
     mapping: MappingFile
@@ -97,7 +96,7 @@ class Reader:
         """Return the runs of a table.
 
         Args:
-            told: which runs it has where its rows do not say that, in order; one for all where it is a test alone.
+            told: runs in order, if rows do not name them; a single test names all.
         """
         file = table.table.file
         unmapped = [name for name in table.table.names if name not in self.mapping.columns]
@@ -128,7 +127,7 @@ class Reader:
         return found
 
     def check(self) -> None:
-        """Refuse what was found.
+        """Refuse the faults so far.
 
         Raises:
             InputError: the faults so far.
@@ -271,7 +270,7 @@ class Reader:
     def _values(
         self, table: ForeignTable, rows: NDArray[np.int64]
     ) -> tuple[dict[str, NDArray[np.float64]], tuple[str, ...]]:
-        """Numbers in units of a run file by meaning, shape (n,), and what is to be said; a column without any number is left out."""
+        """Return numbers by meaning in units of a run file, shape (n,), and notes; columns without numbers are left out."""
         found, said = {}, list[str]()
         for name, column in self.mapping.columns.items():
             if column.means not in UNITS or column.unit is None:
@@ -285,7 +284,7 @@ class Reader:
         return found, tuple(said)
 
     def _named(self, table: ForeignTable, said: Mapping[str, str], told: RunName, line: int) -> RunName:
-        """Which run it is: as the command line says, else columns, lines above the table, the file's name."""
+        """Return the run by command line, else columns, lines above the table, or file name."""
         file = PurePath(table.table.file).stem
         pattern = named_by(self.mapping.file_name, file) if self.mapping.file_name else {}
         sources = (
@@ -308,9 +307,9 @@ class Reader:
         return RunName(test, direction or in_column.direction, repeat)
 
     def asked_span_deg(self, table: ForeignTable) -> float | None:
-        """Return the span of a file's angles that is surely not the plan's: that of none of its circles; None where it may be [deg].
+        """Return the span of a file's angles if no circle of the plan has it, else None [deg].
 
-        A table with columns that tell its runs apart has several, which are looked at when they are read.
+        Tables with several runs are checked later.
         """
         name = self.mapping.column(ANGLE)
         if (
@@ -331,7 +330,7 @@ class Reader:
         return next(iter(spans), None) if all(span is not None for span in spans) else None
 
     def says_test(self, table: ForeignTable) -> bool:
-        """Whether a file says itself which test and direction it is."""
+        """Return whether a file names its test and direction."""
         if self.mapping.column(TEST) is not None:
             return True
         name = self._named(table, {}, RunName(), table.table.header)
@@ -339,7 +338,7 @@ class Reader:
         return name.test in self.plan.tests and (turns or name.direction is not None)
 
     def direction(self, word: str) -> Direction | None:
-        """Return the direction that a word means; None where it means none."""
+        """Return a word's direction, or None."""
         by_mapping = {key.lower(): Direction(value) for key, value in self.mapping.words.items()}
         return {**WORDS, **by_mapping}.get(word.strip().lower())
 
@@ -364,7 +363,7 @@ class Reader:
     def _started(
         self, table: ForeignTable, rows: NDArray[np.int64], said: Mapping[str, str], computed: list[str]
     ) -> datetime | None:
-        """When a run was taken: as the command line says, else a column, lines above the table, the file's name; None where none does."""
+        """Return a run's time by command line, else column, lines above the table, or file name; else None."""
         later = timedelta(seconds=self._later_s(table, rows))
         if table.table.file in self.started:
             return self.started[table.table.file] + later
@@ -382,7 +381,7 @@ class Reader:
         return found.at if in_column else found.at + later
 
     def _later_s(self, table: ForeignTable, rows: NDArray[np.int64]) -> float:
-        """How much later than the file's first sample a run began, by its times [s]; 0 where they do not say it."""
+        """Return a run's begin after the file's first sample [s]; 0 if unknown."""
         name = self.mapping.column(TIME)
         if name is None:
             return 0.0
@@ -399,10 +398,10 @@ _SAY_IT = "add it to the mapping, as `ignored` where it does not matter"
 
 
 def chance_of_runs(runs: Sequence[ImportedRun], plan: Plan) -> float | None:
-    """Return the probability that runs lie as near to their commanded centres as they do by chance; None where nobody can say.
+    """Return the probability that runs lie as near to their commanded centres by chance; None if unknown.
 
     Args:
-        runs: as they will be written; those without angles are not looked at.
+        runs: those without angles are ignored.
     """
     centres: dict[tuple[str, int | None], list[NDArray[np.float64]]] = {}
     for one in runs:

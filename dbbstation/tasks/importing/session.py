@@ -1,4 +1,4 @@
-"""Writing imported runs as a sealed session, tried out in a folder beside it first: what no command could use is not written."""
+"""Write imported runs as a sealed session, after a trial beside it."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ IMPORTED = "imported"
 def originals(
     tables: Mapping[Path, bytes], mapping: MappingFile, provenance: Provenance, statements: Sequence[str]
 ) -> dict[str, str | bytes]:
-    """Return what a session keeps of its import, content by path in its folder.
+    """Return what a session keeps of its import, content by relative path.
 
     Args:
-        tables: bytes of the files as they came.
-        statements: what was computed and assumed.
+        tables: original bytes.
+        statements: computed and assumed facts.
     """
     names: dict[str, bytes] = {}
     for path, data in tables.items():
@@ -64,18 +64,18 @@ def staged(
     *,
     dry: bool,
 ) -> Iterator[Callable[[], None]]:
-    """Write a session beside its place, read it as every command does and cut every accepted run; give what puts it in its place.
+    """Write a session beside its place, read it and cut every accepted run; yield what moves it there.
 
     Args:
         runs: in order.
-        more: further files by path in its folder.
-        dry: it is never put in its place: it is written where the system keeps what is temporary.
+        more: further files by relative path.
+        dry: never move it; use the system's temporary folder.
 
     Yields:
         What puts the session in its place; it is gone where that was not called.
 
     Raises:
-        InputError: lengths, times or angles that no circle of the plan has, by the file that they come from.
+        InputError: no circle of the plan has a run's lengths, times or angles.
         OutputError: the folder exists, or cannot be written.
     """
     if folder.exists():

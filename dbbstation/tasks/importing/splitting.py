@@ -1,4 +1,4 @@
-"""Several runs in one file: where one ends and the next begins."""
+"""Separate several runs in one file."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ SMALLEST_RUN_DEG = 90.0
 
 
 def longest_pause_s(circles: Sequence[Circle]) -> float:
-    """Return the longest time without a sample that a run may have: a longer one parts two runs [s].
+    """Return the longest pause within a run [s].
 
     Args:
-        circles: of the plan; the slowest decides.
+        circles: the slowest decides.
     """
     return max(LARGEST_GAP_DEG / circle.turning_deg_s for circle in circles)
 
 
 def parts_by_gaps(t_s: NDArray[np.float64] | None, lines: NDArray[np.int64], pause_s: float) -> list[NDArray[np.int64]]:
-    """Return the rows of each run of a file whose runs are parted by pauses, by times that begin anew, or by empty lines.
+    """Return the rows of each run, separated by pauses, restarted times or empty lines.
 
     Args:
-        t_s: times, shape (n,) [s]; None where the file has none.
-        lines: number of the line of each row, shape (n,).
+        t_s: shape (n,); None if the file has none.
+        lines: of each row, shape (n,).
     """
     begins = np.diff(lines) > 1
     if t_s is not None:
@@ -44,12 +44,12 @@ def parts_by_gaps(t_s: NDArray[np.float64] | None, lines: NDArray[np.int64], pau
 
 
 def parts_by_direction(angle_deg: NDArray[np.float64]) -> list[NDArray[np.int64]]:
-    """Return the rows of each run of a file whose angles turn round between its runs.
+    """Return the rows of each run, separated by a change of turning direction.
 
-    A turn back is one of 90 degrees or more; the run ends where the angle is farthest.
+    A turn back is at least 90 degrees; the run ends at its farthest angle.
 
     Args:
-        angle_deg: in order of time, shape (n,) [deg].
+        angle_deg: in order of time, shape (n,).
     """
     travelled = np.unwrap(angle_deg, period=FULL_TURN_DEG)
     ends: list[int] = []

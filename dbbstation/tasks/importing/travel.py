@@ -1,4 +1,4 @@
-"""Times and angles of one run: angles into the machine's frame; what the file lacks follows from the plan's feed, and is said."""
+"""Times and angles of a run in the machine's frame; missing ones follow from the plan's feed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ UNLIKE_SPAN_DEG = 2.0
 
 
 class UnusableTravelError(Exception):
-    """Times or angles that no run can have."""
+    """Impossible times or angles."""
 
     def __init__(self, what: str, remedy: str) -> None:
         self.what, self.remedy = what, remedy
@@ -40,13 +40,13 @@ class UnusableTravelError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class TravelledPath:
-    """When and where samples of a run were taken.
+    """When and where a run's samples were taken.
 
     Attributes:
-        t_s: rising times, shape (n,) [s].
-        theta_deg: angles from +X towards +Y, shape (n,) [deg]; None where the circle has to be found in the trace.
+        t_s: rising, shape (n,).
+        theta_deg: from +X towards +Y, shape (n,); None: find the circle in the trace.
         rows: which rows of the file these are, shape (n,).
-        computed: what the file did not say, in words.
+        computed: values that the file lacks, in words.
     """
 
     t_s: NDArray[np.float64]
@@ -56,7 +56,7 @@ class TravelledPath:
 
 
 def rises(angle_deg: NDArray[np.float64]) -> bool:
-    """Whether angles grow over the run, steps of a turn aside."""
+    """Return whether angles grow, apart from steps of a turn."""
     return float(np.sum(np.diff(_unwrapped(angle_deg)))) > 0.0
 
 
@@ -64,11 +64,11 @@ def machine_angles(angle_deg: NDArray[np.float64], said: AngleSchema, circle: Ci
     """Return angles from +X towards +Y, shape (n,) [deg].
 
     Args:
-        angle_deg: as the file has them, shape (n,) [deg].
-        said: where their 0 lies and how they grow.
+        angle_deg: as in the file, shape (n,).
+        said: its zero and sense.
 
     Raises:
-        UnusableTravelError: they turn against the direction of the run.
+        UnusableTravelError: they turn against the run's direction.
     """
     sense = circle.direction.sign if said.grows == "travel" else Direction(said.grows).sign
     zero = circle.start_deg if said.zero_deg is None else said.zero_deg
@@ -82,10 +82,10 @@ def machine_angles(angle_deg: NDArray[np.float64], said: AngleSchema, circle: Ci
 
 
 def unplanned_span_deg(theta_deg: NDArray[np.float64], circle: Circle) -> float | None:
-    """Return what angles span, where that is neither a turn nor the plan's path with its overshoot; None where it is one of them [deg].
+    """Return the angles' span if it is neither a turn nor the plan's path with overshoot, else None [deg].
 
     Args:
-        theta_deg: angles in the machine, in order of time, shape (n,) [deg].
+        theta_deg: in the machine, in order of time, shape (n,).
     """
     travelled = _unwrapped(theta_deg)
     spacing = float(np.median(np.abs(np.diff(travelled)))) if len(travelled) > 1 else 0.0
@@ -99,14 +99,14 @@ def unplanned_span_deg(theta_deg: NDArray[np.float64], circle: Circle) -> float 
 
 
 def check_span(theta_deg: NDArray[np.float64], stated_deg: float | None, circle: Circle) -> tuple[str, ...]:
-    """Return what is to be said of a span that somebody confirmed; nothing of the plan's own.
+    """Return notes on a confirmed span that is not the plan's.
 
     Args:
-        theta_deg: angles in the machine, in order of time, shape (n,) [deg].
-        stated_deg: span that somebody confirmed [deg]; None where nobody did.
+        theta_deg: in the machine, in order of time, shape (n,).
+        stated_deg: confirmed; None if not.
 
     Raises:
-        UnusableTravelError: a span that is not the plan's and that nobody confirmed.
+        UnusableTravelError: an unconfirmed span other than the plan's.
     """
     span = unplanned_span_deg(theta_deg, circle)
     if span is None:
@@ -123,15 +123,15 @@ def check_span(theta_deg: NDArray[np.float64], stated_deg: float | None, circle:
 def travel(
     t_s: NDArray[np.float64] | None, theta_deg: NDArray[np.float64] | None, circle: Circle, trace: str | None
 ) -> TravelledPath:
-    """Return times and angles of a run.
+    """Return a run's times and angles.
 
     Args:
-        t_s: times of the file, shape (n,) [s]; None where it has none.
-        theta_deg: angles in the machine, shape (n,) [deg]; None where it has none.
-        trace: of a run without angles: `whole` or `turn`.
+        t_s: of the file, shape (n,); None if it has none.
+        theta_deg: in the machine, shape (n,); None if it has none.
+        trace: without angles: `whole` or `turn`.
 
     Raises:
-        UnusableTravelError: neither is there, times do not rise, or a turn takes longer at the plan's feed.
+        UnusableTravelError: both are missing, times do not rise, or a turn would take longer.
     """
     if t_s is None:
         if theta_deg is None:
@@ -168,7 +168,7 @@ def _from_zero(t_s: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str
 
 
 def _turn(t_s: NDArray[np.float64], circle: Circle, computed: tuple[str, ...]) -> TravelledPath:
-    """Angles of a turn that begins with the first sample, by the programmed feed."""
+    """Return angles of a turn from the first sample at the programmed feed."""
     progress = (t_s - t_s[0]) * circle.turning_deg_s
     if progress[-1] < LEAST_TURN * FULL_TURN_DEG:
         turn_s = FULL_TURN_DEG / circle.turning_deg_s
@@ -196,5 +196,4 @@ def _at(circle: Circle) -> str:
 
 
 def _unwrapped(theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Angles without steps of a turn [deg]."""
     return np.unwrap(theta_deg, period=FULL_TURN_DEG)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import functools
 import hashlib
+import inspect
 import os
 import pickle
 from contextlib import contextmanager
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 OF_TABLES = ("dbbstation.tasks.mismatch.mismatch",)
 """Tasks on tables of the package, which documents show and tests look at; what `drive` found cannot be written down."""
+
+STUDIES = ("studies.concealed_gravity.concealed_gravity",)
+"""Studies that a document shows and tests look at."""
 
 TELLING = {"progress", "stop", "say"}
 """Arguments of a task by which it tells, and that are no part of what it is asked."""
@@ -57,6 +61,8 @@ def computed_once(factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, *t
 
 
 def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
+    tells = "say" in inspect.signature(task).parameters
+
     @functools.wraps(task)
     def ask(*words: object, **more: Any) -> Any:
         wanted = {name: value for name, value in more.items() if name not in TELLING}
@@ -65,7 +71,7 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
         with alone(place):
             if not place.exists():
                 told: list[str] = []
-                answer = task(*words, **{**more, "say": told.append})
+                answer = task(*words, **{**more, **({"say": told.append} if tells else {})})
                 try:
                     place.write_bytes(pickle.dumps((told, answer)))
                 except (

@@ -41,7 +41,7 @@ def concealed_gravity(*, seed: int, figure: Path | None, force: bool, as_json: b
     plans = shipped_folder("protocols") / "plans"
     jig, conditions = read_plan(plans / "table2.yaml"), read_plan(plans / "gravity-conditions.yaml")
     with stage_bar("study", STAGES) as progress:
-        found = experiment(machine, jig, conditions, seed, progress)
+        found = experiment(machine, jig, conditions, seed=seed, progress=progress)
     if figure is not None:
         write_bytes(figure, concealed_figure(found, format_of(figure)), force=force)
         say(f"figure written to {figure}")

@@ -19,8 +19,9 @@ def diagnosed(folder, hidden, candidates, seed, rate_hz):
 
 
 @pytest.mark.slow
-def test_a_bent_scale_is_identified_by_tests_that_were_held_out(tmp_path):
-    found = diagnosed(tmp_path / "s", BarScale(curved_um=2.0), ("bar-scale", "joint-runout"), 1509, 10.0).diagnosis
+@pytest.mark.parametrize("rate_hz", [4.0, pytest.param(10.0, marks=pytest.mark.nightly)])
+def test_a_bent_scale_is_identified_by_tests_that_were_held_out(tmp_path, rate_hz):
+    found = diagnosed(tmp_path / "s", BarScale(curved_um=2.0), ("bar-scale", "joint-runout"), 1509, rate_hz).diagnosis
     scale = next(f for f in found.sources if f.name == "bar-scale")
     assert scale.verdict is Verdict.IDENTIFIED
     bow = scale.parameters["curved_um"]
@@ -36,10 +37,12 @@ FEW = ("jig-bump", "bar-scale", "bar-drift", "backlash", "gravity", "platform-jo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("candidates", [FEW, pytest.param(None, marks=pytest.mark.nightly)], ids=["few", "all"])
-def test_a_bump_happened(tmp_path, candidates):
+@pytest.mark.parametrize(
+    ("candidates", "rate_hz"), [(FEW, 4.0), pytest.param(None, 10.0, marks=pytest.mark.nightly)], ids=["few", "all"]
+)
+def test_a_bump_happened(tmp_path, candidates, rate_hz):
     """Between the two directions of a test, so that one mounting sees both sides of it."""
-    told = diagnosed(tmp_path / "s", BumpedJig(from_run=15), candidates, 1510, 10.0)
+    told = diagnosed(tmp_path / "s", BumpedJig(from_run=15), candidates, 1510, rate_hz)
     bump = next(f for f in told.diagnosis.sources if f.name == "jig-bump")
     assert bump.verdict is Verdict.HAPPENED
     for name, true in (("x_um", 2.33), ("y_um", -6.43)):

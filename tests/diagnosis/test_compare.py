@@ -93,7 +93,7 @@ def the_cause(found, verdict=Verdict.IDENTIFIED):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("draws", [8, pytest.param(100, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("draws", [4, pytest.param(100, marks=pytest.mark.nightly)])
 def test_noise_and_mountings_alone_are_no_difference(reference, draws):
     """One truth, new noise and balls put up anew: of what is said with 0.95, one in twenty may be wrong."""
     found = []

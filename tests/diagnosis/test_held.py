@@ -14,14 +14,13 @@ from tests.plant.mechanisms.set_up import ToolBallOffset
 from tests.plant.session import record
 
 OFFSET_MM = 0.12
-SESSIONS = 8
 
 
-@pytest.mark.slow
-def test_a_ball_off_the_tool_tip_is_as_uncertain_where_no_circle_sees_it_as_it_is_large_elsewhere(tmp_path):
+@pytest.mark.parametrize("sessions", [4, pytest.param(8, marks=pytest.mark.nightly)])
+def test_a_ball_off_the_tool_tip_is_as_uncertain_where_no_circle_sees_it_as_it_is_large_elsewhere(tmp_path, sessions):
     """Ten times the usual size of a ball off the tool tip, towards everywhere: both fits' errors against the truth."""
     source = sources_named(["tool-ball-offset"])
-    towards = np.random.default_rng(3).standard_normal((SESSIONS, 3))
+    towards = np.random.default_rng(3).standard_normal((sessions, 3))
     offsets = OFFSET_MM * towards / np.linalg.norm(towards, axis=1, keepdims=True)
     of_ball, of_base, known = [], [], []
     for k, offset in enumerate(offsets):

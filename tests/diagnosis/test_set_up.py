@@ -19,17 +19,17 @@ from tests.plant.mechanisms.bar import BarOffset
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.thermal import JigThermal
-from tests.plant.plan import table_ii_plan
+from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
 
 NAMES = ("gravity", "screw-lead", "jig-thermal", "tool-ball-offset", "platform-joints", "backlash")
 
 
-def diagnosed(folder, seed, *mechanisms):
+def diagnosed(folder, seed, *mechanisms, tests="abcdefghijklmno"):
     record(
         folder,
         seed=seed,
-        plan=replace(table_ii_plan(seed), repeat_at_end=("a", "f", "k")),
+        plan=replace(subset(table_ii_plan(seed), tests), repeat_at_end=("a", "f", "k")),
         mechanisms=[RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05), *mechanisms],
         rate_hz=5.0,
     )
@@ -72,8 +72,12 @@ def test_a_warm_plate_is_no_ball_off_the_tool_tip(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_badly_seated_ball_beside_gravity_is_found_with_it(tmp_path):
-    diagnosis = diagnosed(tmp_path / "s", 42, Gravity(), BadSeating({3: np.array([20.0, -25.0, 0.0])}))
+@pytest.mark.parametrize(
+    ("tests", "within"), [("abdfhjkn", 0.09), pytest.param("abcdefghijklmno", 0.015, marks=pytest.mark.nightly)]
+)
+def test_a_badly_seated_ball_beside_gravity_is_found_with_it(tmp_path, tests, within):
+    """Eight tests know the compliance to 3 %, one standard deviation."""
+    diagnosis = diagnosed(tmp_path / "s", 42, Gravity(), BadSeating({3: np.array([20.0, -25.0, 0.0])}), tests=tests)
     assert named(diagnosis) == {"gravity"}
     (found,) = diagnosis.outliers
     assert found.kind is OutlierKind.MOUNTING
@@ -81,4 +85,5 @@ def test_a_badly_seated_ball_beside_gravity_is_found_with_it(tmp_path):
     assert found.size_um == pytest.approx(np.hypot(20.0, 25.0), abs=3 * np.hypot(found.uncertainty_um, 1.0))
     assert 0 < found.uncertainty_um < 6.0
     compliance = next(f for f in diagnosis.sources if f.name == "gravity").parameters["strut_compliance_um_kn"]
-    assert compliance.value == pytest.approx(9.68, rel=0.015)
+    assert compliance.value == pytest.approx(9.68, rel=within)
+    assert compliance.value == pytest.approx(9.68, abs=3 * compliance.uncertainty)

@@ -45,7 +45,7 @@ class Coarse(Mechanism):
 
 
 def diagnosed(folder, mechanism, *more):
-    record(folder, seed=83, mechanisms=[RandomKinematics(), mechanism, *more], rate_hz=10.0)
+    record(folder, seed=83, mechanisms=[RandomKinematics(), mechanism, *more], rate_hz=4.0)
     found = diagnose_sessions([folder], NAMES, (), lambda _: None).diagnosis
     return found, {f.name: f for f in found.sources if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}}
 

@@ -17,7 +17,7 @@ from dbbstation.cli.diagnose import _print as print_diagnosis
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.results.diagnosis import BeforeAfter, CauseResult, DiagnosisFigures, ParameterShift, UnexplainedResult
 from tests.cli.conftest import Outcome, call
-from tests.once import OF_TABLES, computed_once
+from tests.once import OF_TABLES, STUDIES, computed_once
 from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import table_ii_plan
 from tests.plant.session import record
@@ -176,7 +176,7 @@ def workshop(tmp_path_factory):
     plan[second] = plan[second].replace("elevation_deg", "elevaton_deg")
     (folder / "plan.yaml").write_text("\n".join(plan) + "\n", encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        computed_once(tmp_path_factory, patch, *OF_TABLES)
+        computed_once(tmp_path_factory, patch, *OF_TABLES, *STUDIES)
         yield Workshop(folder)
 
 

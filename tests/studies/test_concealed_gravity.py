@@ -6,15 +6,19 @@ import pytest
 
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
+from studies import concealed_gravity
 from studies.concealed_figure import concealed_figure
-from studies.concealed_gravity import concealed_gravity
+from tests.once import STUDIES, computed_once
 
 
 @pytest.fixture(scope="module")
-def study(reference):
+def study(reference, tmp_path_factory):
+    """The one that docs/diagnosis.md shows."""
     plans = shipped_folder("protocols") / "plans"
     jig, conditions = read_plan(plans / "table2.yaml"), read_plan(plans / "gravity-conditions.yaml")
-    return concealed_gravity(reference, jig, conditions, 2, lambda _: None)
+    with pytest.MonkeyPatch.context() as patch:
+        computed_once(tmp_path_factory, patch, *STUDIES)
+        return concealed_gravity.concealed_gravity(reference, jig, conditions, seed=1, progress=lambda _: None)
 
 
 @pytest.mark.slow

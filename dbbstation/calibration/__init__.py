@@ -1,1 +1,1 @@
-"""What is fitted to raw circles and how: sources, observability, uncertainty, evaluation. Pure mathematics."""
+"""Fit errors to raw circles: sources, observability, uncertainty, evaluation."""

@@ -1,4 +1,4 @@
-"""Which numbers a fit looks for: every source's parameters, once per set that shares them."""
+"""The numbers of a fit: every source's parameters, once per sharing set."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ParameterSet:
     """One set of parameters of one source.
 
     Attributes:
-        columns: where they stand in x.
+        columns: places in x.
     """
 
     source: ErrorSource
@@ -45,23 +45,22 @@ class ParameterSet:
     columns: slice
 
     def acts_on(self, motion: Motion) -> bool:
-        """Whether a run's reading takes its values from this set."""
+        """Return whether a run takes its values from this set."""
         return self.source.shared_by(motion) == self.shared and not self.source.of_currents
 
     def fitted(self, x: NDArray[np.float64]) -> Fitted:
-        """Return the source with its values among those of all columns, shape (k,)."""
+        """Return the source with its values of x, shape (k,)."""
         return Fitted(self.source, x[self.columns], self.shared)
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Terms of a fit and what is known of their columns beforehand.
+    """Terms of a fit with priors.
 
     Attributes:
-        terms: sets of parameters in the order of the columns.
-        known: priors and scales; priors are about `nominal`.
-        nominal: values that columns keep where nothing is seen of them, shape (k,): zero for amplitudes, a usual value for shape
-            parameters such as time constants.
+        terms: in column order.
+        known: priors about `nominal`, and scales.
+        nominal: values of unseen columns, shape (k,): zero for amplitudes, usual for shapes such as time constants.
     """
 
     machine: Machine
@@ -75,7 +74,7 @@ class Layout:
         return tuple((term.source.name, term.shared, p.name) for term in self.terms for p in term.parameters)
 
     def columns_of(self, source: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Columns of a source's amplitudes, of all its sets, and those of its parameters of shape."""
+        """Return columns of a source's amplitudes and of its shape parameters, over all sets."""
         numbered = [
             (term.columns.start + k, bool(parameter.grid))
             for term in self.terms
@@ -87,28 +86,28 @@ class Layout:
 
     @property
     def limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Least and greatest value of every column, shape (k,) each: parameters of shape stay on their grid and one step beyond it."""
+        """Return limits of every column, shape (k,) each: shapes stay on their grid and one step beyond."""
         each = [p.limits for term in self.terms for p in term.parameters]
         return np.array([low for low, _ in each]), np.array([high for _, high in each])
 
     def held_at(self, x: NDArray[np.float64], columns: NDArray[np.int64]) -> Layout:
-        """The same with some columns known to be what they are in x, shape (k,)."""
+        """Return the layout with some columns known as in x, shape (k,)."""
         nominal, prior = self.nominal.copy(), self.known.prior.copy()
         nominal[columns], prior[columns] = x[columns], HELD * self.known.scale[columns]
         return replace(self, nominal=nominal, known=replace(self.known, prior=prior))
 
     @property
     def bounded(self) -> NDArray[np.bool_]:
-        """Columns that a tolerance of the machine file bounds, shape (k,)."""
+        """Return which columns tolerances bound, shape (k,)."""
         return np.array([p.tolerance is not None for term in self.terms for p in term.parameters], dtype=bool)
 
     def formula_variance(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Variance of every column by what the formula of its source may be off by, shape (k,).
+        """Return every column's variance by its formula's inaccuracy, shape (k,).
 
-        It is that of amplitudes; random effects are no more than what they are stated to be, and the nominal geometry has no formula.
+        It applies to amplitudes, not to random effects and nominal geometry.
 
         Args:
-            x: values of all columns, shape (k,).
+            x: shape (k,).
         """
         share = [
             0.0 if parameter.grid or term.source.name in GEOMETRY else term.source.form_uncertainty
@@ -119,11 +118,11 @@ class Layout:
 
     @property
     def needs(self) -> frozenset[Need]:
-        """What all sources of the bar's reading together must be given."""
+        """Return what all sources of the reading need."""
         return frozenset[Need]().union(*(term.source.needs for term in self.terms if not term.source.of_currents))
 
     def model(self, x: NDArray[np.float64]) -> MachineModel:
-        """Machine model with the values of all columns, shape (k,)."""
+        """Return the machine model at x, shape (k,)."""
         return MachineModel(
             self.machine,
             tuple(term.fitted(x) for term in self.terms),
@@ -131,11 +130,10 @@ class Layout:
 
 
 def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequence[Observation]) -> Layout:
-    """Give every source the sets that the observations need.
+    """Return the sets of every source that the observations need.
 
-    A set whose size is stated becomes a random effect; one whose stated size is zero does not exist. Parameters of
-    shape, which say nothing while their amplitude is zero, have their plausible size as prior about a usual value.
-    A tolerance that the machine file states is a prior; without one nothing is regularised.
+    A stated size makes a random effect; size zero removes it. Shape parameters have a prior about a usual value.
+    Tolerances of the machine file are priors; without one nothing is regularised.
 
     Raises:
         ModelError: a source needs what machine file or recordings lack.
@@ -165,9 +163,9 @@ _Stated: TypeAlias = "NDArray[np.float64] | ModelError | None"
 
 
 def _sets(sources: Sequence[ErrorSource], observations: Sequence[Observation]) -> list[dict[str, _Stated]]:
-    """Names of the sets that each source needs, in the order of the runs, with what the last run of each says of its size.
+    """Return each source's sets in run order, with the stated size of each.
 
-    One run at a time: its motion is six numbers a sample, more than all else that is known of it.
+    One run at a time saves memory.
     """
     found: list[dict[str, _Stated]] = [{} for _ in sources]
     driven = [observation.raw.motor_current_a is not None for observation in observations]

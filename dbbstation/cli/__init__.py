@@ -1,4 +1,4 @@
-"""The command line: parse, call, print. Commands are loaded when they are called, not before."""
+"""The command line: parse, call, print. A command is loaded when called."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:  # noqa: A
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and leave with its exit code."""
+    """Run the command line and exit with its code."""
     open_missing()
     # All work of this process is the program's own: the threads that `dbbstation.computing.threads` takes away are not even started.
     # Read when NumPy is imported.
@@ -152,7 +152,7 @@ _SHOWN_BY_PYTHON = warnings.showwarning
 
 
 def _noted(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:  # noqa: ANN401 - passed on
-    """Say in a sentence what the program itself warns of; warnings of others are for who mends them, with file and line."""
+    """Print the program's own warnings as sentences, others with file and line."""
     from dbbstation.machine.compiled import NotKeptWarning
 
     if issubclass(category, NotKeptWarning):
@@ -162,10 +162,7 @@ def _noted(message: Warning | str, category: type[Warning], *where: Any, **furth
 
 
 def _own_first(given: list[str]) -> list[str]:
-    """Return the arguments with the program's own options before the command.
-
-    People put them where they notice that they need them: at the end.
-    """
+    """Move the program's own options, often typed last, before the command."""
     own, others = [], list[str]()
     arguments = iter(given)
     for argument in arguments:

@@ -1,4 +1,4 @@
-"""Asking for what the command line lacks: on a terminal a question, in a pipe one refusal that names every option."""
+"""Ask for missing options on a terminal; in a pipe, refuse once with all their names."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ if TYPE_CHECKING:
 
 
 def on_terminal() -> bool:
-    """Whether somebody sees questions and can answer them."""
+    """Return whether questions can be answered."""
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 class Asker:
-    """Asks one thing after the other; where nobody can answer it gathers what is missing."""
+    """Asks one question after another; without a terminal it collects what is missing."""
 
     def __init__(self) -> None:
         self.terminal = on_terminal()
         self._missing: list[str] = []
 
     def text(self, question: str, option: str, choices: Sequence[str] = (), default: str | None = None) -> str:
-        """Return an answer; empty where nobody can give one, which `check` refuses then.
+        """Return an answer; empty if none is possible, which `check` refuses.
 
         Args:
-            option: that says the same on the command line.
-            choices: the only answers that are taken; empty: any.
-            default: what Enter means; None: an answer is needed.
+            option: equivalent on the command line.
+            choices: empty: any.
+            default: meaning of Enter; None: an answer is needed.
         """
         if not self.terminal:
             self._missing.append(f"{option} ({question})")
@@ -43,14 +43,14 @@ class Asker:
         )
 
     def give(self, option: str, why: str) -> None:
-        """Say that an option is needed which no single answer can take the place of: `check` refuses, on a terminal too."""
+        """Require an option that no answer can replace; `check` refuses, on a terminal too."""
         self._missing.append(f"{option} ({why})")
 
     def number(self, question: str, option: str, *, needed: bool = False) -> float | None:
-        """Return a number; None where nobody can give one, or where Enter says that nobody knows it.
+        """Return a number; None if none is possible or known.
 
         Args:
-            option: that says the same on the command line.
+            option: equivalent on the command line.
         """
         if not self.terminal:
             self.text(question, option)
@@ -64,7 +64,7 @@ class Asker:
                 echo(f"`{answer}` is not a number", err=True)
 
     def check(self) -> None:
-        """Refuse to go on without what could not be asked.
+        """Refuse missing answers.
 
         Raises:
             click.UsageError: names every option that is missing.

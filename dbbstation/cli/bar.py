@@ -132,10 +132,10 @@ def bar(
 
 
 def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolution_um: float | None) -> Steady:
-    """Mean of so many good readings.
+    """Return the mean of good readings.
 
     Raises:
-        InstrumentError: the line, or too many readings that are no length.
+        InstrumentError: the line failed, or too many readings are no length.
         click.UsageError: the resolution cannot be told.
     """
     from dbbstation.instrument.driver import Instrument
@@ -151,7 +151,7 @@ def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolutio
 def _file(
     found: Steady, of_bar: dict[str, object], calibrator: dict[str, object], instrument: str, now: datetime
 ) -> BarFile:
-    """The calibration as its file has it.
+    """Return the calibration as a file.
 
     Raises:
         click.UsageError: a value that no such file may have.

@@ -126,7 +126,7 @@ def calibrate(
 
 
 def names_in(text: str | None) -> list[str] | None:
-    """Return names that commas part; None where there is no text."""
+    """Return names separated by commas; None without a text."""
     return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
 
 
@@ -181,7 +181,7 @@ def _print_plan_check(check: PlanCheck) -> None:
 
 
 def _print_misfit(result: CalibrationResult) -> None:
-    """Print what is left beyond noise and mountings; nothing where chance explains it."""
+    """Print the residual beyond noise and mountings, unless chance explains it."""
     from dbbstation.results.model_warnings import exceeds
 
     misfit = result.misfit

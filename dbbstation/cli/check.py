@@ -168,7 +168,7 @@ def _file(result: Checked) -> CheckedFile:
 
 
 def _print(results: Sequence[Checked], runs: Sequence[DryRun]) -> None:
-    """Print what is in order, and notes; faults come as the command's error."""
+    """Print sound files and notes; faults become the command's error."""
     from dbbstation.cli.output import say
 
     for result in results:
@@ -183,7 +183,7 @@ def _print(results: Sequence[Checked], runs: Sequence[DryRun]) -> None:
 
 @dataclass(frozen=True)
 class DryRun:
-    """The programs of a plan, tried on a machine."""
+    """A trial of a plan's programs."""
 
     plan: Path
     machine: Path
@@ -213,7 +213,7 @@ def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[S
 
 
 def _check_one(file: Path, known: Mapping[str, ErrorSource]) -> Checked:
-    """Check a file of any format, or a session; protocol files of instruments as their own reader does."""
+    """Check a file or session; instrument files by their own reader."""
     from dbbstation.errors import InputError
     from dbbstation.files.checking import Checked, check
     from dbbstation.files.yaml.text import load_yaml
@@ -242,7 +242,7 @@ def _check_one(file: Path, known: Mapping[str, ErrorSource]) -> Checked:
 
 
 def _sound(results: Sequence[Checked], kind: str) -> list[Path]:
-    """Files of a format that have no faults."""
+    """Return files of a format without faults."""
     return [one.path for one in results if one.kind.partition("/")[0] == kind and not one.problems]
 
 

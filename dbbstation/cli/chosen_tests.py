@@ -1,4 +1,4 @@
-"""`--test` and `--exclude`: which tests a command takes, alike in every command that takes some."""
+"""`--test` and `--exclude`: the tests of a command."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _names(_context: click.Context, _parameter: click.Parameter, given: tuple[st
 
 
 def chosen_tests_options(function: _Function) -> _Function:
-    """Give a command both options; it takes `tests` and `exclude`, tuples of names."""
+    """Give a command both options as `tests` and `exclude`, tuples of names."""
     options = (
         click.option(
             "--test",

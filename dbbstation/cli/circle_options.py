@@ -1,4 +1,4 @@
-"""How the circles of a plan become programs: options of `program`, and of `check`, which tries the same."""
+"""Options of circle programs, for `program` and `check`."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ _OPTIONS = (
 
 
 def circle_options(function: _Function) -> _Function:
-    """Give a command these options; it takes `step_deg`, `clearance_mm` and `bar_stays_on`."""
+    """Give a command `step_deg`, `clearance_mm` and `bar_stays_on`."""
     for option in reversed(_OPTIONS):
         function = option(function)
     return function
 
 
 def approach_of(clearance_mm: float, *, bar_stays_on: bool) -> Approach | None:
-    """Return how the machine comes to the first point."""
+    """Return the approach to the first point."""
     from dbbstation.nc.circle_program import Approach
 
     return None if bar_stays_on else Approach(clearance_mm)

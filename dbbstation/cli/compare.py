@@ -128,7 +128,7 @@ def _print_runs(result: ComparisonResult) -> None:
 
 
 def _tenths(value: float) -> str:
-    """Print with one digit, zero without a sign."""
+    """Return one decimal, zero without sign."""
     return f"{round(value, 1) + 0.0:.1f}"
 
 

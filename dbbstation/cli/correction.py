@@ -1,4 +1,4 @@
-"""`--largest-correction-mm`: for every command that writes compensated programs."""
+"""`--largest-correction-mm`, for commands that write compensated programs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
 def largest_correction_option(function: _Function) -> _Function:
-    """Give a command the option; it takes `largest_mm`, a length [mm]."""
+    """Give a command `largest_mm` [mm]."""
     return shop_option(
         "--largest-correction-mm",
         "largest_mm",

@@ -56,7 +56,7 @@ def demo(*, out: Path | None, seed: int, quick: bool, as_json: bool) -> None:
 
 
 class DemoShown:
-    """Each command on a line, and a bar below it while it runs."""
+    """Each command on a line, with a bar while it runs."""
 
     def __init__(self) -> None:
         self.bar = ProgressBar("", ENDLESS)
@@ -69,7 +69,7 @@ class DemoShown:
         self.bar.show()
 
     def progress(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Show how many of how many circles are done."""
+        """Show the number of finished circles."""
         if done == 0:
             self.bar.end()
             self.bar = ProgressBar("  circles", COUNTED, passing=True)
@@ -127,7 +127,7 @@ _CONTENTS = (
 
 
 def _sizes(run: DemoCircle) -> tuple[tuple[float, float], ...]:
-    """Centre deviation, mean radial error and circular deviation, before and after each [µm]."""
+    """Return centre deviation, mean radial error and circular deviation, each before and after [µm]."""
     before, after = run.before, run.after
     return (
         (before.centre_deviation_um, after.centre_deviation_um),

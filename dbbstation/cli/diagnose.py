@@ -147,7 +147,7 @@ def _print(result: DiagnosisFigures) -> None:
 
 
 def _print_mismatch(result: DiagnosisFigures) -> None:
-    """Print whether the recordings differ from the kinematic model; before that, where what was found predicts worse."""
+    """Print whether recordings contradict the kinematic model, and first whether findings predict worse."""
     from dbbstation.results.model_warnings import chance_in_words
 
     if result.held_out_worse:
@@ -163,7 +163,7 @@ def _print_mismatch(result: DiagnosisFigures) -> None:
 
 
 def _print_workspace(elsewhere: WorkspaceGain) -> None:
-    """Print how far apart two models put the tool, with and without what they shift it by in common, and how well that is known."""
+    """Print how far two models put the tool apart, with and without common shift, and its uncertainty."""
     shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", elsewhere.common_shift_um, strict=True))
     for which, error, u, more in (
         ("as a whole", elsewhere.error_with_shift_rms_um, elsewhere.uncertainty_with_shift_rms_um, ""),
@@ -186,7 +186,7 @@ STILL_OPEN = frozenset({"ambiguous", "not-testable"})
 
 
 def _print_next_tests(result: DiagnosisFigures) -> None:
-    """Print which tests to measure next; that none helps, where a verdict is open; nothing where none is."""
+    """Print proposed tests, or that none helps an open verdict."""
     if result.next_test:
         tests = [result.next_test, *result.further_tests]
         which = "this test" if len(tests) == 1 else f"these {len(tests)} tests"
@@ -276,7 +276,7 @@ SAID = frozenset({"identified", "happened", "does-not-predict", "ambiguous"})
 
 
 def _probable(source: CauseResult) -> str:
-    """Probability as printed: no figure is closer to one or nought than the catalogue of causes is complete."""
+    """Return a probability, no closer to one or zero than the catalogue is complete."""
     if source.probability is None:
         return ""
     surest = 0.999

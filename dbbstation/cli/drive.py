@@ -136,7 +136,7 @@ def _print(result: DriveResult) -> None:
 
 
 def _print_rest(result: DriveResult) -> None:
-    """Print what has no name, what cancels, what cannot be told, and the band."""
+    """Print unnamed, cancelling and undecided parts, and the band."""
     echo("\n" + result.unexplained.text)
     if result.unexplained.significant:
         for effect in result.unexplained.effects[:3]:
@@ -192,7 +192,7 @@ def _print_sources(sources: Sequence[DriveFinding]) -> None:
 
 
 def _print_parts(source: DriveFinding) -> None:
-    """Numbers of a cause, or of each wave and pulse where it has several."""
+    """Print a cause's numbers, by wave or pulse."""
     if source.parameters and len(source.parts) <= 1:
         for name, number in source.parameters.items():
             echo(f"{source.name}: {name} {_number(number)}")

@@ -1,4 +1,4 @@
-"""How commands print what was found: values with their uncertainty, names in a row, and which verdicts are shown."""
+"""Print findings: values with uncertainty, names, shown verdicts."""
 
 from __future__ import annotations
 
@@ -23,35 +23,35 @@ MOST_NAMES = 6
 
 
 def with_uncertainty(number: Value) -> str:
-    """Return a value with its standard uncertainty and unit, as people read it."""
+    """Return value, standard uncertainty and unit for people."""
     known = f"{number.value:.4g} ± {number.uncertainty:.2g}" if number.is_known else f"{number.value:.4g}"
     return f"{known} {number.unit}".rstrip()
 
 
 def first_names(names: Sequence[str]) -> str:
-    """Return the first names of a list, and how many more there are."""
+    """Return the first names and the count of others."""
     shown = ", ".join(names[:MOST_NAMES])
     return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
 
 
 def parts_with_gain(gains: Gains | None, *, acts: str = "always") -> str:
-    """Return in how many held-out parts of how many an effect gains; nothing where other parts cannot show it.
+    """Return the count of held-out parts with gain; empty if other parts cannot show it.
 
     Args:
-        gains: None: held-out parts were not asked for.
+        gains: None: not tested.
         acts: `always` or `once`.
     """
     return gains.counted if gains is not None and acts == "always" else ""
 
 
 def cancelling_text(cancelling: Cancelling) -> str:
-    """Return which effects cancel each other, as a sentence."""
+    """Return the cancelling effects as a sentence."""
     parts = ", ".join(f"{name} {rms:.2g}" for name, rms in cancelling.rms.items())
     return f"Effects cancel each other: {parts}, together {cancelling.rms_of_sum:.2g} {cancelling.unit} rms."
 
 
 def residual_text(left: LeftOver, unit: str) -> str:
-    """Return whether something is left beyond noise, and what, as a sentence."""
+    """Return the residual beyond noise as a sentence."""
     if left.is_noise:
         return "Nothing is left beyond noise."
     where = f", {left.worst.where}" if left.worst.where else ""

@@ -137,7 +137,7 @@ def emulate(
 
 
 def _truth(machine: Machine, file: Path | None, source_files: tuple[Path, ...], seed: int) -> MachineModel:
-    """Return the actual machine: of a model file, or a random one.
+    """Return the actual machine, from a model file or random.
 
     Raises:
         InputError: the model file is wrong, or is of another machine.

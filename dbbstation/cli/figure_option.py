@@ -1,4 +1,4 @@
-"""`--figure FILE`: a figure in the format that the ending of its name says."""
+"""`--figure FILE`: a figure in the format of its extension."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 def figure_option(
     what: str = "Write a figure here", name: str = "--figure", *, required: bool = False
 ) -> Callable[[_Function], _Function]:
-    """Give a command this option; it takes the path under the option's name, None where none is wanted."""
+    """Give a command this option as a path or None."""
     return click.option(
         name,
         required=required,
@@ -30,12 +30,12 @@ def figure_option(
 
 
 def format_of(path: Path) -> Stamped:
-    """Return the format of a path that the option took, with where the figure comes from."""
+    """Return the format of a path with its provenance."""
     return Stamped(FigureFormat(path.suffix.lower()), provenance())
 
 
 def _known_format(_context: click.Context, _option: click.Parameter, path: Path | None) -> Path | None:
-    """Refuse other endings before any work is done.
+    """Refuse other extensions before any work.
 
     Raises:
         click.BadParameter: the name ends otherwise.

@@ -1,4 +1,4 @@
-"""The table of circles before and after, as [CAL Table III] has it."""
+"""The table of circles before and after [CAL Table III]."""
 
 from __future__ import annotations
 

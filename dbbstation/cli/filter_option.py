@@ -1,4 +1,4 @@
-"""`--filter`: the filter of G, F and H, alike in every command that works out circles."""
+"""`--filter`: the filter of G, F and H."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FILTERS = {"none": 0, "15": 15, "30": 30, "50": 50, "150": 150}
 
 
 def filter_option(function: _Function) -> _Function:
-    """Give a command this option; it takes its word as `cut_off`."""
+    """Give a command this option as `cut_off`."""
     return click.option(
         "--filter",
         "cut_off",
@@ -29,7 +29,7 @@ def filter_option(function: _Function) -> _Function:
 
 
 def filter_of(cut_off: str) -> Filter:
-    """Return the filter that a word of the option names."""
+    """Return the filter of a word."""
     from dbbstation.circles.path import Filter
 
     return Filter(FILTERS[cut_off])

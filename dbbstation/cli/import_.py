@@ -134,7 +134,7 @@ def import_(
 
 @dataclass(frozen=True)
 class _Told:
-    """What somebody says of the files: names of runs, starts, what is to be trusted, what nobody knows."""
+    """Stated facts of the files: runs, starts, trusted and unknown facts."""
 
     named: Sequence[str]
     started: Sequence[str]
@@ -144,7 +144,7 @@ class _Told:
 
 @dataclass(frozen=True)
 class _Import:
-    """Everything that will be written."""
+    """Everything to be written."""
 
     mapping: MappingFile
     plan: InlinePlan
@@ -205,7 +205,7 @@ def _read(
 
 
 def _confirm(asker: Asker, question: str, *, yes: bool) -> None:
-    """Have what was shown confirmed.
+    """Ask for confirmation.
 
     Raises:
         click.UsageError: nobody is there to confirm it.
@@ -249,7 +249,7 @@ def _with_conditions(asker: Asker, told: SessionOptions, not_known: Sequence[str
 
 
 def _unknown(told: SessionOptions) -> list[str]:
-    """Conditions that nobody knows, whether that was said on the command line or by Enter."""
+    """Return unknown conditions, by command line or Enter."""
     has_bar = told.bar_file is not None or told.bar_length_mm is not None
     known = (told.ambient_temp_c is not None, bool(told.operator), bool(told.job), has_bar)
     return [one for one, is_known in zip(CONDITIONS, known, strict=True) if not is_known]
@@ -313,7 +313,7 @@ def _started(files: Sequence[Path], said: Sequence[str], zone: str | None) -> di
 
 
 def _split(asker: Asker, mapping: MappingFile, tables: Sequence[ForeignTable]) -> MappingFile:
-    """Ask whether a file whose angles turn round has several runs; in a pipe `--split` says it."""
+    """Ask whether turning angles mean several runs; in a pipe `--split` answers."""
     import numpy as np
 
     from dbbstation.files.formats.mapping import ANGLE, OF_RUNS
@@ -335,10 +335,10 @@ def _split(asker: Asker, mapping: MappingFile, tables: Sequence[ForeignTable]) -
 
 
 def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> list[str]:
-    """Refuse circles from which another program took the centre, unless somebody says that they are raw.
+    """Refuse centred circles unless somebody confirms that they are raw.
 
     Raises:
-        InputError: nobody is there to say it.
+        InputError: nobody can confirm.
     """
     from dbbstation.errors import InputError, Problem
     from dbbstation.tasks.importing.plausible import CHANCE
@@ -363,7 +363,7 @@ def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> lis
 
 
 def _with_span(asker: Asker, reader: Reader, tables: Sequence[ForeignTable]) -> Reader:
-    """Have a span of angles confirmed that no circle of the plan has; in a pipe `--angle-span-deg` says it."""
+    """Ask to confirm an unplanned span of angles; in a pipe `--angle-span-deg` answers."""
     from dataclasses import replace
 
     angle = reader.mapping.angle
@@ -383,7 +383,7 @@ def _with_span(asker: Asker, reader: Reader, tables: Sequence[ForeignTable]) -> 
 
 
 def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequence[str]) -> list[str]:
-    """What somebody who reads the session later has to know of it."""
+    """Return what a later reader of the session must know."""
     from dbbstation.files.formats.mapping import ANGLE, DEVIATION
 
     files = ", ".join(dict.fromkeys(Path(one.file).name for one in runs))

@@ -1,4 +1,4 @@
-"""Options of every command that talks to a real instrument: which one, where it is, how fast its line is."""
+"""Options of real instruments: which, where, line rate."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
 def protocol_options(*, required: bool) -> Callable[[_Function], _Function]:
-    """Give a command `--instrument`, `--profile` and `--zero-mm`; the first required unless the shop has set it."""
+    """Give a command `--instrument`, `--profile` and `--zero-mm`; the first is required unless set by the shop."""
     return _given(
         shop_option(
             "--instrument",
@@ -46,7 +46,7 @@ def protocol_options(*, required: bool) -> Callable[[_Function], _Function]:
 
 
 def instrument_options(*, required: bool) -> Callable[[_Function], _Function]:
-    """Give a command the options of `protocol_options`, `--port` and `--baud`; what is required unless the shop has set it."""
+    """Give a command `protocol_options`, `--port` and `--baud`; required unless set by the shop."""
     of_protocol = protocol_options(required=required)
     of_line = _given(
         shop_option(
@@ -78,14 +78,14 @@ def spy_option(function: _Function) -> _Function:
 def chosen_protocol(
     instrument: str, profile: str | None, zero_mm: float | None, *, bar_length_mm: float | None = None
 ) -> Protocol:
-    """Return the protocol that the options name.
+    """Return the protocol of the options.
 
     Args:
-        zero_mm: where a relative instrument shows zero [mm].
-        bar_length_mm: calibrated length of the bar, taken for it where nothing else is said [mm].
+        zero_mm: reading position of a relative instrument's zero.
+        bar_length_mm: calibrated length, the default zero.
 
     Raises:
-        InstrumentError: no such instrument or profile, or a relative one of which nobody says where its zero is.
+        InstrumentError: unknown instrument or profile, or a relative one without zero.
         InputError: faults of the protocol file.
     """
     from dbbstation.instrument.library import load_instrument, with_zero
@@ -98,10 +98,10 @@ def chosen_protocol(
 
 @contextmanager
 def spying(path: Path | None, protocol: Protocol, port: str, *, force: bool = False) -> Iterator[ByteLog | None]:
-    """Open a byte log where one is asked for.
+    """Open a byte log if requested.
 
     Raises:
-        OutputError: the file exists already, lies in a session, or cannot be written.
+        OutputError: the file exists, lies in a session, or cannot be written.
     """
     from dbbstation.files.recorded_ground import refuse_recorded
     from dbbstation.instrument.bytelog import ByteLog

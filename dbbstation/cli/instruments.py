@@ -1,4 +1,4 @@
-"""`dbbstation instruments`: what is known, and the line settings of each."""
+"""`dbbstation instruments`: known instruments and their line settings."""
 
 from __future__ import annotations
 

@@ -212,10 +212,10 @@ def holders(
 
 
 def _write_holders(found: Mapping[str, Repeatability], before: Path, out: Path, sheet: Path, *, force: bool) -> None:
-    """Write a jig file as before, with what was found of its holders.
+    """Write a jig file with new values of its holders.
 
     Raises:
-        InputError: the jig has no such holder.
+        InputError: an unknown holder.
         OutputError: the file cannot be written.
     """
     from dbbstation.cli.provenance import provenance
@@ -259,7 +259,7 @@ _WHAT = ("ball", "bore", "holder", "x", "y", "z", "u", "ux", "uy", "uz", "axis",
 
 
 def _pairs(texts: Sequence[str], option: str, known: Sequence[str] = ()) -> dict[str, str]:
-    """Pairs `A=B` of an option.
+    """Return pairs `A=B` of an option.
 
     Raises:
         click.UsageError: no pair, or a first part that is not known.
@@ -287,7 +287,7 @@ def _texts(change_um: Sequence[float] | None) -> list[str]:
 
 
 def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str, list[Any]]:
-    """Centres by holder and place, shape (n, axes) each [µm].
+    """Return centres by holder and place, shape (n, axes) each [µm].
 
     Raises:
         InputError: a row without a holder.

@@ -1,4 +1,4 @@
-"""`--model`: for every command that judges circles while they are measured."""
+"""`--model`, for commands that judge circles while measuring."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
 def judging_model_options(function: _Function) -> _Function:
-    """Give a command `--model` and `--source-file`; it passes them to `judging_model`."""
+    """Give a command `--model` and `--source-file` for `judging_model`."""
     option = click.option(
         "--model",
         "model_file",
@@ -29,10 +29,10 @@ def judging_model_options(function: _Function) -> _Function:
 
 
 def judging_model(model_file: Path | None, source_files: Sequence[Path]) -> IdentifiedModel | None:
-    """Return the model that says where circles are expected; None where none is given.
+    """Return the model of expected circles, or None.
 
     Raises:
-        InputError: every fault of the file with its place.
+        InputError: every fault with its place.
     """
     if model_file is None:
         return None

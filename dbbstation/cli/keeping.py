@@ -1,4 +1,4 @@
-"""`--prefer` and `--accept-chord-um`: what compensated programs keep where chord error and feed cannot both be kept."""
+"""`--prefer` and `--accept-chord-um`: what compensated programs keep."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _OPTIONS = (
 
 
 def keeping_options(function: _Function) -> _Function:
-    """Give a command these options; it takes `prefer` and `accepted_um`."""
+    """Give a command `prefer` and `accepted_um`."""
     for option in reversed(_OPTIONS):
         function = option(function)
     return function

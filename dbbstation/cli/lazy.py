@@ -1,4 +1,4 @@
-"""Groups of commands of which only the one that is called is imported, so that `--help` stays quick."""
+"""Groups that import only the called command, so that `--help` stays quick."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 
 class LazyGroup(click.Group):
-    """Loads a command's module only when that command is asked for.
+    """Loads a command's module on demand.
 
     Args:
         table: name and one line of help of every command.
-        package: where each is a module with a command of its name, hyphens as underscores, an underscore behind a word of Python.
-        more: as `click.Group` takes it.
+        package: modules named as commands, underscores for hyphens and behind Python keywords.
+        more: for `click.Group`.
     """
 
     def __init__(self, *, table: Mapping[str, str], package: str, **more: Any) -> None:  # noqa: ANN401
@@ -49,7 +49,7 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command, or name those that are spelled nearly like it."""
+        """Find the command, or suggest similar ones."""
         name = args[0]
         near = difflib.get_close_matches(name, self._table, n=3)
         if name not in self._table and not name.startswith("-") and near:
@@ -57,6 +57,6 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """List the commands from the table, without importing them."""
+        """List commands from the table without imports."""
         with formatter.section("Commands"):
             formatter.write_dl(sorted(self._table.items()))

@@ -1,8 +1,6 @@
-"""The log: what a command was asked, with which versions and inputs, what it said, how it ended; for a service engineer.
+"""The log of commands for service: request, versions, inputs, messages, end.
 
-One file in the user's folder for logs, which every command continues: a command writes nothing beside what it reads. What happened
-while a session was measured is in its own event log, which goes with it. The file is turned over at a size, so that it never fills a
-disk.
+One file in the user's log folder, rotated at a size. Events of a measurement are in the session's own log.
 """
 
 from __future__ import annotations
@@ -44,7 +42,7 @@ _VERSIONS = ("numpy", "scipy", "numba", "matplotlib", "pydantic", "pyserial", "t
 
 
 class _Printable(logging.Formatter):
-    """A log is looked at in a terminal too."""
+    """Makes log records safe for a terminal."""
 
     def format(self, record: logging.LogRecord) -> str:
         return printable(super().format(record))
@@ -54,7 +52,7 @@ _FORM = _Printable("%(asctime)s %(process)d %(levelname)s %(message)s", "%Y-%m-%
 
 
 def attended(command: click.Command) -> click.Command:
-    """Let a command, or every command of a group, keep the log; one that does so already is left as it is."""
+    """Let a command, or every command of a group, keep the log once."""
     for inner in command.commands.values() if isinstance(command, click.Group) else ():
         attended(inner)
     callback = command.callback
@@ -75,7 +73,7 @@ def _attended(callback: Callable[..., Any]) -> Callable[..., Any]:
 
 @contextmanager
 def _kept(context: click.Context) -> Iterator[None]:
-    """Log the beginning of a command, everything that is logged while it runs, and its end."""
+    """Log begin, events and end of a command."""
     verbose = bool(context.find_root().params.get("verbose"))
     handlers = [_to_file(), _to_screen() if verbose else None]
     used = [handler for handler in handlers if handler is not None] or [logging.NullHandler()]
@@ -132,7 +130,7 @@ def _to_screen() -> logging.Handler:
 
 
 def _to_file() -> logging.Handler | None:
-    """Return the handler of the log; None where there is to be none, or it cannot be written."""
+    """Return the log's handler, or None if disabled or unwritable."""
     from logging.handlers import RotatingFileHandler
 
     named = os.environ.get(VARIABLE)
@@ -150,10 +148,10 @@ def _to_file() -> logging.Handler | None:
 
 
 def _free(path: Path) -> bool:
-    """Whether a log may stand there: nothing else does. Not in a session, and nothing that a pipe or a second name leads to.
+    """Return whether a log may be here: a regular file with one name, outside sessions.
 
     Raises:
-        OSError: the system does not say.
+        OSError: the system refuses.
     """
     if session_around(path) is not None:
         return False
@@ -168,7 +166,7 @@ _Kind = TypeVar("_Kind", bound=logging.Handler)
 
 
 def _undisturbing(kind: type[_Kind]) -> type[_Kind]:
-    """Return a kind of handler that falls silent where it cannot write: a log is no reason to fail, or to hide one."""
+    """Return a handler that stays silent if it cannot write."""
 
     class Undisturbing(kind):  # type: ignore[misc, valid-type]  # a kind that is known here only
         def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802, ARG002 - called so by the library

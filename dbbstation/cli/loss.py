@@ -1,4 +1,4 @@
-"""`--largest-loss-percent`: for every command that records runs."""
+"""`--largest-loss-percent`, for commands that record runs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
 def loss_option(function: _Function) -> _Function:
-    """Give a command the option; it takes `largest_loss_percent` and passes it to `with_loss_limit`."""
+    """Give a command `largest_loss_percent`, for `with_loss_limit`."""
     return shop_option(
         "--largest-loss-percent",
         setting="limits.largest_loss_percent",
@@ -27,9 +27,9 @@ def loss_option(function: _Function) -> _Function:
 
 
 def with_loss_limit(plan: InlinePlan, percent: float | None) -> InlinePlan:
-    """Return the plan with the limit in it, so that whoever reads the session later holds its runs against the same.
+    """Return the plan with the limit, for later judgements.
 
-    The command line holds over the plan, and the plan over the shop's settings.
+    The command line overrides the plan, which overrides the shop's settings.
     """
     stated = plan.plan.largest_loss_percent is not None
     if percent is None or (stated and from_settings("largest_loss_percent")):

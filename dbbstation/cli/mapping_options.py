@@ -1,4 +1,4 @@
-"""Options that say what the columns of foreign tables mean, and the mapping that follows from them."""
+"""Options on the meaning of foreign columns, and their mapping."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ _OPTIONS = (
 
 @dataclass(frozen=True, kw_only=True)
 class MappingOptions:
-    """What was given of these options; None or nothing where an option was not given."""
+    """Given options; None or empty if not given."""
 
     mapping_file: Path | None
     columns: tuple[str, ...]
@@ -103,12 +103,12 @@ class MappingOptions:
 
     @property
     def kept(self) -> Path | None:
-        """File of the mapping; None where there is none yet."""
+        """Return the mapping's file, or None."""
         return self.mapping_file if self.mapping_file is not None and self.mapping_file.exists() else None
 
     @property
     def said(self) -> list[str]:
-        """Names of the options that say what a mapping says too, as they are typed."""
+        """Return given options that a mapping states too."""
         given = [one.name for one in fields(self)[1:] if getattr(self, one.name) not in (None, ())]
         return ["--" + ("column" if name == "columns" else name.replace("_", "-")) for name in given]
 
@@ -121,9 +121,9 @@ def mapping_options(function: _Function) -> _Function:
 
 
 def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, ForeignTable]:
-    """Read all files: as the mapping says where it says how numbers are written, else as the options, else as the shop's settings.
+    """Read all files by the mapping's number format, else by options, else by settings.
 
-    Where nobody says it, it is found by looking. So it is with tables that this program exported, whatever the shop writes.
+    Otherwise, and for this program's own tables, it is detected.
 
     Raises:
         InputError: every fault of every file.
@@ -156,7 +156,7 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
 
 
 def _read(path: Path, stated: NumberLanguage | None, shops: NumberLanguage | None, encoding: str) -> ForeignTable:
-    """Read one file: as stated, else as the shop writes, where this program did not write it; errors as of `read_foreign`."""
+    """Read one file as stated, else by settings unless exported by this program; errors as `read_foreign`."""
     from dbbstation.errors import InputError
     from dbbstation.files.recordings.foreign_csv import read_foreign
     from dbbstation.tasks.importing.proposal import EXPORTED
@@ -170,11 +170,7 @@ def _read(path: Path, stated: NumberLanguage | None, shops: NumberLanguage | Non
 
 
 def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, asker: Asker) -> Callable[[], MappingFile]:
-    """Return what gives the mapping once everything was answered: from its file, or from names, options and answers.
-
-    Args:
-        asker: of what cannot be told.
-    """
+    """Return a function that gives the mapping after all answers: from its file, or names, options and answers."""
     from dbbstation.files.formats.mapping import ANGLE, DEVIATION, IGNORED, LENGTH, UNITS, read_mapping
     from dbbstation.tasks.importing.proposal import EXPORTED, Proposed
 
@@ -248,7 +244,7 @@ def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
 
 
 def _angle(options: MappingOptions, asker: Asker, *, own: bool) -> dict[str, object]:
-    """Zero, sense and span of the angles; tables that this program exported have angles in the machine."""
+    """Return zero, sense and span of angles; own exports have machine angles."""
     grows = "ccw" if own else options.angle_grows
     grows = grows or asker.text(
         "sense in which the files' angles grow, seen from +Z", "--angle-grows", ["ccw", "cw", "travel"]
@@ -262,7 +258,7 @@ def _angle(options: MappingOptions, asker: Asker, *, own: bool) -> dict[str, obj
 
 
 def _mapping(table: ForeignTable, data: Mapping[str, Any]) -> MappingFile:
-    """The mapping as its file has it.
+    """Return the mapping as a file.
 
     Raises:
         click.UsageError: something that no mapping may say.

@@ -83,23 +83,23 @@ def measure(**given: Any) -> None:  # noqa: ANN401 - the options, each with a ty
 
 @dataclass(frozen=True, kw_only=True)
 class MeasureOptions:
-    """What `measure` was asked.
+    """The options of `measure`.
 
     Attributes:
-        instrument: name of the instrument, or its protocol file.
-        profile: of the instrument; None: its usual one.
-        zero_mm: length at which a relative instrument shows zero; None: that of the bar [mm].
-        baud: rate of the line; None: the instrument's usual one [1/s].
-        spy: file for a log of all bytes; None: none.
+        instrument: name or protocol file.
+        profile: None: the usual one.
+        zero_mm: None: the bar's length.
+        baud: None: the usual one [1/s].
+        spy: log of all bytes; None: none.
         out: session folder.
         auto: control address of `emulate`; None: a person starts circles.
-        programs: folder of the NC programs that are run; None: none.
-        rate_hz: sampling rate; None: the instrument's usual one [Hz].
-        largest_loss_percent: of samples, of a run; None: the plan's [%].
-        largest_bar_age_h: of the bar's calibration; None: any [h].
-        model_file: that circles are judged by; None: the nominal machine.
-        source_files: Python files with error sources of that model.
-        gate: which run must be good before the others.
+        programs: folder; None: none.
+        rate_hz: None: the usual one.
+        largest_loss_percent: of a run's samples; None: the plan's.
+        largest_bar_age_h: None: any.
+        model_file: None: the nominal machine.
+        source_files: own sources of that model.
+        gate: repeated at the end.
     """
 
     plan_file: Path
@@ -197,7 +197,7 @@ def _measured(asked: MeasureOptions) -> None:
 
 
 def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> bool:
-    """Run the sequence, say what happens, print the summary; return whether Ctrl-C ended it."""
+    """Run the sequence with messages and summary; return whether Ctrl-C ended it."""
     from dbbstation.cli.measure_talk import Keyboard, Log, Summary, Talk
     from dbbstation.cli.output import print_result
     from dbbstation.station.autopilot import Autopilot
@@ -228,7 +228,7 @@ def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> 
 
 @contextmanager
 def _interruptible(station: Station) -> Iterator[threading.Event]:
-    """Let Ctrl-C and a polite kill end the sequence between two samples; a second one breaks off at once."""
+    """End the sequence between samples on Ctrl-C or SIGTERM; a second signal aborts."""
     from dbbstation.station.commands import Quit
 
     interrupted = threading.Event()
@@ -245,9 +245,6 @@ def _interruptible(station: Station) -> Iterator[threading.Event]:
 class VirtualHands:
     """Moves the virtual machine of `emulate`.
 
-    Args:
-        url: its control address.
-
     Raises:
         MachineError: no such address.
     """
@@ -263,7 +260,7 @@ class VirtualHands:
         return None if ball is None else str(ball)
 
     def stands_since_s(self) -> float:
-        """Return the machine time at which the machine stands; minus infinity where it does not wait [s]."""
+        """Return the machine time since which it stands [s]; minus infinity if it does not wait."""
         return float(str(self._client.ask("status").get("stands_since_s", -math.inf)))
 
     def mount(self, test: str) -> None:

@@ -1,4 +1,4 @@
-"""What `dbbstation measure` says and hears: lines on standard error, a bar on a terminal, keys from standard input."""
+"""Talk of `measure`: lines, a progress bar, keys."""
 
 from __future__ import annotations
 
@@ -53,10 +53,10 @@ _ASKED_OF_WRONG = "Enter: repeat   a WHY: accept all the same   x: reject   q: q
 
 
 class Talk:
-    """Tells a person what happens; an observer of the station.
+    """Tells a person what happens; an observer.
 
     Args:
-        asking: somebody answers, so say what can be answered.
+        asking: name possible answers.
     """
 
     def __init__(self, *, asking: bool) -> None:
@@ -84,12 +84,12 @@ class Talk:
             echo(f"  {_ASKED_OF_WRONG if doubtful else _ASKED[event.state]}", err=True)
 
     def end(self) -> None:
-        """Take the bar away, whatever ended the measurement."""
+        """Remove the bar after any end."""
         self._bar.end()
 
 
 class Log:
-    """Logs what happens; an observer of the station."""
+    """Logs what happens; an observer."""
 
     def __call__(self, event: events.Event) -> None:
         """Log an event."""
@@ -100,21 +100,21 @@ class Log:
 
 
 class Summary:
-    """Collects what `--json` prints; an observer of the station."""
+    """Collects what `--json` prints; an observer."""
 
     def __init__(self) -> None:
         self._completed: dict[str, events.RunCompleted] = {}
         self._fault = ""
 
     def __call__(self, event: events.Event) -> None:
-        """Remember the figures of runs, and what went wrong."""
+        """Take figures of runs and faults."""
         if isinstance(event, events.RunCompleted):
             self._completed[event.run.label] = event
         elif isinstance(event, events.Fault):
             self._fault = str(event.error)
 
     def of(self, workplace: Workplace) -> MeasuredSession:
-        """Return the session; figures of the runs that were recorded now."""
+        """Return the session with figures of new runs."""
         session, schedule = workplace.writer.session, workplace.schedule
         return MeasuredSession(
             session=str(session.folder),
@@ -153,7 +153,7 @@ class Summary:
 
 
 class Keyboard:
-    """Turns lines of standard input into commands; an observer of the station, which knows what Enter means now."""
+    """Turns input lines into commands by the station's state; an observer."""
 
     def __init__(self, send: Callable[[Command], None], lines: TextIO | None = None) -> None:
         self._send = send
@@ -179,7 +179,7 @@ class Keyboard:
 
     @property
     def _doubtful(self) -> bool:
-        """Whether a run waits for its verdict with which something is wrong."""
+        """Return whether a faulty run awaits its verdict."""
         return self._state is State.COMPLETE and self._wrong
 
     def _listen(self) -> None:
@@ -210,7 +210,7 @@ def _command_of(line: str) -> Command | None:
 
 
 def _temperature(text: str) -> AddNote | None:
-    """Temperature of the shop as a note; None where it is no number or no shop has it."""
+    """Return the shop's temperature as a note, or None if implausible."""
     degc = shop_degc(text)
     return None if degc is None else AddNote(ambient_temp_c=degc)
 

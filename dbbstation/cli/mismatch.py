@@ -216,7 +216,7 @@ def mismatch(
 
 
 def _refuse_mixed(simulator: Path | None, of_tables: Mapping[str, object], of_simulators: Mapping[str, object]) -> None:
-    """Refuse options that belong to the other of both kinds of recordings."""
+    """Refuse options of the other kind of recordings."""
     given = [name for name, value in (of_simulators if simulator is None else of_tables).items() if value is not None]
     if given:
         what = (
@@ -274,7 +274,7 @@ def _print(result: MismatchResult) -> None:
 
 
 def _print_whether(result: MismatchResult) -> None:
-    """Is there a mismatch, how large, beside which noise, led by which variable."""
+    """Print existence, size, noise and leading variable of a mismatch."""
     unit, noise, rms = result.unit, result.noise, result.residual_rms
     offset = result.offset
     if offset and offset.significant:

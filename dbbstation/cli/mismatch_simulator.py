@@ -1,4 +1,4 @@
-"""`dbbstation mismatch --simulator`: a simulator that the program runs itself, asked at its ports."""
+"""`dbbstation mismatch --simulator`: a simulator in the loop."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def mismatch_with_simulator(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Compare a simulator with recordings, print what is said and write what is asked for."""
+    """Compare a simulator with recordings; print and write the results."""
     from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
@@ -96,7 +96,7 @@ STAGES_WHOLE = {"refit": 0, "look": 5, "sets of causes": 20}
 
 
 def _corrected(answer: SimulatorComparison) -> str:
-    """Text of a table of all rows: run, time, and of each output measured, simulated, refitted and corrected values."""
+    """Return a table of run, time, and each output's measured, simulated, refitted and corrected values."""
     from dbbstation.files.recordings.table_csv import table_csv
 
     work, model = answer.work, answer.model

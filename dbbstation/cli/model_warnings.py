@@ -1,4 +1,4 @@
-"""What every command says first of a model that lacks physics, or has causes that are not decided or unknown."""
+"""Warnings of a model, said first by every command."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def say_model_warnings(identified: IdentifiedModel) -> None:
-    """Say what speaks against a model, one line each."""
+    """Print a model's warnings, one line each."""
     from dbbstation.results.model_warnings import model_warnings
 
     for warning in model_warnings(identified):

@@ -15,7 +15,7 @@ MA_PER_A = 1e3
 
 
 def print_currents(currents: CurrentsFigures | None) -> None:
-    """Print drives, centre of gravity by channel and notes, where a calibration used motor currents."""
+    """Print drives, centre of gravity by channel and notes of motor currents."""
     if currents is None:
         return
     echo()

@@ -1,4 +1,4 @@
-"""`--decimal` and `--separator`: for every command that reads a table from elsewhere."""
+"""`--decimal` and `--separator`, for tables from elsewhere."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SEPARATOR = click.Choice([*_BY_NAME, *_BY_NAME.values()])
 
 
 def number_options(function: _Function) -> _Function:
-    """Give a command the options; it takes `decimal` and `separator` and passes them to `number_language`."""
+    """Give a command `decimal` and `separator`, for `number_language`."""
     options = (
         shop_option(
             "--decimal",
@@ -45,9 +45,9 @@ def number_options(function: _Function) -> _Function:
 
 
 def shops_numbers() -> NumberLanguage | None:
-    """Return how the shop's settings say that numbers are written, and tell the user; None where they do not say.
+    """Return the number format of the shop's settings, with a note; None if not set.
 
-    For a command whose options do not take them by themselves, because a file decides first.
+    For commands in which a file decides first.
     """
     values = shop_settings().values
     found = {key: values[name] for key in ("decimal", "separator") if (name := f"numbers.{key}") in values}
@@ -59,10 +59,10 @@ def shops_numbers() -> NumberLanguage | None:
 
 
 def number_language(decimal: str | None, separator: str | None) -> NumberLanguage:
-    """Return how the numbers of the table are written.
+    """Return the number format of a table.
 
     Raises:
-        InputError: decimal sign and separator are alike.
+        InputError: decimal sign and separator are equal.
     """
     from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 

@@ -1,4 +1,4 @@
-"""Types of options that are numbers: what is not a finite number is refused by the option's name, before anything is read or written."""
+"""Option types for finite numbers."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 
 class Finite(click.FloatRange):
-    """A finite number, within a range where one is given; arguments as those of `click.FloatRange`.
+    """A finite number, with a range as of `click.FloatRange`.
 
-    `nan` lies in every range, as it is neither below nor above anything, and `inf` in those without an end.
+    `nan` lies in every range, and `inf` in open ones.
     """
 
     def __init__(self, *limits: Any, **more: Any) -> None:  # noqa: ANN401 - as click has it
@@ -34,5 +34,5 @@ class Finite(click.FloatRange):
         return number
 
     def _describe_range(self) -> str:
-        """The range in help texts; nothing where there is none."""
+        """Return the range for help, or an empty text."""
         return "" if self.min is None and self.max is None else super()._describe_range()

@@ -1,4 +1,4 @@
-"""Options of a command as one object, where several commands have them or there are many."""
+"""Options of a command as one object."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ _Options = TypeVar("_Options")
 
 
 def taken_from(options: MutableMapping[str, Any], kind: type[_Options]) -> _Options:
-    """Take the options of one class out of all that a command was given.
+    """Remove the options of one class from `options` and return them.
 
     Args:
-        options: by name; those that are taken are no longer in it.
-        kind: a dataclass whose fields have the names of its options.
+        kind: dataclass with fields named as its options.
     """
     return kind(**{one.name: options.pop(one.name) for one in fields(kind)})  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Options that say in which order the tests of a plan are measured, and by which NC programs."""
+"""Options on the order of tests and on NC programs."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def order_options(function: _Function) -> _Function:
 
 
 def in_order(plan: InlinePlan, order: str, gate: str) -> InlinePlan:
-    """Return the plan in the order that was asked for."""
+    """Return the ordered plan."""
     from dbbstation.service.order import Gate, Order, ordered
 
     return ordered(plan, Order(order), Gate(gate))

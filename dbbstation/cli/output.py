@@ -1,4 +1,4 @@
-"""What commands print: tables for people, JSON for programs. Standard output is data, standard error is talk."""
+"""Output of commands: data on standard output, talk on standard error."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _LOG = logging.getLogger(__name__)
 
 
 def echo(text: object = "", *, err: bool = False, nl: bool = True) -> None:
-    """Print text: the one way out to a terminal, which no name, reason or cell of a file can give orders to.
+    """Print text, the one way to a terminal.
 
     Args:
-        text: control characters in it are shown.
-        nl: end it with a line end.
+        text: control characters are shown.
+        nl: end with a line end.
     """
     # While a bar is drawn Rich stands in for standard error and puts lines above the bar; Click would look through it.
     above = sys.stderr if err and hasattr(sys.stderr, "rich_proxied_file") else None
@@ -39,31 +39,31 @@ def echo(text: object = "", *, err: bool = False, nl: bool = True) -> None:
 
 
 def print_json(data: Mapping[str, object]) -> None:
-    """Print one JSON object with where it comes from; numbers that are not finite are refused: they are no JSON."""
+    """Print a JSON object with its provenance; refuse numbers that are not finite."""
     from dbbstation.cli.provenance import provenance
 
     print_plain_json({**data, "provenance": provenance().data()})
 
 
 def print_result(result: object) -> None:
-    """Print a result as one JSON object with where it comes from."""
+    """Print a result as JSON with its provenance."""
     from dbbstation.facts.serialise import plain
 
     print_json(plain(result))
 
 
 def print_plain_json(data: Mapping[str, object]) -> None:
-    """Print one JSON object as it is: a document of its own, such as a schema."""
+    """Print a JSON document such as a schema."""
     echo(json_text(data, indent=1))
 
 
 def json_text(data: Mapping[str, object], indent: int | None = None) -> str:
-    """Return data as JSON that no terminal takes for an order: delete is the one control that `json` leaves as it is."""
+    """Return data as JSON, with DEL escaped for terminals too."""
     return json.dumps(data, indent=indent, allow_nan=False).replace("\x7f", "\\u007f")
 
 
 def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Print rows under titles, numbers to the right, texts to the left."""
+    """Print rows under titles, numbers right, texts left."""
     texts = [[_text(cell) for cell in row] for row in rows]
     numeric = [all(_is_number(row[k]) for row in texts if row[k]) for k in range(len(titles))]
     widths = [max(len(title), *(len(row[k]) for row in texts), 0) for k, title in enumerate(titles)]
@@ -73,13 +73,13 @@ def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None
 
 
 def say(text: str) -> None:
-    """Tell the person at the terminal, and the log, something that is not the result."""
+    """Tell user and log something beside the result."""
     log_said(text)
     echo(text, err=True)
 
 
 def log_said(text: str) -> None:
-    """Log what the person at the terminal sees anyhow: `--verbose` does not show it again."""
+    """Log what the user sees anyhow, hidden from `--verbose`."""
     _LOG.info("%s", text, extra={"said": True})
 
 

@@ -1,4 +1,4 @@
-"""What `program` and `compensate` share: the start of a program, what is printed."""
+"""Common parts of `program` and `compensate`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def parsed_pose(text: str) -> NDArray[np.float64]:
-    """Return the pose, shape (6,) [mm, deg], that `X,Y,Z,A,B,C` says."""
+    """Return the pose of `X,Y,Z,A,B,C`, shape (6,) [mm, deg]."""
     try:
         pose = np.array([float(number) for number in text.split(",")])
     except ValueError:
@@ -29,7 +29,7 @@ def parsed_pose(text: str) -> NDArray[np.float64]:
 
 
 def print_programs(result: ProgramsResult, *, as_json: bool) -> None:
-    """Print what was written, as a table or as JSON, and for compensated programs what the machine accelerates with."""
+    """Print programs as table or JSON, with the assumed acceleration."""
     if as_json:
         print_result(result)
         return
@@ -65,7 +65,7 @@ def _or_empty(value: float | None) -> float | str:
 
 
 def _say_uncertainty(programs: Sequence[WrittenProgram]) -> None:
-    """Set what the model knows of the paths, where it knows least, against the chord error that was asked for."""
+    """Compare the model's largest uncertainty with the requested chord error."""
     reasons = [each.model_uncertainty_not_known_because for each in programs]
     for why in dict.fromkeys(one for one in reasons if one):
         say(f"how well the model knows the path is not known in every coordinate: {why}")

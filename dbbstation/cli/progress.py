@@ -1,7 +1,6 @@
-"""Progress of long work: a bar on a terminal with counts and the time that is left; nothing in a pipe.
+"""Progress of long work: a bar with counts and remaining time on a terminal, nothing in a pipe.
 
-Rich draws it with the colours and lines that the terminal has. Lines that are printed meanwhile appear above the bar.
-Stages go into the log, which `--verbose` shows in place of the bar.
+Lines printed meanwhile appear above the bar. Stages go into the log.
 """
 
 from __future__ import annotations
@@ -47,20 +46,19 @@ COUNTED, SHARE, ENDLESS = "{task.completed:.0f} of {task.total:.0f}{task.fields[
 
 
 class Tell(Protocol):
-    """What is told how far work has come."""
+    """Receives the progress of work."""
 
     def __call__(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Take a stage, and how much of it is done where that can be counted."""
+        """Take a stage, and how much of it is done if countable."""
 
 
 class ProgressBar:
-    """A bar on standard error, which begins when it is first shown to somebody.
+    """A bar on standard error, drawn when first shown.
 
     Args:
-        label: what is being done.
-        form: what stands beside the bar: `COUNTED`, `SHARE` or `ENDLESS`.
+        form: `COUNTED`, `SHARE` or `ENDLESS`.
         unit: behind a count.
-        passing: the bar disappears when it ends.
+        passing: remove the bar at its end.
     """
 
     def __init__(self, label: str, form: str, *, unit: str = "", passing: bool = False) -> None:
@@ -75,9 +73,9 @@ class ProgressBar:
         """Show how much of how much is done.
 
         Args:
-            of: all; None where that is unknown.
+            of: None if unknown.
             text: beside the bar.
-            at_once: draw it now, and not a moment later.
+            at_once: draw without delay.
         """
         left = time_left(done / of, now_s() - self._started_s) if of else ""
         beside = left + on_one_line(text)
@@ -91,7 +89,7 @@ class ProgressBar:
             self._drawn.start()
 
     def end(self, *, done: bool = False) -> None:
-        """Take the bar away, or leave it as it is; fill it first where the work is done."""
+        """Remove or keep the bar, filled if done."""
         if self._drawn is None:
             return
         if done:
@@ -122,7 +120,7 @@ def _rich(form: str, *, passing: bool) -> Progress:
 
 
 class Compiling:
-    """Says on a terminal, once, that loops are compiled, and shows a bar meanwhile."""
+    """Reports once that loops are compiled, with a bar."""
 
     def __init__(self) -> None:
         self._bar = ProgressBar("compiling", ENDLESS, passing=True)
@@ -142,16 +140,16 @@ class Compiling:
 
 @contextmanager
 def progress_bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show a bar on standard error; yields what is to be told how much of `total` is done."""
+    """Show a bar; yield a callback for how much of `total` is done."""
     with count_bar(label) as tell:
         yield lambda done: tell(done, total)
 
 
 @contextmanager
 def count_bar(label: str) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar for work that is counted; yields what is to be told how much of how much is done.
+    """Show a bar; yield a callback for done and total.
 
-    The bar begins when the work has taken a moment, and ends with the last piece.
+    The bar appears after a moment.
     """
     bar, started_s, begun = ProgressBar(label, COUNTED), now_s(), False
 
@@ -172,14 +170,12 @@ def count_bar(label: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def stage_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
-    """Show how far work has come that tells its stages; yields what is to be told each stage as it begins.
+    """Show a bar; yield a callback for stages.
 
-    A bar begins with the first stage, so that lines said before stay whole.
+    The bar appears with the first stage.
 
     Args:
-        label: what is being done.
-        stages: how much is done when a stage begins [%], in their order; a text belongs to the stage whose name it begins
-            with.
+        stages: percentage at each begin, in order; by the begin of its text.
     """
     bar = _Stages(ProgressBar(label, SHARE), stages)
     try:
@@ -191,11 +187,10 @@ def stage_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
 
 @contextmanager
 def task_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
-    """Show how far a task has come that reads sessions first: a bar for that, and one for its stages.
+    """Show bars for reading sessions and a task's stages.
 
     Args:
-        label: what is being done.
-        stages: of the task once runs are read, as `stage_bar` takes them.
+        stages: of the task, as in `stage_bar`.
     """
     from dbbstation.tasks.load import READING
 
@@ -232,7 +227,7 @@ class _Stages:
 
 
 def time_left(share: float, passed_s: float) -> str:
-    """Return what is left of work as text before the name of its stage, such as `20 s left, `; empty where too early."""
+    """Return the remaining time, such as `20 s left, `; empty if too early."""
     least_s, least = _TRUSTED
     if passed_s < least_s or not least <= share < 1.0:
         return ""
@@ -241,14 +236,14 @@ def time_left(share: float, passed_s: float) -> str:
 
 
 def _shown() -> bool:
-    """Whether somebody looks: on a terminal, and not at the log in place of the bar."""
+    """Return whether a bar is visible."""
     context = click.get_current_context(silent=True)
     verbose = context is not None and bool(context.find_root().params.get("verbose"))
     return sys.stderr.isatty() and not verbose
 
 
 def _stage_of(text: str, stages: Mapping[str, int]) -> tuple[float, float] | None:
-    """Where a stage begins and the next one does [%]; None for a text of no stage."""
+    """Return begin and end of a stage [%]; None for other texts."""
     names = list(stages)
     here = next((k for k, name in enumerate(names) if text.startswith(name)), None)
     if here is None:
@@ -257,13 +252,13 @@ def _stage_of(text: str, stages: Mapping[str, int]) -> tuple[float, float] | Non
 
 
 def _reached_within(text: str, stages: Mapping[str, int], share: float) -> float:
-    """How much is done when a share of a stage is; nothing for a text of no stage [%]."""
+    """Return the progress within a stage [%]; None for other texts."""
     begins, following = _stage_of(text, stages) or (0.0, 0.0)
     return begins + share * (following - begins)
 
 
 def _reached(text: str, stages: Mapping[str, int], before: float) -> float:
-    """How much is done when a stage begins; one that comes again goes a quarter of the way to the next [%]."""
+    """Return the progress at a stage's begin [%]; a repeated one advances a quarter of the way."""
     stage = _stage_of(text, stages)
     if stage is None:
         return before

@@ -1,4 +1,4 @@
-"""The one place that says where the outputs of the command that runs come from."""
+"""Provenance of the running command's outputs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _GIVEN = frozenset({ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP, Pa
 
 
 def provenance() -> Provenance:
-    """Return where the outputs of the command that runs come from, with the inputs that were read so far."""
+    """Return the provenance with the inputs read so far."""
     from dbbstation.files.inputs import inputs_so_far
     from dbbstation.files.provenance import Provenance
 
@@ -38,7 +38,7 @@ def provenance() -> Provenance:
 
 
 def command_of(context: click.Context) -> str:
-    """Return what a command was asked, as it can be typed: options of the shop's settings too, files without folders."""
+    """Return a command as typed, with options of settings, files without folders."""
     path = context.command_path.split()
     words = ["dbbstation", *(path[1:] if path[:1] == ["dbbstation"] else path)]
     for parameter in context.command.params:

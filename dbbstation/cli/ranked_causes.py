@@ -1,4 +1,4 @@
-"""What `diagnose --effects` prints: causes ranked by what they contribute, their cures, the circles without them."""
+"""Output of `diagnose --effects`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_CAUSES = 4
 
 
 def print_effects(effects: Sequence[CauseContribution]) -> None:
-    """Print the causes, the greatest first, their cures, and G of every circle as measured and as it would be without each."""
+    """Print causes and cures by contribution, and G measured and without each."""
     if not effects:
         echo("\nno cause contributes to these circles")
         return

@@ -1,4 +1,4 @@
-"""Whether an instrument is quick enough for a plan, said before anything is measured."""
+"""Check an instrument's rate against a plan."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def sampled_circles(plan: Plan, protocol: Protocol, baud: int | None = None) -> 
     """Return for each circle of a plan what the instrument sees of it.
 
     Args:
-        baud: of its line, None: the usual rate.
+        baud: None: the usual rate.
     """
     from dbbstation.plan.sampling import enough_feed_mm_min, sampling
     from dbbstation.results.sampling import SampledCircle
@@ -44,7 +44,7 @@ def sampled_circles(plan: Plan, protocol: Protocol, baud: int | None = None) -> 
 
 
 def sampling_notes(plan: Plan, protocol: Protocol, baud: int | None = None) -> Iterator[str]:
-    """Yield a sentence for the plan, and one for each kind of circle that the instrument is too slow for."""
+    """Yield sentences on the plan and on circles that are too fast."""
     from dbbstation.plan.sampling import SMALLEST_POINTS, UNDULATIONS
 
     circles = sampled_circles(plan, protocol, baud)
@@ -72,6 +72,6 @@ def sampling_notes(plan: Plan, protocol: Protocol, baud: int | None = None) -> I
 
 
 def say_sampling(plan: Plan, protocol: Protocol, baud: int | None) -> None:
-    """Say before a measurement what the instrument sees of the plan's circles."""
+    """Print what the instrument sees of the circles."""
     for note in sampling_notes(plan, protocol, baud):
         say(f"note: {note}")

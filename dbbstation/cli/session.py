@@ -314,7 +314,7 @@ def _tell(name: str, run: RunEntry, *, as_json: bool) -> None:
 
 
 def _repeated(read: SessionFolder) -> list[tuple[str, int]]:
-    """Circles with more than one accepted run, and how many."""
+    """Return circles with several accepted runs, and how many."""
     from dbbstation.files.recordings.entries import RunState
 
     counted = Counter(f"{run.test} {run.direction}" for run in read.in_state(RunState.ACCEPTED))
@@ -322,7 +322,7 @@ def _repeated(read: SessionFolder) -> list[tuple[str, int]]:
 
 
 def _missing(read: SessionFolder) -> list[tuple[str, str]]:
-    """Tests and directions of the plan without an accepted run."""
+    """Return tests and directions without accepted run."""
     from dbbstation.files.recordings.entries import RunState
 
     done = {(run.test, run.direction) for run in read.in_state(RunState.ACCEPTED)}
@@ -331,10 +331,10 @@ def _missing(read: SessionFolder) -> list[tuple[str, str]]:
 
 
 def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunEntry:
-    """Find a run by its name and note what became of it.
+    """Find a run by name and note its verdict.
 
     Raises:
-        InputError: faults of the session, or no such run in it.
+        InputError: faults of the session, or no such run.
         OutputError: another process writes into the session.
     """
     import difflib
@@ -357,7 +357,7 @@ def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunE
 
 
 def _reason_for(run: str, unusable: str) -> str:
-    """Ask why a run is accepted that cannot be used; empty for one that can.
+    """Ask why an unusable run is accepted; empty for a usable one.
 
     Raises:
         click.UsageError: nobody can answer.

@@ -1,4 +1,4 @@
-"""Options that say what a session notes beside its runs."""
+"""Options on what a session notes beside its runs."""
 
 from __future__ import annotations
 
@@ -61,32 +61,32 @@ _AGE = shop_option(
 
 
 def noted_options(function: _Function) -> _Function:
-    """Give a command the options of what a session notes; it takes them as keywords, `SessionOptions` takes them together."""
+    """Give a command these options as keywords of `SessionOptions`."""
     for option in reversed((*_OPTIONS, *_OF_BAR)):
         function = option(function)
     return function
 
 
 def session_options(function: _Function) -> _Function:
-    """Give a command the same for a session that is measured now: a bar whose calibration is too old is refused."""
+    """Give a command the same, with a limit for the bar's age."""
     return noted_options(_AGE(function))
 
 
 @dataclass(frozen=True)
 class SessionOptions:
-    """What these options say of machine, shop and bar.
+    """Stated facts of machine, shop and bar.
 
     Attributes:
-        operator: name; empty for none.
-        job: what it is measured for; empty for none.
-        serial_number: of the machine; empty for none.
-        ambient_temp_c: temperature of the shop [degC]; None where not known.
-        bar_serial_number: of the bar; empty for none.
-        bar_length_mm: distance of its balls [mm]; None where not known.
-        bar_uncertainty_um: standard uncertainty of that [µm]; None where not known.
-        bar_temp_c: of the bar at its calibration [degC]; None where not known.
-        bar_file: file of the bar, in place of these; None for none.
-        bar_waiver: why it is measured without a fresh calibration of the bar; empty where there is one.
+        operator: may be empty.
+        job: may be empty.
+        serial_number: of the machine; may be empty.
+        ambient_temp_c: of the shop; None if unknown.
+        bar_serial_number: may be empty.
+        bar_length_mm: distance of its balls; None if unknown.
+        bar_uncertainty_um: standard; None if unknown.
+        bar_temp_c: at calibration; None if unknown.
+        bar_file: instead of these; None for none.
+        bar_waiver: why without fresh calibration; may be empty.
     """
 
     operator: str
@@ -104,7 +104,7 @@ class SessionOptions:
         """Return what a session notes.
 
         Args:
-            stroke_mm: of the bar, as the instrument file states it; None where it does not [mm].
+            stroke_mm: by the instrument file; None if not stated.
 
         Raises:
             click.UsageError: length without uncertainty, something of the bar without either, or a file and options of the bar.
@@ -131,7 +131,7 @@ class SessionOptions:
 
     @property
     def of_bar(self) -> list[str]:
-        """Names of the options of the bar, beside its file, that were given and do not come from settings."""
+        """Return given options of the bar beside its file, without settings."""
         given = {
             "bar_serial_number": self.bar_serial_number,
             "bar_length_mm": self.bar_length_mm,
@@ -141,7 +141,7 @@ class SessionOptions:
         return [name for name, value in given.items() if value not in {"", None} and not from_settings(name)]
 
     def stated_length_mm(self) -> float | None:
-        """Return the length of the bar that its file or `--bar-length-mm` states [mm]; None where neither does.
+        """Return the length by file or `--bar-length-mm` [mm], or None.
 
         Raises:
             InputError: faults of the bar's file.
@@ -166,12 +166,10 @@ class SessionOptions:
 
 
 def require_bar(job: Job, largest_age_h: float | None) -> None:
-    """Refuse to begin a session whose plan needs the bar's length where nobody has read it lately, unless it is said why.
-
-    A session that goes on has its bar already.
+    """Refuse a new session whose plan needs the bar's length without fresh calibration or reason.
 
     Args:
-        largest_age_h: age of a calibration beyond which it is stale [h]; None: the usual one.
+        largest_age_h: None: the usual one.
 
     Raises:
         InputError: what is wrong with the bar, and what to do.

@@ -1,4 +1,4 @@
-"""`dbbstation settings`: what the shop has set, and where each value comes from."""
+"""`dbbstation settings`: the shop's settings with their origin."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ PROGRAM = "dbbstation"
 
 
 def built_in() -> dict[str, str | int | float | None]:
-    """Values of the program itself by key, None where it has none; every key of the settings but the tolerances."""
+    """Return the program's own values by key, or None; without tolerances."""
     from dbbstation.files.formats.number_language import PLAIN
     from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH
     from dbbstation.nc.compensate import CHORD_MM
@@ -128,7 +128,7 @@ def _print(found: Settings) -> None:
 
 
 def _template() -> str:
-    """Return the example of the format with every value commented out: a `#` with nothing after it but the key."""
+    """Return the format's example with every value commented out."""
     from dbbstation.files.formats.settings_schema import SettingsFile
     from dbbstation.files.shipped import shipped_folder
     from dbbstation.files.yaml.schema import format_of

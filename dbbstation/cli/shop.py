@@ -1,4 +1,4 @@
-"""The shop's settings on the command line: options that take their value from there where none is given."""
+"""The shop's settings as defaults of options."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ _ONE_THING = frozenset({"bar", "numbers"})
 
 
 class ShopOption(click.Option):
-    """An option that takes its value from the shop's settings where the command line has none.
+    """An option with a default from the shop's settings.
 
     Args:
-        setting: key in the settings, with dots.
+        setting: dotted key.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class ShopOption(click.Option):
         self._factor = factor
 
     def consume_value(self, ctx: click.Context, opts: Mapping[str, Any]) -> tuple[Any, ParameterSource]:
-        """Return the value on the command line, in the settings, or the program's own; note which."""
+        """Return the value by command line, settings or program, and note which."""
         value, source = super().consume_value(ctx, opts)
         if ctx.resilient_parsing:
             return value, source
@@ -83,12 +83,12 @@ class ShopOption(click.Option):
 
 
 def shop_option(*declarations: str, setting: str, **more: Any) -> Callable[[Any], Any]:  # noqa: ANN401
-    """Give a command an option that takes its value from the shop's settings; arguments as those of `ShopOption`."""
+    """Give a command such an option; arguments as of `ShopOption`."""
     return click.option(*declarations, cls=ShopOption, setting=setting, **more)
 
 
 def from_settings(name: str) -> bool:
-    """Whether a parameter of the command that runs has its value from the settings."""
+    """Return whether a parameter comes from settings."""
     return click.get_current_context().get_parameter_source(name) is ParameterSource.DEFAULT_MAP
 
 
@@ -103,10 +103,10 @@ def shop_settings() -> Settings:
 
 
 def folder_of_sessions(command: str | None, values: Mapping[str, Any]) -> Path | None:
-    """Return the folder that a command's sessions stand in; None where it has none.
+    """Return the folder of a command's sessions, or None.
 
     Args:
-        values: its parameters by name.
+        values: parameters by name.
     """
     names = (*_SESSIONS, *(["out"] if command in _MADE else []))
     given = next((values[name] for name in names if values.get(name)), None)

@@ -1,4 +1,4 @@
-"""`--source-file`: error sources that somebody wrote, for every command that fits or reads a model."""
+"""`--source-file`, for commands that fit or read a model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
 def source_file_option(function: _Function) -> _Function:
-    """Give a command the option; it takes `source_files`, a tuple of paths."""
+    """Give a command `source_files`, a tuple of paths."""
     return click.option(
         "--source-file",
         "source_files",

@@ -192,7 +192,7 @@ def station(
 def _check_options(
     *, virtual: bool, time_scale: float, baud: int | None, needed: tuple[Path | str | None, ...]
 ) -> None:
-    """Refuse what does not go together.
+    """Refuse options that do not combine.
 
     Raises:
         click.UsageError: it does not.
@@ -218,10 +218,10 @@ def _check_terminal() -> None:
 
 
 def _run(job: Job, open_station: Opener, line: HeldLine) -> int:
-    """Show the screen until it is closed; return the exit code.
+    """Show the screen until closed; return the exit code.
 
     Raises:
-        StationError: the fault that ended the sequence, where nothing was done about it.
+        StationError: the unhandled fault that ended the sequence.
         click.Abort: a signal ended it.
     """
     from dbbstation.service.runner import Runner
@@ -234,7 +234,7 @@ def _run(job: Job, open_station: Opener, line: HeldLine) -> int:
 
 
 def _begin(given: Choice, limits: Limits, model: IdentifiedModel | None) -> int:
-    """Show the start screen until it is closed; arguments as of `Front`, errors as of `_run`."""
+    """Show the start screen; arguments as of `Front`, errors as of `_run`."""
     from dbbstation.cli.measure_talk import Log
     from dbbstation.service.front import Front
     from dbbstation.service.memory import Memory
@@ -248,7 +248,7 @@ def _begin(given: Choice, limits: Limits, model: IdentifiedModel | None) -> int:
 
 
 def _operate(path: Path, model: IdentifiedModel | None) -> int:
-    """Show the screens of a job until they are closed; arguments as of `Front`, errors as of `_run`."""
+    """Show the screens of a job; arguments as of `Front`, errors as of `_run`."""
     from dbbstation.cli.measure_talk import Log
     from dbbstation.service.front import Front
     from dbbstation.service.memory import Memory
@@ -269,10 +269,10 @@ def _line(
 
 
 def _given(line: Line, spy: Path | None, sequence: tuple[str, str], noted: SessionOptions) -> Choice:
-    """Return what options and settings say of a session that is chosen on the screen.
+    """Return what options and settings state for a chosen session.
 
     Args:
-        sequence: order of the tests, and what is repeated at their end.
+        sequence: order and repeats of tests.
 
     Raises:
         click.UsageError: an option that the start screen has no place for.
@@ -307,10 +307,10 @@ def _limits(largest_loss_percent: float | None, largest_bar_age_h: float | None)
 
 
 def _shown(app: StationApp) -> int:
-    """Show the screen until it is closed; return the exit code.
+    """Show the screen until closed; return the exit code.
 
     Raises:
-        StationError: the fault that ended the sequence, where nothing was done about it.
+        StationError: the unhandled fault that ended the sequence.
         click.Abort: a signal ended it.
     """
     with _stopped_politely(app) as stopped, ended_when_hung_up(app.give_up):
@@ -328,7 +328,7 @@ def _shown(app: StationApp) -> int:
 
 @contextmanager
 def _stopped_politely(app: StationApp) -> Iterator[threading.Event]:
-    """Let a polite kill, or a terminal that is closed, end the sequence between two samples and restore the terminal.
+    """End the sequence between samples on SIGTERM or SIGHUP, and restore the terminal.
 
     Yields:
         Whether that happened.

@@ -1,4 +1,4 @@
-"""The three streams of the program: there from the beginning, and let go of where nobody takes what is written."""
+"""The three standard streams: opened if missing, dropped if unwritable."""
 
 from __future__ import annotations
 
@@ -13,10 +13,7 @@ _STREAMS = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))
 
 
 def open_missing() -> None:
-    """Open those that the program was started without, as `>&-` and some schedulers do: onto nothing.
-
-    Otherwise a file that is opened later takes the place of one, and what a library complains of goes into that file.
-    """
+    """Open missing streams onto nothing, lest later files take their place."""
     for number, (name, mode) in enumerate(_STREAMS):
         try:
             os.fstat(number)
@@ -28,11 +25,11 @@ def open_missing() -> None:
 
 
 def flush_output() -> None:
-    """Bring the output to where it goes.
+    """Flush the output.
 
     Raises:
-        BrokenPipeError: nobody reads it any more.
-        OutputError: the disk that it goes to refuses.
+        BrokenPipeError: its reader is gone.
+        OutputError: its disk refuses.
     """
     try:
         sys.stdout.flush()
@@ -44,7 +41,7 @@ def flush_output() -> None:
 
 
 def drop_unwritable() -> None:
-    """Forget output that cannot be written: the interpreter would try again behind the sentence that says what to do."""
+    """Discard unwritable output, which the interpreter would retry."""
     try:
         sys.stdout.flush()
     except (OSError, ValueError):
@@ -52,5 +49,5 @@ def drop_unwritable() -> None:
 
 
 def drop_output() -> None:
-    """Let the interpreter flush what is left of the output into nothing."""
+    """Flush remaining output into nothing."""
     os.dup2(open_nothing(), sys.stdout.fileno())

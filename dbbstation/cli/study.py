@@ -1,4 +1,4 @@
-"""`dbbstation study`: reproducible experiments, which stand in a checkout beside the package."""
+"""`dbbstation study`: reproducible experiments of a checkout."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class StudyGroup(LazyGroup):
-    """The studies of the checkout; where the package came as a wheel, a word on where they are."""
+    """The studies of the checkout; a wheel has none and says where they are."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -36,7 +36,7 @@ class StudyGroup(LazyGroup):
 
 
 def _studies() -> Mapping[str, str]:
-    """Name and one line of help of every study; none where there is no checkout."""
+    """Return name and help of every study; empty without checkout."""
     root = checkout()
     if root is None:
         return {}

@@ -1,4 +1,4 @@
-"""The type of options that are texts: bytes that are none are refused by the option's name, before anything is read or written."""
+"""The option type for texts, which refuses invalid bytes by the option's name."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 
 class Utf8(StringParamType):
-    """A text that can be written in UTF-8. Names of files are no texts: they may hold any bytes."""
+    """A text in UTF-8; file names may hold any bytes."""
 
     def convert(self, value: Any, param: Parameter | None, ctx: Context | None) -> Any:  # noqa: ANN401 - as click has it
         """Return the text.
 
         Raises:
-            BadParameter: it has bytes that are none of the characters of the terminal's encoding.
+            BadParameter: bytes that are no characters.
         """
         text = super().convert(value, param, ctx)
         try:
@@ -29,7 +29,7 @@ class Utf8(StringParamType):
 
 
 def in_utf8(command: click.Command) -> click.Command:
-    """Let a command, or every command of a group, refuse texts that are not in UTF-8."""
+    """Let a command, or every command of a group, refuse texts that are no UTF-8."""
     for inner in command.commands.values() if isinstance(command, click.Group) else ():
         in_utf8(inner)
     for parameter in command.params:

@@ -1,4 +1,4 @@
-"""Circles held against the shop's tolerances."""
+"""Print circles against the shop's tolerances."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 
 def which_circles(tests: Sequence[str], directions: Sequence[str]) -> str:
-    """Say which circles a tolerance holds for: no test is every test, no direction is both."""
+    """Return the circles of a tolerance: no test means all, no direction both."""
     named = f"tests {', '.join(tests)}" if tests else "every test"
     return named + (f", {', '.join(directions)} only" if directions else "")
 
 
 def print_tolerances(held: Sequence[EvaluatedTolerance], origin: str) -> None:
-    """Print the worst run of every tolerance; nothing where the shop has none."""
+    """Print the worst run of every tolerance."""
     from dbbstation.cli.output import print_table
 
     if not held:

@@ -1,4 +1,4 @@
-"""Serial adapters by their USB identity: after a cable was pulled and put back, a port may have another name."""
+"""Serial adapters by USB identity: a replugged cable may get another port name."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Adapter:
-    """What tells one USB adapter from another.
+    """The identity of a USB adapter.
 
     Attributes:
-        serial_number: of the adapter; empty where it has none.
-        socket: USB socket it is plugged into; decides only between adapters without a serial number.
+        serial_number: empty if it has none.
+        socket: USB socket, decisive only without serial number.
     """
 
     vendor: int
@@ -29,20 +29,20 @@ class Adapter:
 
     @property
     def text(self) -> str:
-        """The identity as people read it: vendor:product and serial number or socket."""
+        """Return the identity in words: vendor:product and serial number or socket."""
         own = self.serial_number or f"in USB socket {self.socket}"
         return f"{self.vendor:04x}:{self.product:04x} {own}".strip()
 
 
 def adapter_of(port: str) -> Adapter | None:
-    """Return the adapter behind a port name; None where it is no USB port, or gone."""
+    """Return the adapter of a port, or None if it is no USB port or gone."""
     return next((adapter for name, adapter in _adapters(list_ports.comports()) if name == port), None)
 
 
 def port_of(adapter: Adapter) -> str | None:
-    """Return the name that an adapter's port has now; None while it is not plugged in.
+    """Return the adapter's current port, or None.
 
-    One without a serial number is known by its socket alone: two of a kind cannot be told apart otherwise.
+    Without serial number only the socket counts.
     """
     return next((name for name, other in _adapters(list_ports.comports()) if _same(adapter, other)), None)
 

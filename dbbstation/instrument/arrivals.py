@@ -1,4 +1,4 @@
-"""When each byte of a line can have arrived at the latest."""
+"""Latest arrival of each byte of a line."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections import deque
 class Arrivals:
     """Remembers when bytes were seen, as far back as a frame reaches.
 
-    Bytes that are seen together arrived one after the other: those in front earlier by the time that the others take.
+    Bytes seen together arrived one after another.
 
     Args:
-        reach: bytes that a question may lie behind the newest.
+        reach: bytes behind the newest that can be asked for.
     """
 
     def __init__(self, character_s: float, reach: int) -> None:
@@ -21,7 +21,7 @@ class Arrivals:
         self._chunks: deque[tuple[int, float]] = deque()
 
     def note(self, size: int, seen_s: float) -> None:
-        """Take note of bytes that were seen together."""
+        """Note bytes seen together."""
         if size <= 0:
             return
         self._count += size
@@ -30,7 +30,7 @@ class Arrivals:
             self._chunks.popleft()
 
     def at_latest_s(self, behind: int) -> float:
-        """Return when the byte with so many behind it had arrived at the latest [s]."""
+        """Return the latest arrival of the byte with so many behind it [s]."""
         place = self._count - behind
         end, seen_s = next(one for one in self._chunks if one[0] >= place)
         return seen_s - (end - place) * self._character_s

@@ -37,7 +37,7 @@ _LINE = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?) ([<>]) ([0-9a-f]{2}(?: [0-9a-f]{2}
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Bytes that went over the line together at `t_s` seconds after the log was opened."""
+    """Bytes on the line `t_s` seconds after the log was opened."""
 
     t_s: float
     direction: Literal["<", ">"]
@@ -45,12 +45,12 @@ class Chunk:
 
 
 class ByteLog:
-    """A byte log that is being written.
+    """A byte log being written.
 
     Args:
-        path: the file; it must not exist yet.
-        instrument: name of the protocol.
-        profile: of it, empty where it has none.
+        path: must not exist.
+        instrument: protocol name.
+        profile: may be empty.
         force: overwrite the file.
 
     Raises:
@@ -83,7 +83,7 @@ class ByteLog:
         self._file.write(f"{_HEAD}\n# instrument: {instrument}\n{variant}# port: {port}\n")
 
     def note(self, direction: Literal["<", ">"], raw: bytes) -> None:
-        """Write down bytes that just went over the line.
+        """Log bytes that went over the line.
 
         Raises:
             OutputError: the file cannot be written any more.
@@ -106,7 +106,7 @@ class ByteLog:
 
 
 def logged_instrument(path: Path) -> tuple[str, str]:
-    """Return instrument and profile in the head of a byte log, each empty where it has none.
+    """Return instrument and profile of a byte log's head, each may be empty.
 
     Raises:
         InputError: the file cannot be read or is no byte log.
@@ -123,10 +123,10 @@ def logged_instrument(path: Path) -> tuple[str, str]:
 
 
 def read_byte_log(path: Path) -> Iterator[Chunk]:
-    """Yield the chunks of a byte log in time order; a last line that a crash cut off is left out.
+    """Yield the chunks in time order, without a cut last line.
 
     Raises:
-        InputError: the file cannot be read, is no byte log, or has a line that is none of its.
+        InputError: the file cannot be read, is no byte log, or has an invalid line.
     """
     for number, line in _lines(path):
         if line.startswith("#") or not line:
@@ -141,7 +141,7 @@ def read_byte_log(path: Path) -> Iterator[Chunk]:
 
 
 def _lines(path: Path) -> Generator[tuple[int, str]]:
-    """Yield the lines below the first with their numbers; not what follows the last line end."""
+    """Yield complete lines below the first with numbers."""
     number = 0
     try:
         with opened(path) as source:

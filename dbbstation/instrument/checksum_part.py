@@ -1,4 +1,4 @@
-"""The part of a frame that proves the others: a checksum over what precedes it."""
+"""The checksum part of a frame."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dbbstation.instrument.fields import NotUnderstood
 
 
 class Checksum(Schema):
-    """A checksum over everything before it, less the first `after` bytes of the frame."""
+    """A checksum over everything before it, without the first `after` bytes."""
 
     kind: Literal["checksum"]
     algorithm: Algorithm
@@ -26,12 +26,12 @@ class Checksum(Schema):
         return checksum_bytes(self.algorithm) * (1 if self.written == "binary" else 2)
 
     def pattern(self) -> bytes:
-        """Return the regular expression of any checksum."""
+        """Return the pattern of any checksum."""
         digit = {"binary": b"[\\x00-\\xff]", "hex": b"[0-9a-f]", "HEX": b"[0-9A-F]"}[self.written]
         return digit + b"{%d}" % self.width
 
     def over(self, before: bytes) -> bytes:
-        """Return the checksum as it stands on the wire, `before` being all that precedes it in the frame."""
+        """Return the checksum on the wire over all that precedes it."""
         raw = checksum(self.algorithm, before[self.after :]).to_bytes(checksum_bytes(self.algorithm), self.order)
         if self.written == "binary":
             return raw
@@ -39,10 +39,10 @@ class Checksum(Schema):
         return text.upper() if self.written == "HEX" else text
 
     def verify(self, before: bytes, raw: bytes) -> None:
-        """Hold the checksum of a frame against what precedes it.
+        """Check a frame's checksum.
 
         Raises:
-            NotUnderstood: they do not belong together.
+            NotUnderstood: it is wrong.
         """
         should = self.over(before)
         if raw != should:

@@ -1,7 +1,7 @@
-"""Checksums that measuring instruments close their frames with.
+"""Checksums of measuring instruments.
 
-A CRC is given by the parameters of the Rocksoft model (width, polynomial, start value, reflected or not, final XOR); the
-check values over the digits 1 to 9 stand in the tests.
+A CRC has the parameters of the Rocksoft model (width, polynomial, start value, reflection, final XOR); tests use the
+check values over digits 1 to 9.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Algorithm: TypeAlias = Literal[
 
 @dataclass(frozen=True, slots=True)
 class _Crc:
-    """One CRC of the Rocksoft model; the reflected ones shift towards the low bit."""
+    """One CRC of the Rocksoft model; reflected ones shift towards the low bit."""
 
     bits: int
     polynomial: int
@@ -61,12 +61,12 @@ _BYTES: dict[str, int] = {"sum16": 2, "crc16-modbus": 2, "crc16-ccitt": 2, "crc1
 
 
 def checksum_bytes(algorithm: Algorithm) -> int:
-    """Return how many bytes the checksum has before it is written as hexadecimal text or not."""
+    """Return the size before any hexadecimal writing."""
     return _BYTES.get(algorithm, 1)
 
 
 def checksum(algorithm: Algorithm, data: bytes) -> int:
-    """Return the checksum of `data` as an unsigned integer."""
+    """Return the checksum as an unsigned integer."""
     if algorithm == "xor8":
         return reduce(xor, data, 0)
     if algorithm in {"sum8", "sum16"}:

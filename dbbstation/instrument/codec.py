@@ -1,4 +1,4 @@
-"""Bytes to readings and back, by the grammar of a protocol. Knows no port and no clock."""
+"""Bytes to readings and back by a protocol's grammar, without port or clock."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Garbage:
     """Bytes that are not understood.
 
     Attributes:
-        why: what was wrong with them, empty where they simply do not fit the grammar.
-        joining: they are the rest of a frame that was under way when listening began: nothing is wrong.
-        reason: why they are rejected, in one word, for counting.
+        why: fault, or empty if they do not fit the grammar.
+        joining: rest of a frame from before listening, which is no fault.
+        reason: one word for counting.
     """
 
     raw: bytes
@@ -42,16 +42,15 @@ Heard: TypeAlias = Piece | Garbage
 
 
 def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, status: Status = "ok") -> bytes:
-    """Return the bytes with which the device tells one sample.
+    """Return the bytes of one sample.
 
     Args:
-        length_mm: length in mm; None: the device has none, which it tells as `fault` unless `status` says otherwise.
-        counter: sample counter, taken modulo what the wire has.
-        status: what the device says of the sample. A length that does not fit is reported as `overrange`; a device that cannot
-            say `overrange` says `fault`.
+        length_mm: None: none, told as `fault` unless `status` says otherwise.
+        counter: taken modulo the wire's modulus.
+        status: a length that does not fit becomes `overrange`, or `fault` if the device has no such status.
 
     Raises:
-        InstrumentError: the wire has no way to say it.
+        InstrumentError: the wire cannot say it.
     """
     if length_mm is None and status == "ok":
         status = "fault"
@@ -74,7 +73,7 @@ def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, sta
 
 
 def decode(protocol: Protocol, raw: bytes) -> Reading:
-    """Return the reading that exactly these bytes tell, without a time and without losses.
+    """Return the reading of exactly these bytes, without time and losses.
 
     Raises:
         NotUnderstood: they are no whole frame of this protocol.
@@ -95,10 +94,10 @@ def _decoded(protocol: Protocol, raw: bytes) -> tuple[Reading, Written | None]:
 
 
 class Decoder:
-    """Cuts a stream of bytes into frames and decodes them; chunks may end anywhere.
+    """Cuts a byte stream into frames and decodes them; chunks may end anywhere.
 
     Args:
-        joining: listening begins in the middle of a stream, so that the first line may be half of one.
+        joining: the first line may be incomplete.
     """
 
     def __init__(self, protocol: Protocol, *, joining: bool) -> None:
@@ -111,16 +110,16 @@ class Decoder:
 
     @property
     def pending(self) -> bytes:
-        """Bytes that are the beginning of a frame, or garbage that nothing has followed yet."""
+        """Return the begin of a frame, or garbage without successor."""
         return self._pending
 
     def take_pending(self) -> bytes:
-        """Return the pending bytes and forget them."""
+        """Return and forget the pending bytes."""
         raw, self._pending = self._pending, b""
         return raw
 
     def feed(self, chunk: bytes) -> list[Heard]:
-        """Return what became complete with `chunk`, in wire order."""
+        """Return what `chunk` completed, in wire order."""
         self._pending += chunk
         return self._cut_by_width() if self._protocol.by_width else self._cut_by_line_end()
 
@@ -159,7 +158,7 @@ class Decoder:
         return Garbage(raw, f"{damaged} {characters} with a wrong parity", reason="parity")
 
     def _cut_by_width(self) -> list[Heard]:
-        """Slide to the next place where a frame fits; out of step, one must be followed by a second to be believed."""
+        """Slide to the next fitting frame; out of step, two in a row must fit."""
         longest = max(frame.width or 0 for frame in self._protocol.frames)
         heard: list[Heard] = []
         start = skipped = 0
@@ -190,7 +189,7 @@ class Decoder:
         return heard
 
     def _next_head(self, after: int, end: int) -> int:
-        """Return the next place at which a frame can begin, at most `end`: every place where frames begin with anything."""
+        """Return the next possible begin of a frame, at most `end`."""
         if not all(self._heads):
             return after
         places = [self._pending.find(head, after, end + len(head) - 1) for head in self._heads]

@@ -1,12 +1,11 @@
-"""Characters that came with a wrong parity or stop bit: marked by the system, counted, never part of a reading.
+"""Characters with wrong parity or stop bit: marked, counted, never part of a reading.
 
-A serial driver compares the parity bit of each character only where it is told to (INPCK), and the system says which characters
-were wrong only where it is told to (PARMRK): the three bytes FF 00 X stand for a wrong X then, FF FF for a right FF, FF 00 00
-for a break [IEEE Std 1003.1-2017, 11.2.2 Input Modes]. pyserial 3.5 switches both off whenever it sets up a port
-(`serialposix.py`, `_reconfigure_port`), so they are switched on behind it. Windows, sockets and RFC 2217 servers mark nothing.
+A serial driver checks parity only with INPCK and marks wrong characters only with PARMRK: FF 00 X for a wrong X, FF FF
+for a right FF, FF 00 00 for a break [IEEE Std 1003.1-2017, 11.2.2 Input Modes]. pyserial 3.5 resets both
+(`serialposix.py`, `_reconfigure_port`), so they are set after it. Windows, sockets and RFC 2217 servers mark nothing.
 
-In the bytes that go on from here a wrong character has its eighth bit set where a line has seven data bits, and is a NUL where it
-has eight: no text of an instrument has either, so no frame with such a character is believed, and a byte log keeps what came.
+A wrong character gets its eighth bit set on a seven-bit line and becomes NUL on an eight-bit line. No instrument's text
+has either, so such a frame is rejected, and byte logs keep what came.
 """
 
 from __future__ import annotations
@@ -23,10 +22,10 @@ _SEVEN, _EIGHTH_BIT = 7, 0x80
 
 
 class Marks:
-    """Takes the system's marks out of what a line brings; they may be cut anywhere between two reads.
+    """Removes the system's marks from received bytes, cut anywhere.
 
     Args:
-        data_bits: 7 or 8, as the port is opened.
+        data_bits: 7 or 8.
     """
 
     def __init__(self, data_bits: int) -> None:
@@ -34,7 +33,7 @@ class Marks:
         self._begun = b""
 
     def taken_out(self, raw: bytes) -> bytes:
-        """Return the bytes as the rest of the program takes them."""
+        """Return the bytes for the rest of the program."""
         raw, self._begun = self._begun + raw, b""
         return _ESCAPED.sub(self._plain, raw)
 
@@ -48,7 +47,7 @@ class Marks:
 
 
 def damaged_in(raw: bytes, line: LineSettings) -> int:
-    """Return how many characters of a text came with a wrong parity, by the bytes that `Marks` gives."""
+    """Return the number of characters with wrong parity, from bytes after `Marks`."""
     if line.parity == "none":
         return 0
     return sum(byte >= _EIGHTH_BIT for byte in raw) if line.data_bits == _SEVEN else raw.count(0)

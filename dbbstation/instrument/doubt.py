@@ -33,11 +33,11 @@ _REMEDY = "look after the cable, its screen and connectors, and what switches mo
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """How a number stood on the wire.
+    """A number as written on the wire.
 
     Attributes:
-        before: digits before its point.
-        unit: that the wire names; empty where it names none.
+        before: digits before the point.
+        unit: may be empty.
     """
 
     value: float
@@ -46,7 +46,7 @@ class Written:
     unit: str = ""
 
     def continues(self, last: Written) -> bool:
-        """Whether the device that wrote `last` may have written this without being set to something else."""
+        """Return whether the device can have written this after `last` with unchanged settings."""
         if (self.behind, self.unit) != (last.behind, last.unit):
             return False
         return self.before == last.before or self._passed_a_power_of_ten(last)
@@ -59,7 +59,7 @@ class Written:
         return whole and abs(self.value - last.value) < _TRUE_STEP * place
 
     def difference(self, last: Written) -> str:
-        """Say what is different from `last`."""
+        """Return the difference from `last`, in words."""
         if self.unit != last.unit:
             return f"its unit is {self.unit}, that of the lines before was {last.unit}"
         count, place, of = self.behind, "behind", last.behind
@@ -71,11 +71,11 @@ class Written:
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A reading (`lost` not yet counted, no time) with its bytes.
+    """A reading without time and losses, with its bytes.
 
     Attributes:
-        after: bytes of the same chunk that follow it.
-        written: how its number stood there; None where it has none in decimal digits.
+        after: later bytes of its chunk.
+        written: its number; None without decimal digits.
     """
 
     reading: Reading
@@ -85,10 +85,10 @@ class Piece:
 
 
 class Doubts:
-    """Marks readings of one line as doubtful.
+    """Marks doubtful readings of one line.
 
     Args:
-        protocol: of the line; with a checksum nothing is doubtful.
+        protocol: with a checksum nothing is doubtful.
     """
 
     def __init__(self, protocol: Protocol) -> None:
@@ -98,11 +98,11 @@ class Doubts:
         self._others = 0
 
     def judged(self, piece: Piece, *, clean: bool = True) -> Reading:
-        """Return the reading of a piece, marked where it is doubtful.
+        """Return a reading, marked if doubtful.
 
         Args:
             piece: in wire order.
-            clean: the piece is all that came in answer to a request.
+            clean: nothing else answered the request.
         """
         reading, written = piece.reading, piece.written
         if self._proved:
@@ -115,7 +115,7 @@ class Doubts:
         return replace(reading, status=DOUBTFUL, said=f"{why}: a character was damaged or lost", remedy=_REMEDY)
 
     def _unlike(self, written: Written) -> str:
-        """Return how a number is written otherwise than those before; empty where it is not, or that is its form from now on."""
+        """Return how a number's form changed; empty if not, or if the new form holds from now on."""
         last = self._form
         if last is None or written.continues(last):
             self._form, self._others = written, 0

@@ -1,7 +1,6 @@
 """The driver: a protocol and a port become readings.
 
-A reader thread owns the line from `start` to `stop`: it asks or listens, decodes, stamps and queues. Nobody else touches
-the port, so that no byte is lost while the program draws or saves.
+A reader thread owns the line from `start` to `stop`, so that no byte is lost while the program is busy.
 """
 
 from __future__ import annotations
@@ -40,19 +39,17 @@ _JOIN_S = 5.0
 
 
 class Instrument:
-    """A length instrument on a serial line; use it in a `with` block, which starts and closes it.
+    """A length instrument on a serial line; a `with` block starts and closes it.
 
     Args:
-        port: name or URL of the port, or an open port (which stays open).
-        baud: baud rate where the device is not set to the usual one.
-        clock: what stamps the readings, in s, monotonic. With a virtual instrument on scaled time, its clock; patience is always
-            in real seconds.
-        log: where every byte is written down; the caller closes it.
-        timeout_s: patience before a silent line is an error, instead of the protocol's.
-        memory_s: how long the quickest arrival of a stream's samples is remembered, by `clock`: on a scaled clock as many times
-            longer, because what holds samples up is the computer, in real time.
-        reconnect_s: how long an adapter that was pulled out is waited for, in real seconds; it is known by its USB identity,
-            whatever its port is called then. A port that is no USB adapter is not waited for.
+        port: name, URL, or an open port, which stays open.
+        baud: if not the usual rate.
+        clock: monotonic, for readings [s]; scaled for virtual instruments, while patience is in real seconds.
+        log: of all bytes; the caller closes it.
+        timeout_s: patience with a silent line; None: the protocol's.
+        memory_s: how long a stream's quickest arrival counts, by `clock`: longer on a scaled clock, since delays are in real
+            time.
+        reconnect_s: real seconds to wait for an unplugged USB adapter, known by its identity.
     """
 
     def __init__(
@@ -93,19 +90,19 @@ class Instrument:
 
     @property
     def sees_damage(self) -> bool:
-        """Whether characters with a wrong parity or stop bit are known on this port."""
+        """Return whether wrong parity or stop bits are detected."""
         return self._link is not None and self._link.sees_damage
 
     @property
     def reading(self) -> bool:
-        """Whether the line is being read; false before `start`, and once it has failed."""
+        """Return whether the line is read: false before `start` and after failure."""
         return self._thread is not None and self._thread.is_alive() and self._failure is None
 
     def start(self) -> None:
-        """Open the line, send the start sequence, begin to read.
+        """Open the line, send the start sequence and read.
 
         Raises:
-            InstrumentError: the port cannot be opened, or the device does not answer the start sequence.
+            InstrumentError: the port does not open, or the start sequence gets no answer.
         """
         if self._thread is not None:
             raise InstrumentError("it is being read already", where=self.where, remedy="stop it first")
@@ -127,10 +124,10 @@ class Instrument:
         self._thread.start()
 
     def stop(self) -> None:
-        """End reading and send the stop sequence; the line stays open, readings not yet fetched stay to be fetched.
+        """Stop reading and send the stop sequence; line and unread readings stay.
 
         Raises:
-            InstrumentError: the device does not answer the stop sequence.
+            InstrumentError: the stop sequence gets no answer.
         """
         if self._thread is None:
             return
@@ -146,7 +143,7 @@ class Instrument:
                 _command(self._link, step, self._timeout_s)
 
     def close(self) -> None:
-        """Stop and close the line; a port that was given open stays open. Readings not yet fetched stay."""
+        """Stop and close the line; a given open port and unread readings stay."""
         try:
             self.stop()
         finally:
@@ -162,11 +159,11 @@ class Instrument:
         self.close()
 
     def read(self) -> Reading:
-        """Return the next reading, waiting for it.
+        """Wait for the next reading and return it.
 
         Raises:
-            InstrumentError: the line is silent, closed, garbled, or was stopped; OutputError: the byte log is full. Every
-                reading that came before is returned first.
+            InstrumentError: the line is silent, closed, garbled or stopped; OutputError: the byte log is full. Earlier readings
+                come first.
         """
         with self._arrived:
             while not self._queue:
@@ -179,14 +176,14 @@ class Instrument:
             return self._queue.popleft()
 
     def unreadable(self) -> dict[str, int]:
-        """Return how often bytes were no reading since `start`, by what was wrong with them."""
+        """Return counts of rejected bytes since `start`, by fault."""
         return {str(reason): count for reason, count in self.tally.rejected.items()}
 
     def drain(self) -> list[Reading]:
-        """Return every reading that has come and was not fetched yet, without waiting.
+        """Return unread readings without waiting.
 
         Raises:
-            InstrumentError: as `read`, once everything before it was fetched.
+            InstrumentError: as `read`, after all earlier readings.
         """
         with self._arrived:
             readings = list(self._queue)
@@ -196,7 +193,7 @@ class Instrument:
             return readings
 
     def readings(self, count: int | None = None) -> Iterator[Reading]:
-        """Yield readings as they come, `count` of them or without end.
+        """Yield `count` readings, or without end.
 
         Raises:
             InstrumentError: as `read`.
@@ -211,7 +208,7 @@ class Instrument:
         return open_link(port, protocol.line, baud=self._baud, log=self._log, text=protocol.is_text)
 
     def _begin(self, link: Link) -> bytes:
-        """Send the start sequence; return what came behind its last answer."""
+        """Send the start sequence and return bytes behind its last answer."""
         after = b""
         for step in self.protocol.ask.start:
             after = _command(link, step, self._timeout_s)
@@ -252,7 +249,7 @@ class Instrument:
             Listener(link, reception).run(after)
 
     def _plugged_in_again(self) -> tuple[Link, bytes] | None:
-        """Wait for the same adapter under whatever name; return its line, and what came behind the start sequence."""
+        """Wait for the same adapter; return its line and bytes behind the start sequence."""
         if self._adapter is None:
             return None
         if self._link is not None:
@@ -290,7 +287,7 @@ class Instrument:
 
 
 def _command(link: Link, step: LineCommand, patience_s: float) -> bytes:
-    """Send one command, wait for its answer, return what came behind it.
+    """Send a command, wait for its answer and return bytes behind it.
 
     Raises:
         InstrumentError: another answer, or none.

@@ -33,10 +33,10 @@ counter is out of order."""
 
 
 class NotUnderstood(ValueError):  # noqa: N818 (it is no error of the program: most garbled bytes end here)
-    """These bytes are not what the grammar says.
+    """Bytes that contradict the grammar.
 
     Args:
-        reason: the same in one word, for counting.
+        reason: one word for counting.
     """
 
     def __init__(self, what: str, reason: Reason = "bytes") -> None:
@@ -45,7 +45,7 @@ class NotUnderstood(ValueError):  # noqa: N818 (it is no error of the program: m
 
 
 class NotRepresentable(ValueError):  # noqa: N818 (the device meets this too, and reports overrange)
-    """This value does not fit into the field."""
+    """A value that does not fit the field."""
 
 
 def _as_bytes(value: object) -> object:
@@ -68,12 +68,12 @@ class FrameParts:
     """What the parts of one frame have said so far.
 
     Attributes:
-        value: the number of the length, in device units, without the sign of a `sign` part.
+        value: in device units, without a `sign` part.
         sign: 1 or -1.
-        unit: None: the unit that the protocol declares.
+        unit: None: the protocol's.
         status, said, remedy: the worst status that a part reported.
-        text: what the device says in words of its own.
-        digits: of the length: how many stood before its point and behind it; None where it is not written in decimal digits.
+        text: the device's words.
+        digits: before and behind the point of the length; None if not decimal.
     """
 
     value: float | None = None
@@ -87,7 +87,7 @@ class FrameParts:
     digits: tuple[int, int] | None = None
 
     def report(self, status: Status, said: str, remedy: str) -> None:
-        """Keep the worst of the statuses."""
+        """Keep the worst status."""
         if SEVERITY[status] > SEVERITY[self.status]:
             self.status, self.said, self.remedy = status, said, remedy
 
@@ -98,8 +98,8 @@ class Content:
 
     Attributes:
         value: signed, in device units.
-        voice: the code or bit that speaks of a status.
-        features: what the device has switched on, for optional parts.
+        voice: code or bit of a status.
+        features: switched on, for optional parts.
     """
 
     value: float
@@ -108,12 +108,12 @@ class Content:
     features: tuple[str, ...] = ()
 
     def of(self, value: float) -> Content:
-        """Return the same with another value."""
+        """Return the content with another value."""
         return replace(self, value=value)
 
 
 class Code(Schema):
-    """One code and its meaning; `remedy` says what the operator does about a status that is not ok."""
+    """One code, its meaning, and the `remedy` of a bad status."""
 
     code: Bytes
     means: str
@@ -123,7 +123,7 @@ class Code(Schema):
 
 
 class Bit(Schema):
-    """One status bit, counted from the lowest, 0."""
+    """One status bit, from the lowest, 0."""
 
     bit: int = Field(ge=0, le=7)
     means: str
@@ -143,11 +143,11 @@ class Literally(Schema):
         return len(self.value)
 
     def pattern(self) -> bytes:
-        """Return the regular expression of these bytes."""
+        """Return the pattern of these bytes."""
         return re.escape(self.value)
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Say nothing: the pattern matched."""
+        """Do nothing: the pattern matched."""
 
     def write(self, content: Content) -> bytes:  # noqa: ARG002 (every part has this signature)
         """Return the bytes."""
@@ -155,7 +155,7 @@ class Literally(Schema):
 
 
 class SignField(Schema):
-    """The sign as a part of its own; the first of `plus` and of `minus` is what the device writes."""
+    """The sign as an own part; the first of `plus` and `minus` is written."""
 
     kind: Literal["sign"]
     plus: tuple[Bytes, ...] = (b"+",)
@@ -173,7 +173,7 @@ class SignField(Schema):
         return 1
 
     def pattern(self) -> bytes:
-        """Return the regular expression of any of the signs."""
+        """Return the pattern of any sign."""
         return b"[" + re.escape(b"".join(self.plus + self.minus)) + b"]"
 
     def read(self, raw: bytes, found: FrameParts) -> None:
@@ -186,7 +186,7 @@ class SignField(Schema):
 
 
 class ChoiceField(Schema):
-    """One of several codes; without a status to report the device writes the first."""
+    """One of several codes; without a status the first is written."""
 
     kind: Literal["choice"]
     codes: tuple[Code, ...] = Field(min_length=1)
@@ -201,12 +201,12 @@ class ChoiceField(Schema):
 
     @property
     def width(self) -> int | None:
-        """Bytes, None where the codes differ in length."""
+        """Return bytes, None for codes of different length."""
         widths = {len(code.code) for code in self.codes}
         return widths.pop() if len(widths) == 1 else None
 
     def pattern(self) -> bytes:
-        """Return the regular expression of any of the codes, the longest first."""
+        """Return the pattern of any code, the longest first."""
         return (
             b"(?:"
             + b"|".join(re.escape(raw) for raw in sorted((c.code for c in self.codes), key=len, reverse=True))
@@ -214,18 +214,18 @@ class ChoiceField(Schema):
         )
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Take unit and status of the code."""
+        """Take unit and status."""
         code = next(code for code in self.codes if code.code == raw)
         found.unit = code.unit or found.unit
         found.report(code.status, code.means, code.remedy)
 
     def write(self, content: Content) -> bytes:
-        """Return the code of the status to report, or the first."""
+        """Return the status's code, or the first."""
         return next((code.code for code in self.codes if code is content.voice), self.codes[0].code)
 
 
 class Flags(Schema):
-    """One byte of status bits over a fixed base."""
+    """Status bits of one byte over a fixed base."""
 
     kind: Literal["flags"]
     base: int = Field(default=0, ge=0, le=255)
@@ -237,7 +237,7 @@ class Flags(Schema):
         return 1
 
     def pattern(self) -> bytes:
-        """Return the regular expression of the base with any of the bits."""
+        """Return the pattern of the base with any bits."""
         free = sum(1 << bit.bit for bit in self.bits)
         allowed = sorted({value for value in range(256) if value & ~free == self.base & ~free})
         return b"[" + b"".join(re.escape(bytes([value])) for value in allowed) + b"]"
@@ -249,12 +249,12 @@ class Flags(Schema):
                 found.report(bit.status, bit.means, bit.remedy)
 
     def write(self, content: Content) -> bytes:
-        """Return the base, with the bit of the status to report turned over."""
+        """Return the base with the status's bit inverted."""
         return bytes([self.base ^ sum(1 << bit.bit for bit in self.bits if bit is content.voice)])
 
 
 class SkipField(Schema):
-    """Bytes of fixed number that say nothing of the length; the virtual instrument writes `written`."""
+    """Ignored bytes of fixed number; the virtual instrument writes `written`."""
 
     kind: Literal["skip"]
     written: Bytes = Field(min_length=1)
@@ -265,11 +265,11 @@ class SkipField(Schema):
         return len(self.written)
 
     def pattern(self) -> bytes:
-        """Return the regular expression of any bytes."""
+        """Return the pattern of any bytes."""
         return b"[\\x00-\\xff]{%d}" % self.width
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Pass over it."""
+        """Ignore them."""
 
     def write(self, content: Content) -> bytes:  # noqa: ARG002 (every part has this signature)
         """Return the filling."""

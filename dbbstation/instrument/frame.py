@@ -1,4 +1,4 @@
-"""One kind of frame on the wire: parts in order, as a pattern that reads them and as a writer."""
+"""One kind of frame: parts in order, as pattern and writer."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ PlainPart: TypeAlias = Annotated[
 
 
 class Optionally(Schema):
-    """Parts that are on the wire only while the device has a feature switched on; both ways are understood.
+    """Parts of a feature that may be switched off; both forms are understood.
 
     Attributes:
-        feature: its name; the virtual instrument writes the parts where the protocol's `features` name it.
+        feature: written if in the protocol's `features`.
         parts: in wire order.
     """
 
@@ -40,18 +40,18 @@ class Optionally(Schema):
 
     @property
     def width(self) -> None:
-        """None: the width varies."""
+        """Return None: the width varies."""
         return
 
     def pattern(self) -> bytes:
-        """Return the regular expression of all the parts, or of nothing."""
+        """Return the pattern of all parts or nothing."""
         return b"(?:" + b"".join(part.pattern() for part in self.parts) + b")?"
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Take what the parts say, where they are there.
+        """Take the parts if present.
 
         Raises:
-            NotUnderstood: the right characters, but a part means nothing.
+            NotUnderstood: a part is meaningless.
         """
         match = self._pattern.fullmatch(raw) if raw else None
         if match is None:
@@ -60,7 +60,7 @@ class Optionally(Schema):
             part.read(match[group], found)
 
     def write(self, content: Content) -> bytes:
-        """Return the parts where the feature is on.
+        """Return the parts if the feature is on.
 
         Raises:
             NotRepresentable: a number does not fit.
@@ -92,12 +92,11 @@ Part: TypeAlias = Annotated[
 
 
 class Frame(Schema):
-    """One kind of frame: parts in wire order. A frame without a length is a message, and says what it means.
+    """One kind of frame; without a length it is a message.
 
     Attributes:
-        bare: it is exactly its parts: neither the prefix nor the end that the protocol gives to replies, and no line end
-            is waited for; for control characters that come alone.
-        means: what it tells; with the text or the code in it.
+        bare: no prefix, no end, no line end, as for single control characters.
+        means: meaning, with its text or code.
     """
 
     name: str = "reading"
@@ -109,7 +108,7 @@ class Frame(Schema):
 
     @property
     def is_message(self) -> bool:
-        """Whether it carries no length."""
+        """Return whether it has no length."""
         return self.number is None
 
     @property
@@ -126,7 +125,7 @@ class Frame(Schema):
         return next((part for part in self.parts if isinstance(part, Number) and part.of == what), None)
 
     def fault(self) -> str:
-        """Return what makes no sense about it, empty where all is well."""
+        """Return its inconsistency, or an empty text."""
         kinds = [part.of for part in self.parts if isinstance(part, Number)]
         if kinds.count("length") > 1 or kinds.count("counter") > 1:
             return "a frame has at most one length and one counter"
@@ -138,19 +137,19 @@ class Frame(Schema):
 
     @property
     def width(self) -> int | None:
-        """Bytes of the frame, None where they vary."""
+        """Return bytes of the frame, None if they vary."""
         widths = [part.width for part in self.parts]
         return None if None in widths else sum(width for width in widths if width is not None)
 
     @property
     def terminator(self) -> bytes:
-        """The fixed bytes at its end, empty where it ends otherwise."""
+        """Return the fixed bytes at its end, or empty."""
         last = self.parts[-1]
         return last.value if isinstance(last, Literally) else b""
 
     @property
     def binary(self) -> bool:
-        """Whether bytes inside can look like a line end by chance."""
+        """Return whether bytes inside may look like a line end."""
         return any(
             isinstance(part, Flags)
             or (isinstance(part, Number) and part.binary)
@@ -160,12 +159,12 @@ class Frame(Schema):
 
     @cached_property
     def pattern(self) -> re.Pattern[bytes]:
-        """The whole frame as a regular expression, one group per part."""
+        """Return the frame as a pattern with one group per part."""
         return re.compile(b"".join(b"(" + part.pattern() + b")" for part in self.parts))
 
     @property
     def voices(self) -> tuple[Code | Bit, ...]:
-        """Every code and bit with which this frame can speak of a status."""
+        """Return every code and bit for a status."""
         found: list[Code | Bit] = []
         for part in self.parts:
             if isinstance(part, ChoiceField | ErrorTable):
@@ -177,10 +176,10 @@ class Frame(Schema):
         return tuple(voice for voice in found if voice.status != "ok")
 
     def read(self, match: re.Match[bytes]) -> FrameParts:
-        """Return what a match of `pattern` says.
+        """Return the content of a match of `pattern`.
 
         Raises:
-            NotUnderstood: the characters are right but a number or the checksum is not.
+            NotUnderstood: a number or checksum is wrong.
         """
         found = FrameParts()
         found.report(self.status, self.means, self.remedy)

@@ -1,4 +1,4 @@
-"""When a device that is asked took its length: bounds from its manual, and what the reply says about them."""
+"""When a polled device took its length, by manual and reply."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Latch:
     """Moment of a length.
 
     Attributes:
-        t_s: the likeliest, by the host's clock [s].
+        t_s: most likely, by the host's clock.
     """
 
     t_s: float
@@ -23,16 +23,15 @@ class Latch:
 
 
 def latch_of(protocol: Protocol, *, asked_s: float, first_byte_s: float, baud: int) -> Latch:
-    """Return when the length was taken that a reply tells.
+    """Return when the length of a reply was taken.
 
-    The moment lies anywhere between the bounds of the device, and never behind the reply: a rectangle, whose middle is the
-    estimate and whose width over the root of 12 the standard uncertainty [JCGM 100:2008, 4.3.7]. A reply that came later than
-    the device may take was held up by the computer, on its way out or on its way in. Most is held up on its way in
-    (adapters collect bytes), so the estimate stays; the uncertainty takes in the other. A reply that came before the stated line
-    could carry it says that its times do not hold: the moment lies anywhere between asking and the first byte.
+    The moment is uniform between the device's bounds and before the reply: its middle, with the width over the root of 12
+    as standard uncertainty [JCGM 100:2008, 4.3.7]. A late reply was delayed by the computer, mostly on arrival, so the
+    estimate stays and the uncertainty includes a delayed request. A reply earlier than possible refutes the bounds: then
+    anywhere between request and first byte.
 
     Args:
-        asked_s: when the request was handed to the system.
+        asked_s: handing over of the request.
     """
     character_s = protocol.line.character_s(baud)
     sent_s = asked_s + len(protocol.ask.request) * character_s

@@ -1,4 +1,4 @@
-"""The protocol files: finding, reading, checking them."""
+"""Find, read and check protocol files."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ HOW_TO_ADD = "or give a .yaml file of your own, or install its package"
 
 
 def instruments_folder() -> Path:
-    """Return the folder of the instruments that the package ships."""
+    """Return the folder of shipped instruments."""
     return shipped_folder("protocols") / "instruments"
 
 
 def known_instruments() -> list[str]:
-    """Return the names of the instruments that are shipped and of installed ones, sorted.
+    """Return the sorted names of shipped and installed instruments.
 
     Raises:
-        InputError: an entry point that cannot be loaded or names no package, or an instrument whose name is taken.
+        InputError: an invalid entry point, or a taken name.
     """
     return list(_files())
 
@@ -58,20 +58,20 @@ def _files() -> dict[str, Path]:
 
 
 def load_instrument(name_or_file: str | Path, profile: str | None = None) -> Protocol:
-    """Return the protocol of a known instrument, or of a file (a name that ends in `.yaml`).
+    """Return the protocol of a known instrument or a `.yaml` file.
 
     Args:
-        profile: variant of the device; the usual one where none is named.
+        profile: None: the usual one.
 
     Raises:
-        InstrumentError: no instrument of that name, or no such profile.
-        InputError: the file cannot be read or is wrong; every fault is listed with line and column.
+        InstrumentError: unknown instrument or profile.
+        InputError: every fault of the file with line and column.
     """
     return read_protocol(_file_of(name_or_file), profile)
 
 
 def load_variants(name_or_file: str | Path) -> list[Protocol]:
-    """Return every variant of an instrument, the usual one first.
+    """Return every variant, the usual one first.
 
     Raises:
         InstrumentError, InputError: as `load_instrument`.
@@ -88,13 +88,13 @@ def _file_of(name_or_file: str | Path) -> Path:
 
 
 def with_zero(protocol: Protocol, zero_mm: float | None) -> Protocol:
-    """Return the protocol of a device that shows how far it is from its zero, with the length at which it shows zero.
+    """Return a relative device's protocol with the length at its zero.
 
     Args:
-        zero_mm: distance of the ball centres at which it shows zero; None where the device shows whole lengths.
+        zero_mm: distance of ball centres at zero; None for a device with whole lengths.
 
     Raises:
-        InstrumentError: a relative device without a zero, or a zero for one that shows whole lengths.
+        InstrumentError: a relative device without zero, or a zero for another device.
     """
     if protocol.length.relative == (zero_mm is not None):
         return protocol if zero_mm is None else _at_zero(protocol, zero_mm)
@@ -113,18 +113,18 @@ def _at_zero(protocol: Protocol, zero_mm: float) -> Protocol:
 
 
 def at_rate(protocol: Protocol, rate_hz: float | None) -> Protocol:
-    """Return the protocol of a device that is set to another sample rate than the usual one, where one is given."""
+    """Return the protocol at another sample rate, if given."""
     if rate_hz is None:
         return protocol
     return protocol.model_copy(update={"timing": protocol.timing.model_copy(update={"rate_hz": rate_hz})})
 
 
 def read_protocol(path: Path, profile: str | None = None) -> Protocol:
-    """Return the protocol in the file `path`, of one profile or of the usual one.
+    """Return the protocol of a file, of one or the usual profile.
 
     Raises:
         InstrumentError: the file has no such profile.
-        InputError: the file cannot be read or is wrong; every fault is listed with line and column.
+        InputError: every fault of the file with line and column.
     """
     variants = _read(path)
     first = next(iter(variants.values()))
@@ -138,7 +138,7 @@ def read_protocol(path: Path, profile: str | None = None) -> Protocol:
 
 
 def _read(path: Path) -> dict[str, Protocol]:
-    """Every variant of a file by the name of its profile, the usual one first; all of them are checked.
+    """Return every checked variant by profile, the usual one first.
 
     Raises:
         InputError: every fault with line and column.

@@ -1,4 +1,4 @@
-"""The serial link: opening a port, reading and writing bytes, and saying in words what went wrong."""
+"""The serial link: open a port, read and write, and explain faults."""
 
 from __future__ import annotations
 
@@ -38,31 +38,31 @@ _BUSY = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
 
 
 class Port(Protocol):
-    """What an already open port must be able to do: the part of pyserial that is used, or a stand-in for tests."""
+    """The used part of pyserial, or a stand-in."""
 
     @property
     def in_waiting(self) -> int:
         """Bytes that can be read at once."""
 
     def read(self, size: int = 1, /) -> bytes:
-        """Return up to `size` bytes; fewer, or none, when its own timeout ends first."""
+        """Return up to `size` bytes, fewer after the port's timeout."""
 
     def write(self, data: bytes, /) -> int | None:
         """Send the bytes."""
 
 
 class LineClosedError(InstrumentError):
-    """The system closed the line while it was in use: an adapter was pulled out, a server hung up."""
+    """The system closed the line, as after unplugging."""
 
 
 class Link:
     """An open line to an instrument.
 
     Args:
-        name: what messages call it.
-        owned: close the port with the link; a port that somebody else opened stays open.
-        log: where every byte is written down.
-        marks: takes out what the system marks damaged characters with; None where it marks none.
+        name: for messages.
+        owned: close the port with the link.
+        log: of all bytes.
+        marks: removes marks of damaged characters; None without marks.
     """
 
     def __init__(
@@ -84,16 +84,16 @@ class Link:
 
     @property
     def sees_damage(self) -> bool:
-        """Whether characters with a wrong parity or stop bit are known."""
+        """Return whether wrong parity or stop bits are detected."""
         return self._marks is not None
 
     @property
     def eighth_bit_marks(self) -> bool:
-        """Whether the eighth bit of a character of seven can only be the mark of a wrong parity."""
+        """Return whether the eighth bit of a seven-bit character can only mark wrong parity."""
         return self._marks is not None and self._has_bits
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived, after waiting a moment for the first; empty where none came.
+        """Return arrived bytes after a short wait; may be empty.
 
         Raises:
             LineClosedError: the line is closed.
@@ -111,7 +111,7 @@ class Link:
         return raw
 
     def _rest(self) -> bytes:
-        """Return what has come behind the first byte, without waiting."""
+        """Return further bytes without waiting."""
         with suppress(*_ERRORS):
             # What is wrong with the line comes up again with the next read; what was read is not thrown away for it.
             if isinstance(self._port, SocketPort):
@@ -138,7 +138,7 @@ class Link:
             raise self._gone(error) from None
 
     def close(self) -> None:
-        """Close the port if this link opened it."""
+        """Close the port if owned."""
         if self._owned:
             _close_quietly(self._port)
 
@@ -165,13 +165,13 @@ def open_link(
     """Open a line to an instrument.
 
     Args:
-        port: name of a port (`/dev/ttyUSB0`, `COM3`), a URL of pyserial (`socket://127.0.0.1:4001`), or an open port.
-        baud: baud rate to use instead of the usual one.
-        log: where every byte is written down.
-        text: all that comes is text, so that characters with a wrong parity or stop bit can be marked in it.
+        port: name (`/dev/ttyUSB0`, `COM3`), pyserial URL (`socket://127.0.0.1:4001`), or open port.
+        baud: instead of the usual rate.
+        log: of all bytes.
+        text: all input is text, so that damaged characters can be marked.
 
     Raises:
-        InstrumentError: no such port, no permission, in use, settings that the port does not take.
+        InstrumentError: no such port, no permission, in use, or unsupported settings.
     """
     if not isinstance(port, str):
         return Link(port, name=str(getattr(port, "name", None) or "open port"), owned=False, log=log)
@@ -205,7 +205,7 @@ def open_link(
 
 
 def connected_ports() -> list[tuple[str, str, str]]:
-    """Return name, description and hardware id of every serial port of this computer, sorted by name."""
+    """Return name, description and hardware id of every serial port, sorted by name."""
     return sorted((port.device, port.description or "", port.hwid or "") for port in list_ports.comports())
 
 
@@ -214,7 +214,7 @@ def _is_pseudo_terminal(port: str) -> bool:
 
 
 def _not_opened(port: str, baud: int, error: Exception) -> InstrumentError:
-    """Return the error in words; `errno` where the system gave one, else the words of pyserial."""
+    """Return the error in words, from `errno` or pyserial."""
     number = getattr(error, "errno", None)
     words = str(error).lower()
     if "://" in port:

@@ -1,4 +1,4 @@
-"""Reading an instrument that sends by itself."""
+"""Read an instrument that sends by itself."""
 
 from __future__ import annotations
 
@@ -19,12 +19,7 @@ if TYPE_CHECKING:
 
 
 class Listener:
-    """Takes what comes, until it shall stop; only a long time without a reading is an error.
-
-    Args:
-        link: the open line.
-        reception: where readings go, and how long is waited.
-    """
+    """Takes readings until stopped; only a long silence is an error."""
 
     def __init__(self, link: Link, reception: Reception) -> None:
         protocol = reception.protocol
@@ -47,7 +42,7 @@ class Listener:
         """Read until `stop` is set.
 
         Args:
-            chunk: bytes that came already.
+            chunk: bytes received already.
 
         Raises:
             InstrumentError: the line is silent, closed or garbled, or the device restarted; OutputError: the byte log is full.
@@ -73,7 +68,7 @@ class Listener:
         self._unread, self._why = (self._unread + heard.raw)[:LONGEST_LINE], heard.why
 
     def _take(self, heard: Piece, seen_s: float) -> None:
-        """Stamp a reading and hand out what has its place."""
+        """Stamp a reading and deliver those in order."""
         size = heard.after + len(heard.raw)
         left_s = seen_s - size * self._to.character_s - self._to.protocol.timing.latch_delay_s
         judged = self._doubts.judged(heard)

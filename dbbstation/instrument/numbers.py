@@ -1,7 +1,7 @@
-"""The parts of a frame that are numbers: text, integers of every kind, IEEE floats.
+"""Numeric parts of a frame: text, integers, IEEE floats.
 
-A number is the length (in device units) or the sample counter. `specials` are whole field contents that stand for a
-status, for example `+FFFFFFF` where a device writes that in place of digits.
+A number is the length in device units or the sample counter. `specials` are contents that mean a status, such as
+`+FFFFFFF`.
 """
 
 from __future__ import annotations
@@ -22,12 +22,11 @@ if TYPE_CHECKING:
 
 
 class Number(Schema):
-    """What all numbers share.
+    """Common parts of numbers.
 
     Attributes:
-        modulus: of a counter: it starts again from 0 there.
-        scale: of a length: what one on the wire stands for, in the length's unit; 0.0001 where a device leaves out the decimal
-            point of four decimals.
+        modulus: of a counter.
+        scale: of one on the wire, in the length's unit; 0.0001 for four implicit decimals.
         specials: contents that are no number.
     """
 
@@ -43,7 +42,7 @@ class Number(Schema):
         return self
 
     def pattern(self) -> bytes:
-        """Return the regular expression of the number or one of its specials."""
+        """Return the pattern of the number or a special."""
         specials = b"".join(re.escape(special.code) + b"|" for special in self.specials)
         return b"(?:" + specials + self._digits() + b")"
 
@@ -51,7 +50,7 @@ class Number(Schema):
         """Take the number.
 
         Raises:
-            NotUnderstood: the right characters, but no number.
+            NotUnderstood: it is no number.
         """
         for special in self.specials:
             if special.code == raw:
@@ -65,7 +64,7 @@ class Number(Schema):
             found.counter = int(value)
 
     def write(self, content: Content) -> bytes:
-        """Return the number, or the special of the status to report.
+        """Return the number, or the status's special.
 
         Raises:
             NotRepresentable: it does not fit.
@@ -78,7 +77,7 @@ class Number(Schema):
         return self._written(self._times(content.value, 1.0 / self.scale))
 
     def as_read(self, value: float) -> float:
-        """Return what is left of a length after writing and reading it, in the length's unit."""
+        """Return a length after writing and reading, in its unit."""
         return self._times(self.rounded(self._times(value, 1.0 / self.scale)), self.scale)
 
     @staticmethod
@@ -87,14 +86,14 @@ class Number(Schema):
         return value if factor == 1.0 else float(f"{value * factor:.12g}")
 
     def rounded(self, value: float) -> float:
-        """Return what is left of `value` after writing and reading it, so that a sign can be written before it."""
+        """Return `value` after writing and reading, before a sign is written."""
         return value
 
     def _digits(self) -> bytes:
         raise NotImplementedError
 
     def _places(self, raw: bytes) -> tuple[int, int] | None:  # noqa: ARG002 (numbers in text have digits)
-        """Return how many digits stand before the point and behind it; None where the number is not in decimal digits."""
+        """Return digits before and behind the point, or None if not decimal."""
         return None
 
     def _parsed(self, raw: bytes) -> float:
@@ -108,13 +107,12 @@ class DecimalText(Number):
     """A number in text.
 
     Attributes:
-        width: characters, sign and decimal point included; None: as many as it takes, at most `max_width`.
-        decimals: decimals that the device writes; others are understood only with `decimals_vary`.
-        pad: what fills the width on the left.
-        signed: the sign stands in this field; `plus` is what a positive number has there. Where it has something, a number
-            without a sign is not understood; a blank is, where blanks fill up.
-        min_width: of a number of free width: blanks or zeros fill it up on the left, and a narrower one is not understood.
-        leading_zero: whether the device writes 0 before the point of a number below one.
+        width: with sign and point; None: free, at most `max_width`.
+        decimals: written; others are understood only with `decimals_vary`.
+        pad: filling on the left.
+        signed: the field has a sign, `plus` for positive numbers. A non-blank sign is required; a blank may be filling.
+        min_width: of a free width, filled with blanks or zeros; narrower is invalid.
+        leading_zero: 0 before the point of numbers below one.
     """
 
     kind: Literal["decimal"]
@@ -137,11 +135,11 @@ class DecimalText(Number):
 
     @property
     def binary(self) -> bool:
-        """Whether a line end can stand inside by chance."""
+        """Return whether a line end may occur inside."""
         return False
 
     def rounded(self, value: float) -> float:
-        """Round to the decimals; never minus zero."""
+        """Round to the decimals, without minus zero."""
         return round(value, self.decimals) + 0.0
 
     def _digits(self) -> bytes:
@@ -188,11 +186,10 @@ class Integer(Number):
     """A whole number.
 
     Attributes:
-        size: bytes of the number (in hexadecimal text: half the characters).
+        size: bytes of the number, half the characters in hexadecimal.
         signed: two's complement.
-        written: `binary`, `bcd` (two decimal digits in a byte), `hex` or `HEX` (text).
-        tags: upper bits of each byte, in wire order, where a device marks its bytes so that a listener can find the start; the
-            other `payload_bits` carry the number.
+        written: `binary`, `bcd` (two digits a byte), `hex` or `HEX` (text).
+        tags: upper bits of each byte in wire order that mark the start; the other `payload_bits` are the number.
     """
 
     kind: Literal["integer"]
@@ -224,7 +221,7 @@ class Integer(Number):
 
     @property
     def binary(self) -> bool:
-        """Whether a line end can stand inside by chance."""
+        """Return whether a line end may occur inside."""
         return self.written in {"binary", "bcd"}
 
     def rounded(self, value: float) -> float:
@@ -276,7 +273,7 @@ class Integer(Number):
 
 
 class Ieee(Number):
-    """An IEEE 754 number of 4 or 8 bytes; not-a-number on the wire is no reading unless a special says so."""
+    """An IEEE 754 number of 4 or 8 bytes; not-a-number is no reading unless special."""
 
     kind: Literal["float"]
     size: Literal[4, 8] = 4
@@ -289,7 +286,7 @@ class Ieee(Number):
 
     @property
     def binary(self) -> bool:
-        """Whether a line end can stand inside by chance."""
+        """Return whether a line end may occur inside."""
         return True
 
     @property
@@ -297,7 +294,7 @@ class Ieee(Number):
         return (">" if self.order == "big" else "<") + ("f" if self.size == 4 else "d")  # noqa: PLR2004 (bytes)
 
     def rounded(self, value: float) -> float:
-        """Round to what the format holds."""
+        """Round to the format."""
         return float(struct.unpack(self._format, struct.pack(self._format, value))[0])
 
     def _digits(self) -> bytes:

@@ -1,4 +1,4 @@
-"""Reading an instrument that is asked for each length."""
+"""Read an instrument by request."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ places. Where one exchange in twenty is disturbed, so many come once in 30 000 t
 
 @dataclass(frozen=True, slots=True)
 class PolledReply:
-    """What came after a request.
+    """The answer to a request.
 
     Attributes:
-        heard: the reply, or as garbage whatever came instead before patience ended.
+        heard: reply, or garbage until patience ended.
         raw: all bytes, in wire order.
     """
 
@@ -48,17 +48,12 @@ class PolledReply:
 
     @property
     def clean(self) -> bool:
-        """Whether the reply is all that came."""
+        """Return whether nothing else came."""
         return isinstance(self.heard, Piece) and self.heard.raw == self.raw
 
 
 class Poller:
-    """Asks, waits for the reply, asks again, until it shall stop.
-
-    Args:
-        link: the open line.
-        reception: where readings go, and how long is waited.
-    """
+    """Requests readings until stopped."""
 
     def __init__(self, link: Link, reception: Reception) -> None:
         self._link = link
@@ -97,7 +92,7 @@ class Poller:
                 pass
 
     def _take(self, heard: Piece, first_s: float, asked_s: float) -> None:
-        """Stamp a reading, let a fault be explained, and hand out what has its place."""
+        """Stamp a reading, ask for a fault's text, and deliver those in order."""
         latch = latch_of(self._protocol, asked_s=asked_s, first_byte_s=first_s, baud=self._to.baud)
         self._last_s = max(latch.t_s, self._last_s + 1e-6)
         reading = replace(heard.reading, t_s=self._last_s, t_uncertainty_s=latch.uncertainty_s, first_byte_s=first_s)
@@ -116,7 +111,7 @@ class Poller:
         self._failed.clear()
 
     def _fail(self, heard: Garbage) -> None:
-        """Take note of a reply that did not come or cannot be read; give up after some in a row."""
+        """Note a missing or unreadable reply; fail after some in a row."""
         self._failed.append(heard)
         self._to.tally.reject(heard.raw, heard.reason)
         self._until_quiet()
@@ -127,14 +122,14 @@ class Poller:
             raise self._to.symptom(telling.raw, telling.why)
 
     def _refuse_strangers(self) -> None:
-        """Give up where bytes that belong to no reply come again and again: part of what comes only looks like replies."""
+        """Fail if foreign bytes recur: then replies are only apparent."""
         noisy = [answer for answer in self._recent if answer.raw and not answer.clean]
         if len(noisy) >= MOST_NOISY:
             raw = b"".join(answer.raw for answer in self._recent)[-LONGEST_LINE:]
             raise self._to.symptom(raw, f"{len(noisy)} of {len(self._recent)} replies have bytes that belong to none")
 
     def _explanation(self) -> str:
-        """Ask for the text of a fault; empty where the device has none to tell or is not asked."""
+        """Return the text of a fault, or an empty text."""
         follow_up, protocol = self._protocol.ask.follow_up, self._protocol.explaining
         if follow_up is None or protocol is None:
             return ""
@@ -147,10 +142,7 @@ class Poller:
         return heard.reading.said if protocol.frames[0].pattern.fullmatch(heard.raw) else ""
 
     def _until_quiet(self) -> None:
-        """Let a reply to an earlier request pass, perhaps one of a program before, lest it be taken for the next one.
-
-        The line is quiet when nothing came for longer than a reply takes from the request to its last byte.
-        """
+        """Discard replies to earlier requests until nothing comes for the time of a reply."""
         quiet_s = self._protocol.timing.reply_latency_s + _MARGIN_S
         quiet_s += self._protocol.frame_characters * self._to.character_s
         now_s = heard_s = time.monotonic()

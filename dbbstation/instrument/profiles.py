@@ -1,4 +1,4 @@
-"""Variants of a device in one protocol file: firmware, resolution, amplifier. Each says what it has instead."""
+"""Variants of a device in one protocol file: firmware, resolution, amplifier."""
 
 from __future__ import annotations
 
@@ -97,11 +97,11 @@ class ProtocolFile(Protocol):
 
 
 def variant(document: YamlDocument, name: str, faults: list[Problem]) -> Protocol | None:
-    """Return one variant of a protocol file; None with every fault added where it makes no sense.
+    """Return one variant of a protocol file; None with faults added.
 
     Args:
-        document: of the file, which is valid as a `ProtocolFile`.
-        name: of the profile; any other than those under `profiles` is the usual one.
+        document: valid as a `ProtocolFile`.
+        name: one not under `profiles` is the usual one.
     """
     chosen = _merged(document, name if name in document.data.get("profiles", {}) else "")
     protocol = validate(chosen, Protocol, faults)
@@ -109,7 +109,7 @@ def variant(document: YamlDocument, name: str, faults: list[Problem]) -> Protoco
 
 
 def _merged(document: YamlDocument, name: str) -> YamlDocument:
-    """Return the document as if the keys of a profile stood in place of its own, and no profiles in it."""
+    """Return the document with a profile's keys in place, without profiles."""
     data = {key: value for key, value in document.data.items() if key != "profiles"}
     values, keys = dict(document.value_places), dict(document.key_places)
     if name:

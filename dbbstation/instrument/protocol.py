@@ -46,23 +46,23 @@ class LineSettings(Schema):
 
     @property
     def bits_per_character(self) -> int:
-        """Start bit, data bits, parity bit, stop bits."""
+        """Return the bits of a character with start, parity and stop."""
         return 1 + self.data_bits + (self.parity != "none") + self.stop_bits
 
     def character_s(self, baud: int | None = None) -> float:
-        """Return how long one character takes, in s, at `baud` or at the usual rate."""
+        """Return the time of one character at `baud` or the usual rate [s]."""
         return self.bits_per_character / (baud or self.baud)
 
     @property
     def bits_text(self) -> str:
-        """What a character is made of, for example `7 data bits, even parity, 2 stop bits`."""
+        """Return a character's bits, such as `7 data bits, even parity, 2 stop bits`."""
         stop = f"{self.stop_bits} stop bit" + ("s" if self.stop_bits > 1 else "")
         parity = "no" if self.parity == "none" else self.parity
         return f"{self.data_bits} data bits, {parity} parity, {stop}"
 
     @property
     def text(self) -> str:
-        """The settings as people say them, for example `9600 baud, 7 data bits, even parity, 2 stop bits`."""
+        """Return the settings, such as `9600 baud, 7 data bits, even parity, 2 stop bits`."""
         flow = "" if self.flow == "none" else f", flow control {self.flow}"
         return f"{self.baud} baud, {self.bits_text}{flow}"
 
@@ -135,7 +135,7 @@ class Reply(Schema):
     end: Bytes = b""
 
     def around(self, frame: Frame) -> Frame:
-        """Return a frame with prefix and end as parts of it; a bare one as it is."""
+        """Return a frame with prefix and end, unless bare."""
         if frame.bare:
             return frame
         before = (Literally(kind="literal", value=self.prefix),) if self.prefix else ()
@@ -174,7 +174,7 @@ class Length(Schema):
         return self
 
     def mm_per_unit(self, unit: Unit | None = None) -> float:
-        """Return the factor from a number on the wire to mm, the sense included."""
+        """Return the factor to mm, with the sense."""
         return self.sense * (self.mm_per_count or _MM_PER_UNIT[unit or self.unit])
 
 
@@ -266,7 +266,7 @@ class Protocol(Schema):
         return self
 
     def whole(self) -> Protocol:
-        """Return the same with what requests and replies have in common written into each of them."""
+        """Return the protocol with common parts written into requests and replies."""
         ask, end = self.ask, self.ask.request_end
         steps = {
             key: tuple(step.model_copy(update={"send": step.send + end}) for step in getattr(ask, key))
@@ -288,31 +288,31 @@ class Protocol(Schema):
 
     @property
     def by_width(self) -> bool:
-        """Whether frames are cut by their width (binary parts) instead of at the line end."""
+        """Return whether frames are cut by width (binary) instead of line end."""
         fixed = all(frame.width is not None for frame in self.frames)
         return fixed and (any(frame.binary for frame in self.frames) or not self.terminator)
 
     @property
     def terminator(self) -> bytes:
-        """The line end that all frames share but bare ones, empty where they have none."""
+        """Return the common line end of frames, bare ones apart; may be empty."""
         ends = {frame.terminator for frame in self.frames if not frame.bare}
         return ends.pop() if len(ends) == 1 else b""
 
     @property
     def counter_modulus(self) -> int | None:
-        """Modulus of the sample counter, None where the wire has none."""
+        """Return the counter's modulus, or None."""
         counter = self.frames[0].counter
         return counter.modulus if counter else None
 
     @property
     def explaining(self) -> Protocol | None:
-        """The protocol of the answers to the follow-up of a fault; None where nothing is asked then."""
+        """Return the protocol of a fault's follow-up, or None."""
         follow_up = self.ask.follow_up
         return None if follow_up is None else self.model_copy(update={"frames": follow_up.frames})
 
     @property
     def has_checksum(self) -> bool:
-        """Whether a wrong digit in a reading is noticed."""
+        """Return whether a wrong digit is noticed."""
         return any(part.kind == "checksum" for part in self.frames[0].parts)
 
     @property
@@ -321,7 +321,7 @@ class Protocol(Schema):
         return not any(frame.binary for frame in self.frames)
 
     def voice(self, status: Status) -> tuple[Frame, Code | Bit | None] | None:
-        """Return how the device says `status`: a code in its reading, or else a message; None where it cannot."""
+        """Return the device's way to say `status`: a code, else a message, or None."""
         for frame in self.frames:
             for voice in frame.voices:
                 if voice.status == status:
@@ -330,7 +330,7 @@ class Protocol(Schema):
 
     @property
     def statuses(self) -> tuple[Code | Bit | Frame, ...]:
-        """Everything the device can say that is not ok, the worst first."""
+        """Return all bad statuses of the device, the worst first."""
         said: list[Code | Bit | Frame] = list(self.frames[0].voices)
         for frame in self.frames[1:]:
             said += frame.voices or (frame,)
@@ -343,7 +343,7 @@ class Protocol(Schema):
         return len(self.frames[0].write(Content(0.0, features=self.features))) if width is None else width
 
     def fastest_hz(self, baud: int | None = None) -> float:
-        """Return the most readings per second that the line carries, latency included; at most `rate_hz`."""
+        """Return the greatest rate of the line with latency, at most `rate_hz`."""
         character_s = self.line.character_s(baud)
         one_s = self.frame_characters * character_s
         if self.ask.asked:
@@ -351,9 +351,9 @@ class Protocol(Schema):
         return min(1.0 / one_s, self.timing.rate_hz or float("inf"))
 
     def latch_bounds_s(self) -> tuple[float, float]:
-        """Earliest and latest moment at which the device takes the length, from the end of the request [s].
+        """Return earliest and latest latching after the request [s].
 
-        Without bounds in the file a device that is polled takes it anywhere before its reply begins.
+        Without bounds a polled device latches anywhere before its reply.
         """
         timing = self.timing
         if timing.latch_bounds_s is not None:

@@ -1,4 +1,4 @@
-"""What an instrument says of one sample, whatever its wire looks like."""
+"""One sample of any instrument."""
 
 from __future__ import annotations
 
@@ -23,14 +23,13 @@ class Reading:
     """One sample.
 
     Attributes:
-        t_s: host time of the sample, monotonic, in s; 0 where there is no clock (a codec alone).
-        length_mm: length in mm; None exactly when the device gave no number (`status` is then not `ok`).
-        lost: samples lost immediately before this one (gap of the counter, or replies that could not be read).
-        counter: the device's own sample counter, None where its wire has none.
-        said: what the device said where `status` is not `ok`; why it is doubted where it is `doubtful`.
-        t_uncertainty_s: standard uncertainty of `t_s` where the request bounds it [s]; None of a stream, whose clock does better
-            than its bounds.
-        first_byte_s: host time at which the first byte had arrived at the latest, by the clock of `t_s` [s]; 0 without.
+        t_s: monotonic host time; 0 without a clock.
+        length_mm: None exactly if there is no number; `status` is then not `ok`.
+        lost: samples lost just before, by counter or unreadable replies.
+        counter: of the device, or None.
+        said: the device's words, or the reason for doubt; if not `ok`.
+        t_uncertainty_s: standard, bounded by the request; None for a stream.
+        first_byte_s: latest arrival of the first byte, by the same clock; 0 without.
     """
 
     t_s: float
@@ -45,5 +44,5 @@ class Reading:
 
     @property
     def gone(self) -> bool:
-        """Whether the device itself says that there is no length to be trusted; a doubtful one is lost on the line only."""
+        """Return whether the device denies the length; a doubtful one is lost on the line."""
         return self.status not in {OK, DOUBTFUL}

@@ -1,4 +1,4 @@
-"""What polling and listening share: the line's protocol, clock and patience, and where readings and faults go."""
+"""Common parts of polling and listening."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ INCOMPLETE = "incomplete"
 
 @dataclass(slots=True)
 class Tally:
-    """What a driver has seen since `start`.
+    """Counts since `start`.
 
     Attributes:
-        lost: samples that never came, or came and were rejected.
-        rejected: frames and stretches of bytes that were not believed, by reason.
-        reconnected: how often the line was opened again.
+        lost: missing or rejected samples.
+        rejected: frames and stretches of bytes, by reason.
+        reconnected: reopenings of the line.
     """
 
     readings: int = 0
@@ -49,16 +49,14 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class Reception:
-    """One line that is being read.
+    """A line being read.
 
     Attributes:
-        where: name of the port.
-        clock: what stamps readings [s].
-        timeout_s: patience before a silent line is an error, in real seconds.
-        memory_s: how long the quickest arrival of a stream's samples is remembered, by the clock.
-        tally: counts what comes.
-        stop: set when reading shall end.
-        eighth_bit_marks: the eighth bit of a character of seven can only be the mark of a wrong parity.
+        where: port.
+        clock: of readings [s].
+        timeout_s: patience with a silent line, in real seconds.
+        memory_s: how long a stream's quickest arrival counts, by the clock.
+        eighth_bit_marks: the eighth bit of a seven-bit character can only mark wrong parity.
     """
 
     protocol: Protocol
@@ -74,14 +72,14 @@ class Reception:
 
     @property
     def character_s(self) -> float:
-        """How long a character takes on the line [s]."""
+        """Return the time of a character [s]."""
         return self.protocol.line.character_s(self.baud)
 
     def symptom(self, raw: bytes, why: str) -> InstrumentError:
-        """Return the error for a line that brings no readings.
+        """Return the error of a line without readings.
 
         Args:
-            raw: what came instead, empty where nothing did.
+            raw: received instead; may be empty.
         """
         if not raw:
             heard_before = self.tally.readings > 0

@@ -1,4 +1,4 @@
-"""Which known instrument speaks like this: for the message about one that was not expected."""
+"""Recognise an unexpected instrument for a message."""
 
 from __future__ import annotations
 
@@ -17,12 +17,9 @@ understand different bytes."""
 
 
 def looks_like(raw: bytes, other_than: Protocol) -> list[Protocol]:
-    """Return the known instruments, with their profiles, that understand most of some bytes; the likeliest first.
+    """Return known instruments and profiles that understand some bytes best, the likeliest first.
 
-    A checksum that fits says more than digits that fit, so instruments with one come first where as many bytes are understood.
-
-    Args:
-        raw: what came over the line.
+    At equal bytes, instruments with a fitting checksum come first.
     """
     found = []
     for name in known_instruments():
@@ -37,7 +34,7 @@ def looks_like(raw: bytes, other_than: Protocol) -> list[Protocol]:
 
 
 def _understood(protocol: Protocol, raw: bytes) -> float:
-    """Share of the bytes that are readings with a length; messages alone are too short to say much."""
+    """Return the share of bytes that are readings with a length."""
     heard = (
         Decoder(protocol, joining=True).feed(raw) if protocol.by_width else Decoder(protocol, joining=False).feed(raw)
     )

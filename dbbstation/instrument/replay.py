@@ -1,4 +1,4 @@
-"""A byte log through the same decoder as the live line."""
+"""Decode a byte log as the live line."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Replayed:
     """What a byte log says in one place.
 
     Attributes:
-        t_s: when its last byte came, in s since the log was opened.
-        reading: what they tell; None where they are not understood.
+        t_s: last byte, since the log was opened.
+        reading: None if not understood.
     """
 
     t_s: float
@@ -34,10 +34,10 @@ class Replayed:
 
 
 def replayed(protocol: Protocol, chunks: Iterable[Chunk], *, where: str) -> Iterator[Replayed]:
-    """Yield readings and everything not understood, in wire order.
+    """Yield readings and rejected bytes in wire order.
 
-    Answers to commands of the start and stop sequence and to what is asked after a fault are left out: they are no readings,
-    and understood. Where the device restarted the driver stops; a replay goes on and says so.
+    Answers to start, stop and follow-up commands are omitted. A restart of the device is reported, and the replay
+    continues.
     """
     decoding = _Decoding(protocol, where)
     for chunk in chunks:
@@ -60,7 +60,7 @@ class _Decoding:
         self._last_s = 0.0
 
     def sent(self, raw: bytes) -> Iterator[Replayed]:
-        """Take bytes that went to the device: the reply before them is over."""
+        """Take bytes to the device, which end the reply before."""
         if not self._protocol.ask.asked:
             return
         yield from self._unfinished("no end before the next request")
@@ -82,7 +82,7 @@ class _Decoding:
                 yield Replayed(chunk.t_s, heard.raw, None, "joined in the middle" if heard.joining else heard.why)
 
     def ended(self) -> Iterator[Replayed]:
-        """Return what is left at the end of the log."""
+        """Return the rest at the end of the log."""
         for one in self._sequence.left():
             yield Replayed(one.sample[1], one.sample[0].raw, None, one.why)
         yield from self._unfinished("the log ends within it")

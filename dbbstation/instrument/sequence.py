@@ -1,11 +1,9 @@
-"""The device's own sample counter: what was lost, and what a counter out of order means.
+"""The device's sample counter: losses and counters out of order.
 
-Three things put a counter out of order. A line is damaged (a digit of the counter is wrong) or doubled: then the lines that
-follow go on where the line before it stood. Samples were lost: the following lines go on from the new counter, which is
-ahead. The device was restarted: they go on from the new counter, which is behind. One line alone cannot tell these apart,
-so it is held until the next ones have spoken. A damaged counter followed by another that happens to continue it would need
-two faults in a row and one value in `modulus`: where one line in a thousand is damaged, and the modulus is 256, that is one
-chance in 250 million.
+Three causes are possible. After a damaged or doubled line, the sequence continues from before it. After a loss it
+continues ahead, after a restart behind. The line is therefore held until the next ones decide. A damaged counter
+continued by chance needs two faults in a row and one value in `modulus`: at one damaged line in a thousand and modulus
+256, one chance in 250 million.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ class Placed(Generic[Held]):
     """A sample with its place in the sequence.
 
     Attributes:
-        lost: samples missing before it; None: it is rejected.
+        lost: missing before it; None: it is rejected.
     """
 
     sample: Held
@@ -39,11 +37,11 @@ class Placed(Generic[Held]):
 
 
 class SampleOrder(Generic[Held]):
-    """Puts samples in order by their counter; hands them out in wire order, the doubtful ones some lines later.
+    """Orders samples by counter and returns them in wire order, doubtful ones later.
 
     Args:
-        modulus: where the counter starts again from 0; None: the wire has no counter, and nothing is held or counted.
-        where: the port, for messages.
+        modulus: None: no counter, nothing is held or counted.
+        where: port, for messages.
     """
 
     def __init__(self, modulus: int | None, where: str) -> None:
@@ -54,19 +52,18 @@ class SampleOrder(Generic[Held]):
 
     @property
     def counts(self) -> bool:
-        """Whether the wire has a counter."""
+        """Return whether the wire has a counter."""
         return self._modulus is not None
 
     def left(self) -> list[Placed[Held]]:
-        """Return the samples that still wait for what follows them, as rejected: nothing follows."""
+        """Return held samples as rejected, at the end."""
         return self._rejected()
 
     def place(self, counter: int | None, sample: Held) -> list[Placed[Held]]:
-        """Take the next sample; return those whose place is known now.
+        """Take the next sample and return those with a known place.
 
         Raises:
-            InstrumentError: the device restarted. Everything before the restart was returned earlier, what was held since is
-                in `left`.
+            InstrumentError: the device restarted. Earlier samples were returned; held ones are in `left`.
         """
         if self._modulus is None or counter is None:
             return [Placed(sample, 0)]
@@ -83,7 +80,7 @@ class SampleOrder(Generic[Held]):
         return self._decided()
 
     def _goes_on_from_before(self, counter: int) -> bool:
-        """Whether a counter continues the sequence before the held lines: each of them took one place at most."""
+        """Return whether a counter continues the sequence before the held lines."""
         last = self._last or 0
         if not self._ahead(last, counter):
             return False

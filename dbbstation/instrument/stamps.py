@@ -1,9 +1,7 @@
-"""When a sample was taken, from when its bytes were seen.
+"""Sample times from the arrival of bytes.
 
-The host sees bytes late, never early: the line takes time, adapters collect bytes (16 ms on a common USB chip), and the
-system wakes the reader when it likes. For a request the moment is known from the sending side. For a stream, the sample
-number times the period is a clock with a tiny jitter but an unknown offset; the offset is the smallest delay seen lately,
-because a delay only ever adds.
+Bytes are seen late, never early: line, adapter buffer (16 ms on a common USB chip) and system add delay. A request bounds
+its moment. For a stream, sample number times period is a precise clock, whose offset is the smallest recent delay.
 """
 
 from __future__ import annotations
@@ -12,10 +10,7 @@ from collections import deque
 
 
 class MachineTime:
-    """Clock of a virtual machine that waits until every sample is read: samples are counted, and no arrival is timed.
-
-    As a clock it gives the time of the last sample.
-    """
+    """Clock of a virtual machine that waits for its reader: samples are counted."""
 
     def __init__(self, period_s: float, begins_s: float) -> None:
         self._period_s = period_s
@@ -23,7 +18,7 @@ class MachineTime:
         self._number = 0
 
     def stamp(self, _seen_s: float, lost: int = 0) -> float:
-        """Return the time of the next sample, in s, at most a period early: where in its period it lies is unknown."""
+        """Return the time of the next sample [s], at most a period early."""
         self._number += 1 + lost
         return self()
 
@@ -33,10 +28,10 @@ class MachineTime:
 
 
 class StreamStamps:
-    """Sample times of a stream that is paced by the device.
+    """Sample times of a stream.
 
     Args:
-        memory_s: how long a small delay is remembered. A device whose clock is off by 100 ppm drifts 0.2 ms in 2 s.
+        memory_s: how long a small delay counts. A clock off by 100 ppm drifts 0.2 ms in 2 s.
     """
 
     def __init__(self, period_s: float, memory_s: float = 2.0) -> None:
@@ -47,10 +42,10 @@ class StreamStamps:
         self._last_s = float("-inf")
 
     def stamp(self, seen_s: float, lost: int = 0) -> float:
-        """Return the time of the next sample, in s, strictly later than the one before.
+        """Return the time of the next sample [s], strictly rising.
 
         Args:
-            seen_s: when its last byte can have left the device at the latest.
+            seen_s: latest leaving of its last byte.
         """
         self._number += 1 + lost
         offset_s = seen_s - self._number * self._period_s

@@ -1,4 +1,4 @@
-"""From what was seen on the line to what is probably wrong."""
+"""From symptoms on the line to likely causes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SHOWN = 24
 
 
 def silence(protocol: Protocol, where: str, waited_s: float, baud: int, *, heard_before: bool) -> InstrumentError:
-    """Return the error for a line on which nothing came."""
+    """Return the error of a silent line."""
     if heard_before:
         what = f"the instrument fell silent: nothing for {waited_s:g} s"
         remedy = "is it still switched on, is the cable still plugged in at both ends?"
@@ -44,7 +44,7 @@ def silence(protocol: Protocol, where: str, waited_s: float, baud: int, *, heard
 
 
 def half_line(raw: bytes, where: str, waited_s: float) -> InstrumentError:
-    """Return the error for a frame that began and never ended."""
+    """Return the error of an unfinished frame."""
     return InstrumentError(
         f"only part of a reply came, then nothing for {waited_s:g} s: {shown(raw)}",
         where=where,
@@ -55,11 +55,10 @@ def half_line(raw: bytes, where: str, waited_s: float) -> InstrumentError:
 def garbage(
     protocol: Protocol, where: str, raw: bytes, why: str, baud: int, *, marked: bool = False
 ) -> InstrumentError:
-    """Return the error for bytes that are no reading, with the likeliest cause.
+    """Return the error of unreadable bytes with the likeliest cause.
 
     Args:
-        where: name of the port.
-        marked: the eighth bit of a character of seven can only be the mark of a wrong parity.
+        marked: the eighth bit of a seven-bit character can only mark wrong parity.
     """
     return InstrumentError(
         f"what comes is not {protocol.label}: {shown(raw)}" + (f" ({why})" if why else ""),
@@ -69,7 +68,7 @@ def garbage(
 
 
 def begins_well(protocol: Protocol, raw: bytes) -> bool:
-    """Whether some frame of the protocol could begin with these bytes: tried with the ends of an example."""
+    """Return whether a frame could begin with these bytes."""
     for frame in protocol.frames:
         example = frame.write(Content(0.0, features=protocol.features))
         if any(frame.pattern.fullmatch(raw + example[cut:]) for cut in range(1, len(example))):
@@ -78,7 +77,7 @@ def begins_well(protocol: Protocol, raw: bytes) -> bool:
 
 
 def shown(raw: bytes) -> str:
-    """Return the bytes in hexadecimal, and as text where most of it is text."""
+    """Return bytes in hexadecimal, and as text if mostly text."""
     head = raw[:_SHOWN]
     text = head.hex(" ") + (f" … ({len(raw)} bytes)" if len(raw) > _SHOWN else "")
     printable = sum(32 <= byte < 127 for byte in head)  # noqa: PLR2004 (printable ASCII)
@@ -119,9 +118,9 @@ def _cause(protocol: Protocol, raw: bytes, baud: int, *, marked: bool) -> str:
 
 
 def parity_in(raw: bytes) -> str:
-    """Return which parity the highest bits of bytes have, empty where they have none throughout.
+    """Return the parity in the highest bits, or empty.
 
-    By chance a byte has the one or the other, so a dozen of the same is chance once in 4096 times; fewer are not believed.
+    A dozen equal parities occur by chance once in 4096 times; fewer do not count.
     """
     even = sum(byte.bit_count() % 2 == 0 for byte in raw)
     if len(raw) < _TELLING_BYTES or 0 < even < len(raw):

@@ -1,4 +1,4 @@
-"""The parts of a frame with which a device speaks for itself: text in its own words, and numbers of errors."""
+"""Parts of a frame with a device's own words and error numbers."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _PRINTABLE = b"[\\x20-\\x7e]"
 
 
 class Text(Schema):
-    """Printable characters in the device's own words; they are put behind what the frame means.
+    """The device's own words, appended to the frame's meaning.
 
     Attributes:
         width: characters; None: 1 to `max_width`.
-        written: what the virtual instrument says.
+        written: by the virtual instrument.
     """
 
     kind: Literal["text"]
@@ -36,7 +36,7 @@ class Text(Schema):
         return self
 
     def pattern(self) -> bytes:
-        """Return the regular expression of printable characters."""
+        """Return the pattern of printable characters."""
         return _PRINTABLE + (b"{%d}" % self.width if self.width else b"{1,%d}" % self.max_width)
 
     def read(self, raw: bytes, found: FrameParts) -> None:
@@ -44,15 +44,15 @@ class Text(Schema):
         found.text = raw.decode("ascii").strip()
 
     def write(self, content: Content) -> bytes:  # noqa: ARG002 (every part has this signature)
-        """Return the words of the virtual instrument."""
+        """Return the virtual instrument's words."""
         return self.written.ljust(self.width or 0).encode("ascii")
 
 
 class ErrorTable(Schema):
-    """The number of an error, with what each means; a number that is not listed is reported as it is.
+    """Error numbers with meanings; unknown ones are reported as they are.
 
     Attributes:
-        codes: what is known; the first is what the virtual instrument says of a fault that no other code fits better.
+        codes: the first stands for any other fault in the virtual instrument.
     """
 
     kind: Literal["errors"]
@@ -74,12 +74,12 @@ class ErrorTable(Schema):
         return len(self.codes[0].code)
 
     def pattern(self) -> bytes:
-        """Return the regular expression of the codes and of anything else that is as wide."""
+        """Return the pattern of the codes and others of equal width."""
         known = b"|".join(re.escape(code.code) for code in self.codes)
         return b"(?:" + known + b"|" + _PRINTABLE + b"{%d})" % self.width
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Take what the code means; it is more exact than what the frame means."""
+        """Take the code's meaning, more exact than the frame's."""
         code = next((one for one in self.codes if one.code == raw), None)
         if code is None:
             found.text = f"code {raw.decode('ascii')}, which its protocol file does not list"
@@ -87,5 +87,5 @@ class ErrorTable(Schema):
         found.status, found.said, found.remedy = code.status, code.means, code.remedy or found.remedy
 
     def write(self, content: Content) -> bytes:
-        """Return the code of the status to report, or the first."""
+        """Return the status's code, or the first."""
         return next((one.code for one in self.codes if one is content.voice), self.codes[0].code)

@@ -1,9 +1,8 @@
-"""What all runs of a session may have in common: programs that were mirrored, turned or run the wrong way round, and another bar.
+"""Faults common to all runs: programs mirrored, turned or reversed, and another bar.
 
-Such a session agrees with itself: both directions of each test do, and no run stands out. But forms of several tests, each mirrored about
-its own place, are no forms that one hexapod makes; and a machine that makes all circles larger by the same makes them odd in other ways too.
-So ways in which the whole session may have been run are compared by the likelihood of all readings together. The chance that sound runs favour
-another way by a factor of f or more is 1 / f at the most [Markov's inequality].
+Such a session agrees with itself, but mirrored forms of several tests fit no hexapod, and a uniformly oversized machine
+errs in other ways too. Ways to have run the session are compared by likelihood. Sound runs favour another way by f or
+more with a chance of at most 1 / f [Markov's inequality].
 """
 
 from __future__ import annotations
@@ -46,8 +45,8 @@ class Way:
 
     Attributes:
         label: in the shop's words.
-        reverses: whether the machine turned the other way than its programs say.
-        begin_deg: angle from +X at which a circle began that should have begun at a given one [deg].
+        reverses: whether the machine turned against its programs.
+        begin_deg: angle from +X where a circle began instead of a given one.
     """
 
     label: str
@@ -72,10 +71,10 @@ KEEPING, REVERSING = (tuple(way for way in WAYS if way.reverses is reverses) for
 
 
 def programs_of_all(runs: Sequence[Seen]) -> Finding:
-    """Return whether all runs together are likelier those of programs that ran in another way than the plan's.
+    """Test whether programs ran in another way than planned.
 
     Args:
-        runs: all that count. Those of which the other direction was measured on the same mounting are used, from two tests on.
+        runs: all that count; used are those with the other direction on the same mounting, from two tests on.
     """
     pairs = [(one, other) for one in runs if (other := _other_direction(one, runs)) is not None]
     if len({one.run.test for one, _ in pairs}) < FEWEST_TESTS:
@@ -111,9 +110,9 @@ def programs_of_all(runs: Sequence[Seen]) -> Finding:
 
 
 def bar_of_all(runs: Sequence[Seen], *, by_model: bool) -> Finding:
-    """Return whether all runs together are likelier those of a bar of another length.
+    """Test whether the bar had another length.
 
-    Without a model a machine that makes all circles larger by as much explains the same readings, an odd one: then it cannot be told.
+    Without a model, an oversized machine explains the same readings, and it is undecided.
 
     Args:
         by_model: whether a model says where circles lie.
@@ -140,7 +139,7 @@ def bar_of_all(runs: Sequence[Seen], *, by_model: bool) -> Finding:
 
 
 def _other_direction(one: Seen, runs: Sequence[Seen]) -> Seen | None:
-    """The run of the same test and mounting in the other direction, of which it is known where it should lie."""
+    """Return the other direction of the same test and mounting with known place."""
     if one.run.expected is None:
         return None
     others = (
@@ -158,7 +157,7 @@ def _run_as(one: Seen, other: Seen) -> Seen:
 
 
 def _begun(read: NDArray[np.float64], circle: Circle, way: Way) -> NDArray[np.float64]:
-    """Coefficients of a circle along its travel, counted from the start of the plan, if it began where a way has it, shape (7,) [µm]."""
+    """Return coefficients along the travel if the circle began by a way, shape (7,) [µm]."""
     ahead = np.radians(circle.direction.sign * (way.begin_deg(circle.start_deg) - circle.start_deg))
     angles = ahead * np.arange(1, HIGHEST_HARMONIC + 1)
     mean, cosines, sines = np.split(read, [1, HIGHEST_HARMONIC + 1])
@@ -167,14 +166,14 @@ def _begun(read: NDArray[np.float64], circle: Circle, way: Way) -> NDArray[np.fl
 
 
 class _Likelihood:
-    """How likely readings are by ways in which programs may have run, whatever the size of the machine's errors.
+    """Likelihood of readings by ways, for any size of machine errors.
 
     Args:
-        read: coefficients of each along the travel of the plan, shape (7,) each [µm].
-        longer: whether what a longer bar reads is wanted, too.
+        read: along the plan's travel, shape (7,) each [µm].
+        longer: include readings of a longer bar.
 
     Attributes:
-        logarithms: of the likelihood by each way, shape (k,).
+        logarithms: by way, shape (k,).
     """
 
     def __init__(
@@ -191,10 +190,10 @@ class _Likelihood:
         self.logarithms = logsumexp(self._by_size[:, : len(ways)], axis=0)
 
     def fits(self, way: int, longer_um: float = 0.0) -> bool:
-        """Return whether the readings are as near to what is expected as those of a machine with the causes that are known.
+        """Return whether readings fit a machine with the known causes.
 
         Args:
-            longer_um: by how much the bar reads too long [µm].
+            longer_um: excess of the bar's reading.
         """
         off = self._few.off[:, way] - (longer_um * self._few.off[:, -1] if longer_um else 0.0)
         distances = [float(np.sum(off**2 / self._few.variances(float(size)))) for size in SIZES]
@@ -205,7 +204,7 @@ class _Likelihood:
         return distances[int(np.argmin(unlikeliness))] <= length_quantile(self._dimensions) ** 2
 
     def gained(self, sigma_um: float) -> tuple[float, float]:
-        """Return by how much a longer bar makes the readings likelier, as a logarithm, and how much longer it is [µm]."""
+        """Return the log gain of a longer bar, and its excess [µm]."""
         off, column = self._few.off.T
         logarithms, amounts = [], []
         for size in SIZES:

@@ -1,4 +1,4 @@
-"""One word on a run at the machine, before any number: GOOD, REPEAT or CANNOT TELL; what caused it first, and what to do about that."""
+"""One word on a run: GOOD, REPEAT or CANNOT TELL, with cause and remedy."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Advice(StrEnum):
-    """The word; the text is what people read."""
+    """The word, as people read it."""
 
     GOOD = "GOOD"
     REPEAT = "REPEAT"
@@ -25,8 +25,8 @@ class RunAssessment:
     """What to do with a run.
 
     Attributes:
-        causes: of REPEAT, the one first that explains most of those behind it: what was found, and what to do, a sentence each.
-        unseen: of CANNOT TELL, what could be wrong and shows in nothing that was measured so far.
+        causes: of REPEAT, the most explanatory first: finding and remedy, a sentence each.
+        unseen: of CANNOT TELL, possible faults that no measurement shows yet.
     """
 
     word: Advice
@@ -37,11 +37,11 @@ class RunAssessment:
 def answer(findings: Sequence[Finding], problem: str = "") -> RunAssessment:
     """Return the word on a run.
 
-    REPEAT where anything is wrong. CANNOT TELL where nothing is, and there is a fault that no decided finding would have shown.
-    GOOD where every fault of `SHOWN_BY` would have shown. Without findings nothing was looked for: CANNOT TELL.
+    REPEAT for any fault. CANNOT TELL without fault, if some fault of `SHOWN_BY` would not have shown, or without
+    findings. Else GOOD.
 
     Args:
-        problem: why the recording holds no circle; empty where it does.
+        problem: why there is no circle; may be empty.
     """
     wrong = [one for one in findings if one.wrong]
     if problem and not any(one.name is Name.CIRCLE for one in wrong):
@@ -55,12 +55,12 @@ def answer(findings: Sequence[Finding], problem: str = "") -> RunAssessment:
 
 
 def _doubted(finding: Finding) -> bool:
-    """Whether readings favour a fault, and something else may explain them too."""
+    """Return whether a fault is likely but not the only explanation."""
     return bool(finding.value) and finding.verdict is FindingVerdict.CANNOT_TELL
 
 
 def cause_of(finding: Finding) -> str:
-    """Return what a finding that is wrong found, in short, and what to do."""
+    """Return a wrong finding in short, and its remedy."""
     if finding.name is Name.CIRCLE:  # its text has what to do
         return finding.text
     numbers = "" if finding.value is None else f" {finding.value:.2f}"
@@ -93,7 +93,7 @@ limit they are: a limit is the same probability for all."""
 
 
 def rank(finding: Finding) -> tuple[int, float]:
-    """Return what findings are sorted by, the one first that explains most of those behind it."""
+    """Return a sort key: the most explanatory finding first."""
     place = next(k for k, names in enumerate(EXPLAINS) if finding.name in names)
     return place, -(finding.value / finding.limit if finding.value is not None and finding.limit else 0.0)
 

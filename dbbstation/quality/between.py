@@ -1,4 +1,4 @@
-"""Findings about a run beside others of its test: wrong direction, against the other direction, against the repeat."""
+"""Compare a run with others of its test: direction, opposite direction, repeat."""
 
 from __future__ import annotations
 
@@ -20,18 +20,15 @@ if TYPE_CHECKING:
 
 
 def direction(one: Seen, others: Others, expected: Expected | None = None) -> Finding:
-    """Whether the circle was run in the direction that its name says.
+    """Judge whether the circle ran in its named direction.
 
-    A bar does not see which way the machine turns: feed-in and feed-out look alike, and either overlap passes its places twice.
-    A circle that was run the wrong way shows its form mirrored about the axis through the start of the turn. So it can be seen
-    where the circle lies off that axis and something says on which side: the expected centre, the other direction or a
-    repeat. Lag and friction of drives change sign with the direction too, and would look like a mirror image; but they come
-    back after half a turn, where both the speed and the direction of the bar are reversed: they have even undulations only
-    [linear in the speed, or in its sign]. Odd ones, the centre above all, are compared.
+    A bar does not see the direction. A reversed circle shows its form mirrored about the axis through the start. It is
+    visible if the circle lies off that axis and the expected centre, the other direction or a repeat shows the side. Lag
+    and friction change sign with direction too, but repeat after half a turn: they have only even undulations [linear in
+    the speed, or in its sign]. Odd ones are compared.
 
     Args:
-        others: what other runs of its session show.
-        expected: where its circle should lie, by whatever says so best; None where nothing does.
+        expected: best knowledge of its circle; None if unknown.
     """
     by_place = _by_place(one, expected)
     if by_place is not None:
@@ -59,7 +56,7 @@ def direction(one: Seen, others: Others, expected: Expected | None = None) -> Fi
 def _across_limits(
     one: Seen, against: Seen, others: Others, off: NDArray[np.float64], mirrored: NDArray[np.float64]
 ) -> tuple[float, float] | None:
-    """Greatest distance from another run, and from its mirror image, of a sound circle [µm]; None where nothing is known."""
+    """Return a sound circle's greatest distance from another run and from its mirror image [µm], or None."""
     covariance = covariance_apart(one, against)
     rows = np.ix_(ACROSS, ACROSS)
     stated = None if covariance is None else [limit_along(covariance[rows], each) for each in (off, mirrored)]
@@ -74,7 +71,7 @@ def _across_limits(
 
 
 def _by_place(one: Seen, expected: Expected | None) -> Finding | None:
-    """Judge by the expected centre; None where it cannot decide."""
+    """Judge by the expected centre; None if undecided."""
     if expected is None or not expected.place_known or one.analysis is None:
         return None
     start = np.radians(one.run.circle.start_deg)
@@ -111,12 +108,11 @@ def repeat(one: Seen, others: Others) -> Finding:
 def _beside(
     name: Name, one: Seen, other: Seen, usual: Sequence[tuple[float, float]], sigmas: Sequence[float]
 ) -> Finding:
-    """Hold a run against another of its test.
+    """Compare a run with another of its test.
 
-    Few other pairs say little: then the limit is what plan, machine file and usual sizes of causes allow in the direction in which
-    both differ. Enough other pairs say more of this machine: how they scatter limits a run, and where they scatter by more than is
-    stated, that limit grows with them. No limit is above what is stated allows in any direction, and none below what noise and the
-    plan leave open.
+    With few other pairs the limit is what plan, machine file and usual causes allow along the difference. Enough pairs
+    limit by their scatter, and raise the limit if they scatter more than stated. The limit stays between what noise and
+    plan leave open and the largest stated allowance.
     """
     off = one.coefficients_um - other.coefficients_um
     value = float(np.linalg.norm(off))

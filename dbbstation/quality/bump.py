@@ -1,4 +1,4 @@
-"""A place where the path leaves its own form: a knock, a chip under a ball, a cable that pulled."""
+"""A place where the path leaves its form: a knock, a chip, a pulling cable."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ FEWEST = 3
 
 @dataclass(frozen=True)
 class _Peak:
-    """The stretch that sticks out most, against its limit [µm, deg]."""
+    """The most outstanding stretch, against its limit [µm, deg]."""
 
     height_um: float
     limit_um: float
@@ -48,13 +48,12 @@ class _Peak:
 
 
 def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
-    """Return the stretch that sticks out most of the path's form.
+    """Judge the most outstanding stretch of the path.
 
-    Away from reversals of struts the limit follows from noise and from the scatter of all stretches; at reversals, where
-    machines have steps and spikes, from what the other reversals of the turn show.
+    The limit follows from noise and the scatter of stretches, and at reversals from the turn's other reversals.
 
     Args:
-        reversals_deg: angles at which struts turn round; none where they are not known [deg].
+        reversals_deg: angles at which struts reverse; may be empty.
     """
     rest = one.residual_um - gaussian(one.raw.phi_deg, one.residual_um, FORM_UPR)
     near = near_reversals(one.raw.theta_deg, reversals_deg)
@@ -78,11 +77,10 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
 def near_reversals(
     theta_deg: NDArray[np.float64], reversals_deg: Sequence[float], reach_deg: float = REVERSAL_DEG
 ) -> NDArray[np.int64]:
-    """Return the number of the reversal that each sample lies beside, -1 for none, shape (n,).
+    """Return the reversal near each sample, -1 for none, shape (n,).
 
     Args:
-        theta_deg: angles of the samples, 0 to 360, shape (n,) [deg].
-        reversals_deg: angles at which struts turn round [deg].
+        theta_deg: 0 to 360, shape (n,).
     """
     near = np.full(len(theta_deg), -1, dtype=np.int64)
     for number, place in enumerate(reversals_deg):
@@ -92,7 +90,7 @@ def near_reversals(
 
 
 def _peaks(one: CircleAnalysis, rest: NDArray[np.float64], near: NDArray[np.int64], width_deg: float) -> list[_Peak]:
-    """Greatest mean of stretches of a width, away from reversals and at each of them."""
+    """Return the greatest mean of stretches of a width, away from reversals and at each."""
     samples = max(round(width_deg / FULL_TURN_DEG * len(rest)), 1)
     if samples < FEWEST and width_deg < WIDTHS_DEG[-1]:
         return []

@@ -1,4 +1,4 @@
-"""What a figure with an uncertainty says of a limit."""
+"""Decide about a limit with uncertainty."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class Conformity(StrEnum):
-    """What a figure with an uncertainty says of a limit, by the decision rule of ISO 14253-1."""
+    """Decision about a limit by ISO 14253-1."""
 
     WITHIN = "within"
     """The limit is kept, whatever the figure is within U."""
@@ -22,8 +22,8 @@ class Size:
     """A figure of one circle as measured.
 
     Attributes:
-        u_um: its standard uncertainty [µm]; None where a cause of unknown size counts.
-        why_not: why it has none; empty where it has one.
+        u_um: standard uncertainty; None if a cause of unknown size counts.
+        why_not: may be empty.
     """
 
     um: float

@@ -1,9 +1,7 @@
-"""Readings that stand in two runs: a file that came in twice, a player that repeats itself, one direction's file under the name of the other.
+"""Readings that occur in two runs: a double file, a repeating player, a wrong name.
 
-Such a run is as sound as the one it comes from. It brings nothing new: a repeat that agrees to the last digit shows no scatter, and two
-directions of one file no reversal. Two runs of one circle have the same form, and noise of their own. Whatever the other run reads, the
-next reading is the same with the probability of `quality.held` at the most; k in a row, somewhere in one run and somewhere in the other,
-less often than that to the power k, times the number of both places.
+A copy brings nothing new. Two runs of one circle share form, not noise. The next reading equals a given one with at most
+the probability of `quality.held`; k in a row at most that to the power k, times both numbers of places.
 """
 
 from __future__ import annotations
@@ -39,7 +37,7 @@ BASE = 0x9E3779B97F4A7C15
 
 
 def copied(one: Seen, others: Sequence[Seen]) -> Finding:
-    """Return how many readings of the turn stand, in the same order, in another run of the session."""
+    """Judge how many readings of the turn occur in order in another run."""
     assert one.analysis is not None  # noqa: S101 - asked before
     raw = one.analysis.raw
     chance = _chance(one.analysis)
@@ -66,7 +64,7 @@ def copied(one: Seen, others: Sequence[Seen]) -> Finding:
 
 
 def _chance(analysis: CircleAnalysis) -> float:
-    """Return how probable it is at the most that a sound reading is any given number; one where no bound is known."""
+    """Return a bound of the probability that a sound reading equals a given number; one if unknown."""
     noise = analysis.noise
     if not noise.known or not np.ptp(analysis.raw.length_mm):
         return 1.0
@@ -80,9 +78,9 @@ def _chance(analysis: CircleAnalysis) -> float:
 
 
 def _may_share(one: Seen, other: Seen, row: int) -> bool:
-    """Return whether two neighbouring blocks of a run begin with readings that follow one another in another run.
+    """Return whether neighbouring blocks of a run begin with successive readings of another.
 
-    Otherwise `_shared` is zero. Stretches of the other run are sorted once for each length, which is a power of two.
+    Else `_shared` is zero. The other run's stretches are sorted once for each power-of-two length.
     """
     assert one.analysis is not None  # noqa: S101 - asked before
     assert other.analysis is not None  # noqa: S101 - asked before
@@ -99,14 +97,14 @@ def _may_share(one: Seen, other: Seen, row: int) -> bool:
 
 
 def _shared(own_mm: NDArray[np.float64], other_mm: NDArray[np.float64], row: int) -> int:
-    """Return how many of a run's readings stand in stretches that another run has too.
+    """Return how many readings stand in common stretches.
 
-    Stretches are looked up in blocks of half the length that chance allows: a common stretch of that length holds a whole one.
+    Blocks of half the length that chance allows suffice: a common stretch holds a whole one.
 
     Args:
-        own_mm: readings of the run, shape (n,) [mm].
-        other_mm: of the other, shape (m,) [mm].
-        row: equal readings in a row that chance does not make.
+        own_mm: shape (n,).
+        other_mm: shape (m,).
+        row: equal readings in a row beyond chance.
     """
     block = (row + 1) // 2
     if min(len(own_mm), len(other_mm)) < row:
@@ -120,6 +118,6 @@ def _shared(own_mm: NDArray[np.float64], other_mm: NDArray[np.float64], row: int
 
 
 def _stretches(length_mm: NDArray[np.float64], block: int) -> NDArray[np.uint64]:
-    """One number for each stretch of so many readings, shape (n - block + 1,)."""
+    """Return one number for each stretch, shape (n - block + 1,)."""
     weights = np.array([pow(BASE, k, 2**64) for k in range(block)], dtype=np.uint64)
     return np.convolve(np.ascontiguousarray(length_mm).view(np.uint64), weights, mode="valid")

@@ -1,4 +1,4 @@
-"""One finding: a number, the limit that chance keeps it under, and what both say."""
+"""One finding: a number, its limit by chance, and their meaning."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dbbstation.facts.serialise import Kept
 
 
 class Name(StrEnum):
-    """What is looked for, in the order in which they are listed."""
+    """Kinds of findings in listing order."""
 
     CIRCLE = "circle"
     """The recording shows no full circle: nothing else can be judged."""
@@ -50,11 +50,10 @@ class Finding:
     """One thing that was looked for in one run.
 
     Attributes:
-        value: the number found; None where there is none.
-        limit: greatest value of a sound run; None where none can be given.
-        verdict: whether the value keeps the limit.
-        text: what was found, where, and what to do where it is wrong; why it cannot be decided where it cannot.
-        short: the same in the fewest words; empty where name, value and limit are that.
+        value: or None.
+        limit: of a sound run, or None.
+        text: finding, place and remedy; or why undecided.
+        short: may be empty if name, value and limit suffice.
     """
 
     name: Name
@@ -67,29 +66,23 @@ class Finding:
 
     @property
     def wrong(self) -> bool:
-        """Whether the run should not be used as it is."""
+        """Return whether the run must not be used as it is."""
         return self.verdict is FindingVerdict.WRONG
 
 
 def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: str, short: str = "") -> Finding:
-    """Return a finding of a value that a limit is held against.
-
-    Args:
-        limit: greatest that is sound.
-        sound: text where the limit is kept.
-        short: what was found, in the fewest words.
-    """
+    """Return a finding by value and limit."""
     verdict = FindingVerdict.WRONG if value > limit else FindingVerdict.GOOD
     return Finding(name, value, limit, unit, verdict, wrong if verdict is FindingVerdict.WRONG else sound, short)
 
 
 def undecided(name: Name, why: str, unit: str = "", value: float | None = None) -> Finding:
-    """Return a finding that cannot be decided, and why."""
+    """Return an undecided finding with its reason."""
     return Finding(name, value, None, unit, FindingVerdict.CANNOT_TELL, why)
 
 
 def against_limit(finding: Finding) -> str:
-    """Return a finding's number and limit with their unit, as far as there are any."""
+    """Return number and limit with unit, if any."""
     if finding.value is None:
         return ""
     limit = "" if finding.limit is None else f" of {finding.limit:.2f}"
@@ -97,15 +90,14 @@ def against_limit(finding: Finding) -> str:
 
 
 def stricter(one: Finding, other: Finding) -> Finding:
-    """Return of two findings of the same thing, held against what two bodies of knowledge say, the one that leaves less open.
+    """Return the finding by the knowledge that leaves less open.
 
-    A sound run agrees with both. Wrong goes before good, and good before what cannot be told. Of two that are decided alike the
-    one counts that has more of its limit. Whether another circle explains the readings better is asked of all circles that a
-    body of knowledge holds: who knows fewer of them does not settle what the other one cannot tell.
+    Wrong precedes good, which precedes undecided. Equal decisions rank by use of their limit. For better fitting circles,
+    the knowledge with more circles decides.
 
     Args:
-        one: by the body of knowledge that holds more circles.
-        other: by the one that holds fewer.
+        one: by more circles.
+        other: by fewer.
     """
     if one.wrong or other.wrong:
         return max((each for each in (one, other) if each.wrong), key=_share)

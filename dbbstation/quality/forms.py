@@ -1,8 +1,7 @@
-"""Forms of runs that share causes, as few numbers: what many runs say of the machine costs no more than what a few say.
+"""Forms of runs that share causes, as few numbers whatever the number of runs.
 
-The covariance of n forms is that of the machine's causes, of what several places share, and of what each place has alone: noise, and a
-ball's seat. What a place has alone is made white, place by place. An orthogonal transformation then leaves as many rows as there are
-causes, whatever n is, and no likelihood changes [Bierman, Factorization Methods for Discrete Sequential Estimation (1977), ch. V].
+Each place's own part of the covariance (noise, seat) is whitened. An orthogonal transformation leaves as many rows as
+causes and keeps likelihoods [Bierman, Factorization Methods for Discrete Sequential Estimation (1977), ch. V].
 """
 
 from __future__ import annotations
@@ -42,15 +41,15 @@ UNMOVED = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Forms:
-    """Forms of runs along their travel, whitened, and what causes do to them.
+    """Whitened forms of runs along their travel, and effects of causes.
 
     Attributes:
-        machine: what the machine's causes at their usual or stated size do to each row, shape (r, p).
-        rest: what all else does that several places share, shape (r, q).
-        off: columns of forms less what is expected without other runs, shape (r, k).
-        log_determinant: of the covariance of what each place has alone, before it was made white.
+        machine: effects of machine causes at usual or stated size, shape (r, p).
+        rest: other shared effects, shape (r, q).
+        off: forms less expectation, shape (r, k).
+        log_determinant: of the own covariance before whitening.
         dimensions: coefficients of each test.
-        root: makes the rows of one place coefficients again, shape (r, r) [µm]; empty for several places.
+        root: from rows of one place to coefficients, shape (r, r) [µm]; empty for several.
     """
 
     machine: NDArray[np.float64]
@@ -62,7 +61,7 @@ class Forms:
     root: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
     def apart(self) -> Independent:
-        """Return as many rows as there are causes and columns, no two of which share a cause: an orthogonal transformation."""
+        """Return an orthogonal transformation to as many rows as causes and columns, with separate causes."""
         p, q = self.machine.shape[1], self.rest.shape[1]
         few = np.hstack([self.machine, self.rest, self.off])
         if len(few) > few.shape[1]:
@@ -78,13 +77,13 @@ class Forms:
 
 @dataclass(frozen=True, eq=False)
 class Independent:
-    """Rows that are independent, whatever the size of the machine's errors.
+    """Rows that are independent for any size of machine errors.
 
     Attributes:
-        machine: what the machine's causes at their usual or stated size do to each row, shape (r, p).
-        rest: what all else does that several places share, shape (r, q).
-        off: columns of forms less what is expected without other runs, shape (r, k).
-        variance: of each row by the machine's causes, beside one by all else, shape (r,).
+        machine: effects of machine causes at usual or stated size, shape (r, p).
+        rest: other shared effects, shape (r, q).
+        off: forms less expectation, shape (r, k).
+        variance: by machine causes, beside one by all else, shape (r,).
     """
 
     machine: NDArray[np.float64]
@@ -94,24 +93,24 @@ class Independent:
     log_determinant: float
 
     def variances(self, size: float | NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return those of the rows if errors of the machine are so many times their usual size, shape (r,)."""
+        """Return row variances at a multiple of usual machine errors, shape (r,)."""
         return 1.0 + size**2 * self.variance
 
     def log_likelihoods(self) -> NDArray[np.float64]:
-        """Return the logarithm of the density of each column, by each of SIZES, shape (9, k); without a constant."""
+        """Return each column's log density by each of SIZES, shape (9, k), without a constant."""
         variances = self.variances(SIZES[:, None])
         squares: NDArray[np.float64] = (1.0 / variances) @ self.off**2
         return -0.5 * (squares + np.sum(np.log(variances), axis=1)[:, None] + self.log_determinant)
 
 
 def _whitening(shared: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Axes of rows with a variance of one and causes that they share, and the standard deviation along each."""
+    """Return axes with unit variance and shared causes, and standard deviations along them."""
     axes, sizes, _ = np.linalg.svd(shared)
     return axes, np.sqrt(1.0 + np.pad(sizes, (0, len(axes) - len(sizes))) ** 2)
 
 
 def stacked(forms: Sequence[Forms]) -> Forms:
-    """Return the rows of several above one another, and of places of one test no more than causes tell apart."""
+    """Return stacked rows, for one test no more than causes distinguish."""
     of_test: dict[tuple[str, ...], list[Forms]] = {}
     for each in forms:
         of_test.setdefault(tuple(each.dimensions), []).append(each)
@@ -130,7 +129,7 @@ def _above(forms: Sequence[Forms]) -> Forms:
 
 
 def _repeated(forms: Forms) -> Forms:
-    """Return repeats of one test in rows that causes move, and in one row a column for all others, which have noise alone."""
+    """Return repeats in rows that causes move, and one row of noise per column."""
     p, q = forms.machine.shape[1], forms.rest.shape[1]
     together = np.hstack([forms.machine, forms.rest])
     axes, sizes, _ = np.linalg.svd(together, full_matrices=len(together) > p + q)
@@ -143,11 +142,11 @@ def _repeated(forms: Forms) -> Forms:
 
 
 def by_place(runs: Sequence[Seen], off_um: Sequence[NDArray[np.float64]]) -> list[Forms]:
-    """Return the forms of runs, place by place: those of one test on one mounting.
+    """Return the forms by place: one test on one mounting.
 
     Args:
-        runs: n runs, of which it is known where they should lie.
-        off_um: columns of forms of each along its travel, less what is expected without other runs, shape (7, k) each [µm].
+        runs: n, with known places.
+        off_um: forms along the travel less expectation, shape (7, k) each.
     """
     effects = [_effects(each) for each in runs]
     places: dict[tuple[str, str], list[int]] = {}
@@ -191,7 +190,7 @@ def by_place(runs: Sequence[Seen], off_um: Sequence[NDArray[np.float64]]) -> lis
 
 
 def own_um2(one: Seen) -> NDArray[np.float64]:
-    """Variance of each coefficient that a run shares with no other, shape (7,) [µm²]."""
+    """Return each coefficient's own variance, shape (7,) [µm²]."""
     own = np.full(COEFFICIENTS, max(0.5 * unseen_um2(one, one), LEAST_UM2))
     if one.run.expected is not None and not one.run.expected.place_known:
         own[[FIRST_COSINE, FIRST_SINE]] += ANYWHERE_UM**2

@@ -1,9 +1,8 @@
-"""A length that stands still though its gauge is read: a plunger that sticks, a gauge at its stop, a display that holds.
+"""A length that stands still: stuck plunger, stop, held display.
 
-Readings scatter. With a white part of standard deviation sigma and a step r in which they come, the next reading is any given value
-with a probability of r / (sigma sqrt(2 pi)) at the most, the greatest density of a normal variable times the step, whatever the form
-of the circle and whatever else the noise remembers. n equal readings in a row are therefore less likely than that to the power n - 1.
-Where the step is not finer than the noise the bound is no bound, and equal readings say nothing.
+With white noise sigma and step r, the next reading equals any value with at most r / (sigma sqrt(2 pi)), the greatest
+normal density times the step. So n equal readings have at most that to the power n - 1. A step coarser than the noise
+gives no bound.
 """
 
 from __future__ import annotations
@@ -36,11 +35,11 @@ ROUNDED = 1.0 / 12.0
 
 
 def chance_equal(squares_mm2: float, count: int, step_mm: float) -> float:
-    """Return how probable it is at the most that a sound reading is the same as the one before; one where no bound is known.
+    """Return a bound of the probability that a sound reading repeats the last; one if unknown.
 
     Args:
-        squares_mm2: sum of the squares of second differences where the length does not stand still [mm²].
-        step_mm: smallest difference of two readings [mm].
+        squares_mm2: sum of squared second differences while moving [mm²].
+        step_mm: smallest difference of two readings.
     """
     if not count or not 0.0 < step_mm < inf:
         return 1.0
@@ -49,13 +48,13 @@ def chance_equal(squares_mm2: float, count: int, step_mm: float) -> float:
 
 
 def chance_of(variance_mm2: float, step_mm: float) -> float:
-    """Return the same from a variance of the readings, rounding included [mm²]."""
+    """Return the same from a variance of readings, rounding included [mm²]."""
     finer = sqrt(max(variance_mm2 - ROUNDED * step_mm**2, 0.0) * 2.0 * pi) / step_mm
     return 1.0 / finer if finer > 1.0 else 1.0
 
 
 def moving_noise(raw: RawCircle) -> tuple[float, int, float]:
-    """Return what `chance_equal` is worked out of, from the readings of a turn that do not stand still.
+    """Return the inputs of `chance_equal` from moving readings of a turn.
 
     Returns:
         Sum of the squares of second differences [mm²], how many they are, smallest difference of two readings [mm].
@@ -69,11 +68,11 @@ def moving_noise(raw: RawCircle) -> tuple[float, int, float]:
 
 
 def equal_limit(squares_mm2: float, count: int, step_mm: float, readings: float) -> float:
-    """Return how many equal readings in a row a sound turn has with probability SHARE at the most.
+    """Return how many equal readings in a row a sound turn has with probability SHARE at most.
 
     Args:
-        squares_mm2: sum of the squares of second differences where the length does not stand still [mm²].
-        step_mm: smallest difference of two readings [mm].
+        squares_mm2: sum of squared second differences while moving [mm²].
+        step_mm: smallest difference of two readings.
 
     Returns:
         Their number; infinite where the step is not finer than the noise, by the lower limit of what is known of it.
@@ -84,11 +83,11 @@ def equal_limit(squares_mm2: float, count: int, step_mm: float, readings: float)
 
 @dataclass
 class HeldLength:
-    """Takes readings of a turn one by one, and tells when they have stood still for longer than sound ones do.
+    """Takes readings of a turn and reports a standstill longer than sound ones.
 
     Attributes:
-        since_s: time of the first of the last equal readings [s].
-        step_mm: smallest difference of two readings so far [mm]; infinite before two differ.
+        since_s: first of the last equal readings.
+        step_mm: smallest difference so far; infinite before two differ.
     """
 
     since_s: float = 0.0
@@ -102,14 +101,14 @@ class HeldLength:
     _pending: float = 0.0
 
     def restart(self) -> None:
-        """Begin another run; what is known of the noise is kept."""
+        """Begin another run; the noise is kept."""
         self.equal, self._last, self._before, self._pending = 0, None, None, 0.0
 
     def add(self, t_s: float, length_mm: float, *, noise: bool = True) -> None:
-        """Take the next reading; noise is read where the length moves at least once a second.
+        """Take a reading; noise is read at least once a second of motion.
 
         Args:
-            noise: whether differences may be noise; False where the machine feeds out.
+            noise: whether differences are noise; False during feed-out.
         """
         if self._last is None or length_mm != self._last:
             if self._last is not None and noise:
@@ -125,14 +124,14 @@ class HeldLength:
 
     @property
     def held_s(self) -> float:
-        """How long the length has stood still [s]."""
+        """Return the duration of the standstill [s]."""
         return self._last_s - self.since_s if self.equal else 0.0
 
     def stands(self, readings: float) -> bool:
-        """Whether the length stands still though sound readings would not.
+        """Return whether the length stands still against sound readings.
 
         Args:
-            readings: of a whole turn, about.
+            readings: of a whole turn, approximately.
         """
         if self.held_s < SHORTEST_S:
             return False
@@ -140,7 +139,7 @@ class HeldLength:
 
 
 def held(raw: RawCircle) -> Finding:
-    """Return the longest stretch of the turn over which all readings are the same."""
+    """Judge the longest stretch of equal readings."""
     ends = np.flatnonzero(np.diff(raw.length_mm) != 0.0)
     if not len(ends):
         return undecided(Name.HELD, "all readings of the turn are the same: the step is not finer than the noise", "s")

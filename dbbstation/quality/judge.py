@@ -1,4 +1,4 @@
-"""All findings of all runs of a session."""
+"""All findings of a session's runs."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Judgement:
     """What was found of one run.
 
     Attributes:
-        analysis: its figures without a filter; None where it shows no circle.
-        findings: all that was looked for, in the order of `Name`.
+        analysis: without filter; None without circle.
+        findings: in the order of `Name`.
     """
 
     run: Run
@@ -43,17 +43,16 @@ class Judgement:
 
     @property
     def wrong(self) -> tuple[Finding, ...]:
-        """Findings that pass their limit."""
+        """Return findings beyond their limit."""
         return tuple(finding for finding in self.findings if finding.wrong)
 
 
 @with_one_thread
 def judge(runs: Sequence[Run], progress: Callable[[int, int], None] = lambda _done, _of: None) -> tuple[Judgement, ...]:
-    """Judge the runs of one session, each beside all others.
+    """Judge a session's runs, each beside all others.
 
     Args:
-        runs: in the order in which they were recorded.
-        progress: called with how many of how many are analysed.
+        runs: in recording order.
     """
     known = []
     for done, run in enumerate(runs):
@@ -87,16 +86,16 @@ class _Pair:
 
     @cached_property
     def local_um(self) -> float | None:
-        """How far they differ at places [µm]; None where samples are too few."""
+        """Return the local difference [µm]; None for too few samples."""
         known = self.one.local_um.any() and self.other.local_um.any()
         return locally_apart_um(self.one, self.other) if known else None
 
 
 class SessionRuns:
-    """The runs of one session, analysed, with their pairs; judges any of them, and a new one beside them.
+    """A session's analysed runs with pairs; judges any of them or a new one.
 
     Args:
-        runs: in the order in which they were recorded.
+        runs: in recording order.
     """
 
     def __init__(self, runs: Sequence[Seen], known: SessionRuns | None = None) -> None:
@@ -122,9 +121,9 @@ class SessionRuns:
 
     @with_one_thread
     def judge(self, one: Seen) -> Judgement:
-        """Judge one run, of these or another of the same session.
+        """Judge one run of the same session.
 
-        Where there is a model, a run must agree with it, and with what other runs show of a machine whose errors have usual sizes.
+        With a model, a run must agree with it and with other runs of a usual machine.
         """
         others = self._others(one)
         findings = list(by_itself(one, others))
@@ -193,7 +192,7 @@ class SessionRuns:
         )
 
     def _opposite(self, one: Seen) -> Seen | None:
-        """Return the run of the test in the other direction: on the same mounting before another, then of the same repeat."""
+        """Return the other direction, by preference of the same mounting, then the same repeat."""
         found = [
             other
             for other in self._of_test.get(one.run.test, ())

@@ -1,4 +1,4 @@
-"""What is known before a run is judged, as plain numbers: where its circle should lie, and what other runs of its session show."""
+"""Knowledge before a run is judged: expected circle and other runs."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ LOCAL_COEFFICIENTS = 2 * LOCAL_HARMONIC + 1
 
 
 def local_columns(theta_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what a reading is per orthonormal coefficient of a form with `LOCAL_HARMONIC` undulations, shape (n, 59).
+    """Return readings per orthonormal coefficient with `LOCAL_HARMONIC` undulations, shape (n, 59).
 
     Args:
-        theta_rad: commanded angles from +X towards +Y, shape (n,) [rad].
+        theta_rad: commanded, from +X towards +Y, shape (n,).
     """
     angles = np.outer(theta_rad, np.arange(1, LOCAL_HARMONIC + 1))
     return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
@@ -51,40 +51,39 @@ HIGHER = (2, 3, 5, 6)
 
 
 def form_columns(theta_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what a reading is per orthonormal coefficient of its form, shape (n, 7).
+    """Return readings per orthonormal coefficient of a form, shape (n, 7).
 
     Args:
-        theta_rad: commanded angles from the start of the turn towards +Y, shape (n,) [rad].
+        theta_rad: commanded, from the turn's start towards +Y, shape (n,).
     """
     angles = np.outer(theta_rad, np.arange(1, HIGHEST_HARMONIC + 1))
     return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
 
 
 def along_travel(circle: Circle) -> NDArray[np.float64]:
-    """Return the signs that coefficients take when angles are counted along the travel in place of towards +Y, shape (7,)."""
+    """Return the signs of coefficients counted along the travel, shape (7,)."""
     return np.concatenate([np.ones(HIGHEST_HARMONIC + 1), np.full(HIGHEST_HARMONIC, circle.direction.sign)])
 
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """Where a circle should lie, by the nominal machine or by a model.
+    """An expected circle by nominal machine or model.
 
     Attributes:
-        centre_mm: X and Y of the centre less the commanded one, shape (2,) [mm].
-        radial_mm: mean reading less nominal length of the bar [mm].
-        covariance_mm2: of these three numbers, ball, mounting and bar included, shape (3, 3) [mm²].
-        place_known: False for a ball put up under the spindle: its centre says nothing.
-        mounting_mm: standard deviation of where a ball comes to lie when it is put up again, in X and in Y [mm].
-        reversals_deg: angles from +X at which a strut turns round [deg].
-        form_um: expected coefficients, as of `Seen.coefficients_um`, shape (7,) [µm].
-        effects_um: what one standard deviation of each cause's parameters does to these coefficients, shape (7, p) each, by the
-            cause and the set of values that it shares with other runs [µm].
-        local_um: the same of causes that act along a path or with time, on the coefficients of `local_columns`, shape (59, p) each [µm].
-        moving: keys of the causes that act where the machine moves, and not where it stands.
-        again_um2: covariance of the difference of two runs of this circle, each on a mounting of its own, shape (7, 7) [µm²].
-        place_um: standard deviation of the ball's place that the plan states, CMM and holder, per axis [µm].
-        known_um2: covariance of a sound run's form, noise included, where other tests say what the machine is like, shape (7, 7)
-            [µm²]; None where they do not.
+        centre_mm: X and Y less commanded, shape (2,).
+        radial_mm: mean reading less nominal bar length.
+        covariance_mm2: of these three, with ball, mounting and bar, shape (3, 3).
+        place_known: False under the spindle, where centres mean nothing.
+        mounting_mm: standard deviation of remounting, in X and Y.
+        reversals_deg: from +X, where a strut reverses.
+        form_um: as `Seen.coefficients_um`, shape (7,).
+        effects_um: one standard deviation of each cause on these, shape (7, p) each, by cause and set of values shared with other
+            runs.
+        local_um: the same of causes along path or time, on `local_columns`, shape (59, p) each.
+        moving: keys of causes that act only in motion.
+        again_um2: covariance of the difference of two remounted runs, shape (7, 7).
+        place_um: stated standard deviation of the ball's place, CMM and holder, per axis.
+        known_um2: covariance of a sound form with noise, given other tests, shape (7, 7); None without.
     """
 
     centre_mm: NDArray[np.float64]
@@ -104,7 +103,7 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A circle of the plan, and what a model says that it looks like."""
+    """A planned circle by a model."""
 
     test: str
     circle: Circle
@@ -121,14 +120,13 @@ class Run:
     """One run as it is judged.
 
     Attributes:
-        repeat: counts the runs of this test and direction.
-        mounting: name of the putting-up of its ball; runs that share it share the place of the ball.
-        expected: where its circle should lie; None where nobody knows.
-        largest_loss_percent: share of samples that may be lost [%].
-        planned: all circles of its plan, where a model says what they look like.
-        started_s: when it began, on the clock of its session [s]; None where not noted.
-        usual: where it should lie by the usual sizes of all causes, where `expected` is by a model; None without a model.
-        bar_stated: whether the session states a calibrated length of the bar.
+        mounting: its runs share the ball's place.
+        expected: None if unknown.
+        largest_loss_percent: of samples.
+        planned: all circles of its plan by a model.
+        started_s: on the session's clock; None if not noted.
+        usual: expectation by usual causes if `expected` is by a model; else None.
+        bar_stated: whether a calibrated bar length is stated.
     """
 
     test: str
@@ -151,21 +149,19 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A run with what was worked out of it once.
+    """A run with what is computed once.
 
     Attributes:
-        analysis: its figures; None where it shows no circle.
-        problem: why it shows none; empty where it does.
-        lost: samples missing on the turn, and there.
-        unusable: of the missing ones, how many are recorded but cannot be used.
-        feed_mm_min: feed that its overlap shows and its standard uncertainty [mm/min]; None where it shows none.
-        longer_s: by how much the way from feed-in to feed-out took longer than its length at the programmed feed; None where one
-            of them is missing or angles were recorded [s].
-        coefficients_um: orthonormal Fourier coefficients of the readings less the bar's length, harmonics 0 to 3 by commanded
-            angle from the start of the turn towards +Y: mean, cosines, sines, shape (7,) [µm].
-        local_um: the same up to `LOCAL_HARMONIC` undulations, as of `local_columns`, shape (59,) [µm]; zeros where samples are
-            too few.
-        ways: feed-in and feed-out by the readings; None where they are not in the recording.
+        analysis: None without circle.
+        problem: why there is none; may be empty.
+        lost: missing on the turn.
+        unusable: recorded, but unusable, of these.
+        feed_mm_min: by the overlap, with standard uncertainty; or None.
+        longer_s: excess over the programmed time from feed-in to feed-out; None without both edges or with recorded angles.
+        coefficients_um: orthonormal Fourier coefficients of readings less bar length, harmonics 0 to 3 by commanded angle from
+            the start towards +Y: mean, cosines, sines, shape (7,).
+        local_um: up to `LOCAL_HARMONIC`, as `local_columns`, shape (59,); zeros for too few samples.
+        ways: feed-in and feed-out; None if not recorded.
     """
 
     run: Run
@@ -181,26 +177,26 @@ class Seen:
 
     @cached_property
     def without_model(self) -> Seen:
-        """The same run, of whose circle no model says anything; itself where none does."""
+        """Return the run without a model's expectation."""
         if self.run.usual is None:
             return self
         return replace(self, run=replace(self.run, expected=self.run.usual, usual=None, planned=()))
 
     @cached_property
     def stretches(self) -> dict[int, NDArray[np.uint64]]:
-        """Its stretches of readings, sorted, by their length: `copied` enters them."""
+        """Return sorted stretches of readings by length, filled by `copied`."""
         return {}
 
     @cached_property
     def u_um(self) -> float:
-        """Standard uncertainty of each coefficient by noise [µm]."""
+        """Return each coefficient's standard uncertainty by noise [µm]."""
         if self.analysis is None:
             return 0.0
         return self.analysis.noise.sigma_um / float(np.sqrt(len(self.analysis.raw)))
 
     @cached_property
     def drift_um_s(self) -> float:
-        """How fast the bar's reading of one place grows, by the overlap; zero where it has none [µm/s]."""
+        """Return the drift at one place by the overlap; zero without overlap [µm/s]."""
         passes = None if self.analysis is None else self.analysis.passes
         return 0.0 if passes is None else passes.mean_um / passes.turn_s
 
@@ -225,7 +221,7 @@ def seen(run: Run) -> Seen:
 
 
 def _orthonormal(found: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Coefficients of a form from its harmonics: mean, cosines, sines."""
+    """Return coefficients of a form's harmonics: mean, cosines, sines."""
     waves = found[1:] / np.sqrt(2.0)
     return np.concatenate([found[:1].real, waves.real, -waves.imag])
 
@@ -257,22 +253,22 @@ def _ways(run: Run) -> tuple[FeedingWay, FeedingWay] | None:
 
 
 def due_s(circle: Circle) -> float:
-    """Return how long the way from the middle of the feed-in to that of the feed-out takes at the programmed feed [s]."""
+    """Return the programmed time from the middle of feed-in to that of feed-out [s]."""
     return circle.swept_deg / circle.turning_deg_s + circle.feed_in_mm / (circle.feed_mm_min / 60.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Others:
-    """What the other runs of a session show, and which of them belong to this one.
+    """A session's other runs, and related ones.
 
     Attributes:
-        longer_s: by how much each took longer than due [s].
-        directions_um: root mean square of the difference of both directions, of each other circle, likewise [µm].
-        directions_stated: how far both directions of each other circle differ, in standard deviations of what is stated.
-        across_um: difference of both directions, of each other circle, off the axis through the start of the turn [µm].
-        local_um: root mean square by which both directions of each other circle differ at places [µm].
-        opposite: same test in the other direction, on the same mounting where there is one; None where there is none.
-        earlier: same test and direction, the repeat before; None where there is none.
+        longer_s: excess time of each.
+        directions_um: rms difference of other circles' directions.
+        directions_stated: the same in stated standard deviations.
+        across_um: the same off the axis through the start.
+        local_um: local rms difference of other circles' directions.
+        opposite: same test, other direction, same mounting if possible; or None.
+        earlier: repeat before, or None.
     """
 
     noise_um: tuple[float, ...] = ()
@@ -291,7 +287,7 @@ class Others:
 
 
 def apart_um(one: Seen, other: Seen) -> tuple[float, float]:
-    """Root mean square of the difference of two runs up to three undulations, and each coefficient's uncertainty [µm]."""
+    """Return the rms difference of two runs up to three undulations, and each coefficient's uncertainty [µm]."""
     return float(np.linalg.norm(one.coefficients_um - other.coefficients_um)), float(np.hypot(one.u_um, other.u_um))
 
 
@@ -300,5 +296,5 @@ ACROSS = (HIGHEST_HARMONIC + 1, HIGHEST_HARMONIC + 3)
 
 
 def across(one: Seen) -> NDArray[np.float64]:
-    """Those coefficients, shape (2,) [µm]."""
+    """Return the coefficients off the axis, shape (2,) [µm]."""
     return one.coefficients_um[list(ACROSS)]

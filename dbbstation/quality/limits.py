@@ -34,36 +34,36 @@ The other four numbers scatter less; were they counted in full, a limit would be
 
 
 def quantile(freedom: float, share: float = SHARE) -> float:
-    """Size in standard deviations that a sound value passes, up or down, with probability `share` [Student].
+    """Return the size in standard deviations that a sound value passes with probability `share` [Student].
 
     Args:
-        freedom: degrees of freedom of the standard deviation; infinite where it is known.
-        share: probability of both sides together.
+        freedom: of the standard deviation; infinite if known.
+        share: both sides together.
     """
     freedom = min(max(freedom, 1.0), _MANY)
     return float(-stdtrit(freedom, 0.5 * share))
 
 
 def largest_of(count: float, freedom: float) -> float:
-    """The same for the largest of `count` independent values."""
+    """Return the same for the largest of `count` independent values."""
     return quantile(freedom, SHARE / max(count, 1.0))
 
 
 def length_quantile(dimensions: int) -> float:
-    """Length in standard deviations that a sound vector of so many dimensions passes with probability SHARE."""
+    """Return the length in standard deviations that a sound vector passes with probability SHARE."""
     return float(np.sqrt(chdtri(dimensions, SHARE)))
 
 
 def scaled_length_quantile(freedom: float) -> float:
-    """Square root of the chi-square quantile of a number of degrees of freedom that need not be whole."""
+    """Return the root of the chi-square quantile for any real freedom."""
     return float(np.sqrt(chdtri(max(freedom, 1.0), SHARE)))
 
 
 def ratio_quantile(above: float, below: float) -> float:
-    """Ratio of two estimates of one variance that chance passes with probability SHARE [Fisher].
+    """Return the ratio of two variance estimates that chance passes with probability SHARE [Fisher].
 
     Args:
-        above: degrees of freedom of the numerator.
+        above: freedom of the numerator.
     """
     return float(fdtri(above, below, 1.0 - SHARE))
 
@@ -73,10 +73,10 @@ _MANY = 1e6
 
 
 def scale_of(values: Sequence[float]) -> tuple[float, float]:
-    """Standard deviation about zero of values of which some may be spoilt, and its degrees of freedom.
+    """Return the robust standard deviation about zero, and its freedom.
 
-    The median of their sizes over that of a normal value. It knows the standard deviation as well as 0.37 times as many
-    values known to be sound would [Rousseeuw and Croux, J. Am. Stat. Assoc. 88 (1993)].
+    The median absolute value over that of a normal value; as precise as 0.37 times as many sound values [Rousseeuw and
+    Croux, J. Am. Stat. Assoc. 88 (1993)].
     """
     if not values:
         return 0.0, 0.0
@@ -91,11 +91,11 @@ ROBUST_SHARE = 0.37
 
 
 def length_limit(lengths: Sequence[float], dimensions: int) -> float:
-    """Length that a sound vector passes with probability SHARE, where other vectors of its kind are known [Fisher].
+    """Return the length that a sound vector passes with probability SHARE, given others [Fisher].
 
     Args:
-        lengths: of the others, of which some may be spoilt: the median of their squares counts.
-        dimensions: in which they scatter alike.
+        lengths: of others; their median square counts.
+        dimensions: with equal scatter.
     """
     median = float(chdtri(dimensions, 0.5)) / dimensions
     variance = float(np.median(np.square(lengths))) / median
@@ -104,12 +104,12 @@ def length_limit(lengths: Sequence[float], dimensions: int) -> float:
 
 
 def median_length(dimensions: int) -> float:
-    """Median length of a sound vector of so many dimensions, in standard deviations."""
+    """Return the median length of a sound vector, in standard deviations."""
     return float(np.sqrt(chdtri(dimensions, 0.5)))
 
 
 def joined(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Standard deviation of a sum of independent parts and its degrees of freedom [Welch, Satterthwaite; GUM G.4.1]."""
+    """Return the standard deviation and freedom of a sum of independent parts [Welch, Satterthwaite; GUM G.4.1]."""
     variance = sum(size**2 for size, _ in parts)
     if not variance > 0.0:
         return 0.0, _MANY

@@ -1,8 +1,7 @@
-"""A place where a run differs from another of its test: dirt between ball and cup, a bar that touched something, a push.
+"""Local differences from another run of a test: dirt, contact, a push.
 
-What sits in the circle's form is seen in no single run: a wide bump looks like form. Two runs of one circle have the same form. Against a
-repeat all of it is compared. Against the other direction lag, play and friction differ, and all but come back after half a turn, where
-speed and direction of the struts are reversed: odd undulations are compared. A bump at one place has as much of odd as of even ones.
+A single run hides a wide bump in its form; two runs share the form. Against a repeat everything is compared. Against the
+other direction only odd undulations are, since lag, play and friction nearly repeat after half a turn.
 """
 
 from __future__ import annotations
@@ -35,11 +34,11 @@ ORDERS = np.concatenate([[0], np.arange(1, LOCAL_HARMONIC + 1), np.arange(1, LOC
 
 
 def local_difference(one: Seen, others: Others) -> Finding:
-    """Return how much a run differs at places from another of its test, by three to 29 undulations.
+    """Judge local differences by 3 to 29 undulations.
 
-    Enough other pairs of directions whose odd undulations differ by more widen it. The limit is the ellipsoid of what noise and the causes that are known leave in the direction in which both differ, at stated or usual
-    size; a share of what reversals show; and what a drift leaves: D over a turn is a sawtooth, whose k-th undulation has the amplitude
-    D / (pi k).
+    The limit is the ellipsoid of noise and known causes along the difference, plus a share of what reversals show, and
+    what a drift leaves: D over a turn is a sawtooth whose k-th undulation is D / (pi k). Enough other pairs with larger
+    differences widen it.
     """
     against = others.opposite or others.earlier
     if against is None or one.analysis is None or against.analysis is None:
@@ -76,7 +75,7 @@ def local_difference(one: Seen, others: Others) -> Finding:
 
 
 def locally_apart_um(one: Seen, against: Seen) -> float:
-    """Return the root mean square of the undulations in which two runs of one circle are compared [µm]."""
+    """Return the rms of the compared undulations [µm]."""
     return float(np.linalg.norm((one.local_um - against.local_um)[_compared(one, against)]))
 
 

@@ -1,1 +1,1 @@
-"""What recordings can determine, and whether a fit agrees with what was stated: plan, scatter, noise, physics."""
+"""Check fits against statements: plan, scatter, noise, physics."""

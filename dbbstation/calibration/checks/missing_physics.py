@@ -1,4 +1,4 @@
-"""Whether a fit leaves more than the noise of a reading and the scatter of mountings explain."""
+"""Test a fit's residual against noise and scatter of mountings."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ SECTORS = 720
 
 
 def misfit_of(calibration: Calibration, noise: Spectrum | None = None) -> Misfit:
-    """Misfit of what a fit leaves, by an F test of the low harmonics; where the balls stand in each mounting does not count.
+    """Return an F test of the residual's low harmonics, without ball positions in each mounting.
 
     Args:
-        noise: measured elsewhere; read from the high harmonics of what the fit leaves if None.
+        noise: measured elsewhere; None: from high harmonics of the residual.
     """
     fitted = int(np.count_nonzero(~calibration.layout.known.random)) - len(calibration.solution.held)
     residuals, phases, mountings = _by_sector(calibration)
@@ -38,14 +38,14 @@ def misfit_of(calibration: Calibration, noise: Spectrum | None = None) -> Misfit
 
 
 def remainder_of(calibration: Calibration, noise: Spectrum) -> Remainder:
-    """The harmonic, the run and the stretch of a turn that stand out most of what a fit leaves, beside noise measured elsewhere."""
+    """Return the most outstanding harmonic, run and stretch of the residual."""
     return remainder(*_by_sector(calibration), noise)
 
 
 def _by_sector(
     calibration: Calibration,
 ) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]], list[str]]:
-    """What a fit leaves, averaged over sectors, with the angles [rad] and the mounting of each run."""
+    """Return the residual by sectors, their angles [rad] and each run's mounting."""
     residuals, phases = [], []
     for observation, residual in zip(calibration.observations, calibration.residual_mm, strict=True):
         sector = sector_of(observation.raw, min(SECTORS, len(residual)))
@@ -56,7 +56,7 @@ def _by_sector(
 
 
 def is_missing_physics(found: Misfit) -> bool:
-    """Return whether chance does not explain it."""
+    """Return whether chance fails to explain it."""
     return found.probability < SIGNIFICANT
 
 
@@ -65,7 +65,7 @@ class LeftByFit:
     """The residual beyond noise and mountings, by an F test of low harmonics.
 
     Attributes:
-        probability: of that much by chance.
+        probability: by chance.
     """
 
     probability: float

@@ -1,4 +1,4 @@
-"""Noise of the bar as the finest structure of the residuals shows it."""
+"""The bar's noise from the finest structure of residuals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def fine_noise_mm(calibration: Calibration) -> float:
-    """Noise of one reading from what lies above the smooth harmonics, which no misfit of the model reaches [mm]."""
+    """Return the noise of a reading from above the smooth harmonics, which no misfit reaches [mm]."""
     square, count = 0.0, 0.0
     for observation, residual in zip(calibration.observations, calibration.residual_mm, strict=True):
         rough = residual - smooth(residual, np.radians(observation.raw.phi_deg))

@@ -1,4 +1,4 @@
-"""Whether the tests are enough to check the plan that they were run by: its tilts, heights and places."""
+"""Check that tests are enough to contradict their plan."""
 
 from __future__ import annotations
 
@@ -22,13 +22,12 @@ if TYPE_CHECKING:
 class PlanCheck:
     """Redundancy of the tests.
 
-    Each circle by itself determines some directions of the parameters. What all circles determine, less what the fit
-    uses up, are the degrees of freedom that can contradict the plan.
+    Directions determined by all single circles, less those used by the fit, can contradict the plan.
 
     Attributes:
-        determined: directions that single tests determine, summed over the tests.
-        identified: directions that all tests together determine.
-        of_one_test: directions that the test that shows most determines.
+        determined: by single tests, summed.
+        identified: by all tests together.
+        of_one_test: by the strongest test.
     """
 
     tests: int
@@ -39,23 +38,22 @@ class PlanCheck:
     @computed_field  # type: ignore[prop-decorator]
     @property
     def left(self) -> int:
-        """Degrees of freedom that are left to check the plan."""
+        """Return the remaining degrees of freedom."""
         return self.determined - self.identified
 
     @computed_field  # type: ignore[prop-decorator]
     @property
     def enough(self) -> bool:
-        """Whether the tests can show a wrong plan.
+        """Return whether the tests can show a wrong plan.
 
-        As much as one whole circle shows must be left: then a circle that was run otherwise than planned cannot be
-        explained by parameters that the others determine anyway. Three circles leave 3 to 5, four leave 12, one shows 9.
+        The rest must be at least one whole circle's. Three circles leave 3 to 5, four leave 12, one shows 9.
         """
         return self.left >= self.of_one_test
 
 
 @with_one_thread
 def check_plan(calibration: Calibration) -> PlanCheck:
-    """Count the directions that tests determine, judged by the noise of the fit; tolerances of the machine file do not count."""
+    """Count the directions that tests determine by the fit's noise, without tolerances of the machine file."""
     known = calibration.layout.known
     free = replace(known, prior=np.where(calibration.layout.bounded, np.inf, known.prior))
     fitted = int(np.count_nonzero(~known.random))

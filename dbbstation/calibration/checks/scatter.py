@@ -1,4 +1,4 @@
-"""Whether balls and bar scatter as plan and session state: the stated sizes held against what the fit finds."""
+"""Compare the scatter of balls and bar with plan and session."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ LEAST_STATED_MM = 0.1
 
 @dataclass(frozen=True, eq=False)
 class MountingOffset:
-    """Where a ball came to stand in one putting-up, mounting and CMM error together.
+    """Where a ball stood in one mounting, mounting and CMM error together.
 
     Attributes:
-        stated_mm: standard deviation of each coordinate as plan states it, shape (3,) [mm].
+        stated_mm: standard deviation of each coordinate, shape (3,) [mm].
         shift_mm: best prediction, machine axes, shape (3,) [mm].
         spread_mm2: its covariance, shape (3, 3) [mm²].
-        square: sum of squares of the determined coordinates in units of what they should scatter by.
+        square: of determined coordinates in units of their expected scatter, summed.
         freedom: determined coordinates.
     """
 
@@ -53,7 +53,7 @@ class MountingOffset:
 
 
 class ScatterVerdict(StrEnum):
-    """How balls scatter beside what is stated of them."""
+    """Verdict on the scatter of balls."""
 
     AS_STATED = "as-stated"
     MORE = "more"
@@ -66,11 +66,11 @@ class ScatterCheck:
     """Whether balls of one stated size scatter as stated.
 
     Attributes:
-        stated_um: standard deviation per axis, mounting and CMM together [µm].
-        found_um: what they scatter by; None where the runs cannot tell [µm].
-        interval_um: 95 % interval of that; None likewise [µm].
-        fits: whether balls stand as well as stated, or better; None where the runs say too little.
-        finding: where the stated size lies beside that interval; untold where the runs say too little.
+        stated_um: standard deviation per axis, mounting and CMM together.
+        found_um: None if undetermined.
+        interval_um: 95 % of that; None if undetermined.
+        fits: whether they scatter no more than stated; None if undetermined.
+        finding: place of the stated size relative to the interval, or untold.
     """
 
     stated_um: float
@@ -82,10 +82,10 @@ class ScatterCheck:
 
 
 def seats_of(calibration: Calibration) -> list[MountingOffset]:
-    """Where every ball stands, and how surprising that is.
+    """Return every ball's place and its improbability.
 
-    A best prediction m of an effect with stated covariance P and remaining covariance V scatters by P - V [Henderson,
-    Biometrics 31 (1975) 423], so that m (P - V)^-1 m is chi-square over the coordinates that the runs determine.
+    A best prediction m with stated covariance P and remaining covariance V scatters by P - V [Henderson, Biometrics 31
+    (1975) 423]: m (P - V)^-1 m is chi-square over the determined coordinates.
     """
     layout, covariance = calibration.layout, calibration.solution.covariance
     terms = {(term.source.name, term.shared): term for term in layout.terms}
@@ -118,10 +118,10 @@ def seats_of(calibration: Calibration) -> list[MountingOffset]:
 
 
 def check_scatter(seats: Sequence[MountingOffset]) -> list[ScatterCheck]:
-    """Compare what balls scatter by with what plan states, sizes apart.
+    """Compare found and stated scatter by stated size.
 
-    The sum of squares over the determined coordinates is chi-square in units of the true variance; that neighbours
-    share errors of the fitted machine makes the interval a little too narrow where few balls determine much.
+    The sum of squares is chi-square in units of the true variance. Neighbours share errors of the fitted machine, which
+    narrows the interval a little for few balls.
     """
     groups: dict[float, list[MountingOffset]] = {}
     for seat in seats:

@@ -1,4 +1,4 @@
-"""What the runs of a calibration see of the machine: singular values, weak directions, indices, leverage of tests."""
+"""What runs see of the machine: singular values, weak directions, indices, leverage."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class Indices:
 
 @dataclass(frozen=True)
 class WeakDirection:
-    """A direction that the runs see least of those they see.
+    """A direction seen least.
 
     Attributes:
-        uncertainty: how far the parameter that it moves most may be off along it, one standard deviation.
-        unit: of that; µm for lengths of the geometry.
+        uncertainty: of its largest parameter along it, one standard deviation.
+        unit: µm for lengths of the geometry.
     """
 
     text: str
@@ -68,14 +68,12 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Observability:
-    """What the circles see of the machine's parameters.
+    """What circles see of the machine's parameters.
 
     Attributes:
-        singular_values_mm: of the readings' sensitivity to parameters in units of their usual size, falling, without those that
-            are lost [mm].
-        indices: O1 to O5 of them.
-        leverage: by test, how many parameters' worth of what is known it brings; they add up to the parameters identified, but
-            for what tests share.
+        singular_values_mm: of readings' sensitivity to parameters in usual sizes, falling, without lost ones.
+        indices: O1 to O5.
+        leverage: information of each test in parameters; the sum is their number, but for shared parts.
     """
 
     singular_values_mm: tuple[float, ...]
@@ -88,7 +86,7 @@ class Observability:
 
 @with_one_thread
 def visibility(calibration: Calibration) -> Observability:
-    """Look at the matrix that a calibration solved."""
+    """Examine the matrix of a calibration."""
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
     scale = known.scale[fitted]
@@ -108,7 +106,7 @@ def visibility(calibration: Calibration) -> Observability:
 
 
 def indices(singular: NDArray[np.float64], readings: int) -> Indices:
-    """O1 to O5 of singular values, falling and positive, shape (L,)."""
+    """Return O1 to O5 of singular values, falling and positive, shape (L,)."""
     greatest, least = float(singular[0]), float(singular[-1])
     return Indices(
         o1=float(np.exp(np.mean(np.log(singular)))) / float(np.sqrt(readings)),
@@ -120,7 +118,7 @@ def indices(singular: NDArray[np.float64], readings: int) -> Indices:
 
 
 def _weakest(calibration: Calibration) -> tuple[WeakDirection, ...]:
-    """Directions of greatest uncertainty, from the covariance of the fitted columns in units of their sizes."""
+    """Return directions of greatest uncertainty, from the covariance in parameter sizes."""
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
     scale = known.scale[fitted]
@@ -154,10 +152,9 @@ def _correlations(calibration: Calibration) -> tuple[Correlation, ...]:
 
 
 def _leverage(calibration: Calibration, fitted: NDArray[np.int64]) -> dict[str, float]:
-    """Trace of covariance times a test's own information, its own random effects averaged over.
+    """Return the trace of covariance times a test's own information, averaged over its random effects.
 
-    Measures what the solution would lose to first order without the test, in parameters. Effects that tests share,
-    such as the bar's length, are unknowns like the fitted ones here.
+    It approximates the loss without the test, in parameters. Shared effects, such as the bar's length, count as unknowns.
     """
     known, noise = calibration.layout.known, calibration.noise.effective
     tests: dict[str, list[Block]] = {}

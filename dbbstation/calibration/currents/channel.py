@@ -1,7 +1,6 @@
-"""Motor currents as a second channel of a fit: load profiles of the struts beside the circles [GRAV 3.2].
+"""Motor currents as a second channel: load profiles of struts beside circles [GRAV 3.2].
 
-Each motor is an instrument of its own, with its own noise. Its samples are compressed to blocks beside those of the bar,
-so that one solution weighs circles and currents against each other.
+Each motor is an instrument with own noise. Compressed blocks of both channels enter one solution.
 """
 
 from __future__ import annotations
@@ -58,9 +57,9 @@ class CurrentChannel:
     """Runs with motor currents.
 
     Attributes:
-        current_a: measured, one array of shape (n, 6) per run [A].
-        usable: samples that count, one array of shape (n, 6) per run: logged, not clipped, friction turned over.
-        notes: what was left out and what cannot be told, in words.
+        current_a: one array of shape (n, 6) per run.
+        usable: samples that count: logged, unclipped, after friction reversed; shape (n, 6) per run.
+        notes: omissions and limits.
     """
 
     motions: tuple[Motion, ...]
@@ -70,10 +69,10 @@ class CurrentChannel:
 
 
 def current_channel(layout: Layout, observations: Sequence[Observation]) -> CurrentChannel | None:
-    """Currents of all runs that have them; None for a fit without a source of currents.
+    """Return the currents of all runs that have them, or None without a source of currents.
 
     Raises:
-        CalibrationError: no motor has a current that could be used.
+        CalibrationError: no motor has usable currents.
     """
     if not any(term.source.of_currents for term in layout.terms):
         return None
@@ -96,7 +95,7 @@ def current_channel(layout: Layout, observations: Sequence[Observation]) -> Curr
 
 
 def _motion(run: Observation, current_a: NDArray[np.float64]) -> Motion:
-    """Return a run with its currents as cleaned; a long one as means over sectors, in which loads hardly change."""
+    """Return a run with cleaned currents; a long one as sector means."""
     raw = replace(run.raw, logged={**run.raw.logged, **currents(current_a)})
     if run.commanded is None and len(raw) > LONG * SECTORS:
         raw = averaged(raw, SECTORS)
@@ -104,7 +103,7 @@ def _motion(run: Observation, current_a: NDArray[np.float64]) -> Motion:
 
 
 def current_blocks(layout: Layout, channel: CurrentChannel | None, x: NDArray[np.float64]) -> list[Block]:
-    """Compress the currents about the values x, shape (k,), one block per run and motor with the noise found there."""
+    """Return blocks of currents about x, shape (k,), per run and motor with its noise."""
     if channel is None:
         return []
     blocks, left = linearised(layout, channel, x)
@@ -115,7 +114,7 @@ def current_blocks(layout: Layout, channel: CurrentChannel | None, x: NDArray[np
 def linearised(
     layout: Layout, channel: CurrentChannel, x: NDArray[np.float64]
 ) -> tuple[list[tuple[int, Block]], list[list[NDArray[np.float64]]]]:
-    """Blocks with their motors, and per motor what each run leaves [A]."""
+    """Return blocks with motors, and each motor's residual per run [A]."""
     model = layout.model(x)
     whole = x - layout.nominal
 
@@ -149,7 +148,7 @@ def linearised(
 
 
 def motor_noise(left: Sequence[Sequence[NDArray[np.float64]]]) -> list[Noise | None]:
-    """Noise of each motor from what is left of its readings."""
+    """Return each motor's noise from its residual."""
     return [noise_of(of_motor, len(PER_MOTOR)) if of_motor else None for of_motor in left]
 
 
@@ -158,9 +157,9 @@ def _effective(noise: Noise | None) -> float:
 
 
 def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, NDArray[np.float64]]:
-    """Values by source name from the currents alone, at the nominal geometry, for the joint fit to start from.
+    """Return start values by source from currents alone, at the nominal geometry.
 
-    Gains multiply loads and frictions, so that a fit that began at zero gain would not see them.
+    Gains multiply loads and frictions, which a start at zero would hide.
     """
     if channel is None:
         return {}
@@ -183,10 +182,10 @@ def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, N
 def by_themselves(
     blocks: Sequence[Block], known: Columns, noise: float = 1.0, nominal: Sequence[Block] | None = None
 ) -> tuple[NDArray[np.int64], Solution]:
-    """Solve for the columns that some blocks touch, by these blocks alone.
+    """Solve for columns that some blocks touch, by these alone.
 
     Args:
-        nominal: the same blocks where lost directions are looked for, if elsewhere.
+        nominal: blocks for lost directions, if others.
 
     Returns:
         The columns, shape (c,), and their solution.

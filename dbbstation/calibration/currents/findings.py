@@ -1,4 +1,4 @@
-"""What motor currents say in a fit: noise and residual of each motor, and the centre of gravity by channel."""
+"""Facts of motor currents in a fit: noise, residuals, centre of gravity."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ class MotorFindings:
     """What the motor currents say in a fit.
 
     Attributes:
-        noise: of one reading of each motor, in long runs of the mean over a sector; None for a motor without readings.
-        residual_a: root mean square that the model leaves of each motor's readings [A]; NaN without readings.
-        fine_a: noise of a reading from differences of neighbours, which no slow misfit reaches [A]; NaN without readings.
-        samples: readings of each motor that went in, means of long runs counted once.
-        held: parameters of the drives that the recordings leave open, by their names.
-        alone: centre of gravity by channel (`circles`, `currents`) and parameter, with its standard deviation [mm];
-            None where that channel by itself leaves it open. Empty without the source cog-shift.
-        notes: what was left out and what cannot be told, in words.
+        noise: of each motor's reading, or sector mean in long runs; None without readings.
+        residual_a: rms per motor; NaN without readings.
+        fine_a: noise from differences of neighbours, free of slow misfit; NaN without readings.
+        samples: used readings per motor.
+        held: undetermined parameters of the drives.
+        alone: centre of gravity by channel (`circles`, `currents`) and parameter, with standard deviation [mm]; None if
+            undetermined alone. Empty without cog-shift.
+        notes: omissions and limits.
     """
 
     noise: tuple[Noise | None, ...]
@@ -67,11 +67,11 @@ def motor_findings(
     nominal: Sequence[Block],
     noise: Noise,
 ) -> MotorFindings | None:
-    """Say what the currents left and what each channel tells by itself.
+    """Return residuals and each channel's own facts.
 
     Args:
-        channel: currents; None for a fit without them.
-        x: values found, shape (k,).
+        channel: None without currents.
+        x: found, shape (k,).
         noise: of a bar reading.
     """
     if channel is None:
@@ -101,7 +101,7 @@ def motor_findings(
 
 
 def _rms(parts: Sequence[NDArray[np.float64]]) -> float:
-    """Root mean square of all parts; NaN of nothing."""
+    """Return the rms of all parts; NaN of nothing."""
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else np.nan
 
 
@@ -143,7 +143,7 @@ def _doubts(layout: Layout, x: NDArray[np.float64], solution: Solution, held: fr
 
 
 def _misfits(residual_a: Sequence[float], fine_a: Sequence[float], noise: Sequence[Noise | None]) -> list[str]:
-    """One text for motors that leave something slow: correlated noise is no misfit unless it lasts long."""
+    """Return a text for motors with slow residuals; correlated noise counts only if it lasts long."""
     lacking = [
         str(motor + 1)
         for motor, (left, fine, found) in enumerate(zip(residual_a, fine_a, noise, strict=True))

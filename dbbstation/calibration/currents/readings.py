@@ -1,4 +1,4 @@
-"""Which readings of motor currents can be used, and what cannot be told from them."""
+"""Usable readings of motor currents."""
 
 from __future__ import annotations
 
@@ -25,11 +25,10 @@ steps the last step has two or three times as many readings as the one before; a
 def cleaned(
     labels: Sequence[str], current_a: Sequence[NDArray[np.float64]]
 ) -> tuple[list[NDArray[np.float64]], list[str]]:
-    """Find readings that say something of the drives.
+    """Find usable readings of drives.
 
     Args:
-        labels: names of the runs.
-        current_a: per run, shape (n, 6), NaN for a motor that was not logged [A].
+        current_a: per run, shape (n, 6), NaN for a motor without log.
 
     Returns:
         The same currents, NaN where they cannot be used, and notes in words, by motor.
@@ -42,7 +41,7 @@ def cleaned(
 
 
 def one_way(growing: Sequence[NDArray[np.bool_]], usable: Sequence[NDArray[np.bool_]]) -> list[str]:
-    """Name motors whose struts never turn round, shapes (n, 6) per run."""
+    """Name motors whose struts never reverse, shapes (n, 6) per run."""
     notes = []
     for motor in range(STRUTS):
         ways = np.unique(
@@ -95,6 +94,6 @@ def _limits(values: NDArray[np.float64]) -> list[float]:
 
 
 def _listed(labels: Sequence[str]) -> str:
-    """Name runs, or the first of many with a count."""
+    """Name the first runs, with a count."""
     most = 3
     return ", ".join(labels) if len(labels) <= most else f"{', '.join(labels[:most])} and {len(labels) - most} more"

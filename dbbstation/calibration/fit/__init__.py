@@ -1,1 +1,1 @@
-"""The fit: its equations, samples seen through nodes, prescribed parameters, the paper's three ways to calibrate."""
+"""The fit: equations, nodes, prescribed parameters, three methods."""

@@ -80,21 +80,19 @@ class Calibration:
     """What a fit found.
 
     Attributes:
-        x: values of all columns, shape (k,).
-        solution: covariance, directions and what was held, of all columns.
-        noise: of one bar reading.
-        observations: the runs that went in.
-        machine_residual_mm: per run, what the machine's own sources leave [mm].
-        residual_mm: per run, what is left after the measurement's effects too [mm].
-        blocks: what the runs say of the columns, about the values found: one for the circle of each run, then those of motor
-            currents.
-        directions_lost: what the recordings could not see, in words.
-        directions_regularised: what they could not see and the machine file's tolerances stand in for, in words.
-        prescribed: parameters that were held at nominal in place of the lost directions; empty where the directions themselves
-            were.
-        currents: what the motor currents say; None where the fit does without them.
-        at_limit: columns of nonlinear parameters that are held at an end of their range.
-        settled: False where the last step still moved: values are those of that step.
+        x: all columns, shape (k,).
+        solution: covariance, directions and held rows of all columns.
+        noise: of a reading.
+        observations: fitted runs.
+        machine_residual_mm: per run, beyond the machine's sources.
+        residual_mm: per run, beyond the measurement's effects too.
+        blocks: information about x: one per circle, then motor currents.
+        directions_lost: invisible to the recordings, in words.
+        directions_regularised: invisible, but bounded by the machine file's tolerances.
+        prescribed: parameters held in place of lost directions; may be empty.
+        currents: None without them.
+        at_limit: columns held at an end of their range.
+        settled: False if the last step still moved.
     """
 
     layout: Layout
@@ -114,27 +112,27 @@ class Calibration:
 
     @property
     def model(self) -> MachineModel:
-        """Machine model with everything that was fitted."""
+        """Return the machine model with all fitted values."""
         return self.layout.model(self.x)
 
     @property
     def circle_blocks(self) -> tuple[Block, ...]:
-        """What the circles say of the columns, one block for each run."""
+        """Return one block of the columns per circle."""
         return self.blocks[: len(self.observations)]
 
     @property
     def null_space(self) -> NDArray[np.float64]:
-        """Combinations of the columns that the runs cannot determine, each at its plausible size, shape (h, k)."""
+        """Return undetermined combinations of columns, each at its plausible size, shape (h, k)."""
         return unseen_combinations(self.blocks, self.layout.known, self.noise.effective, self.solution.held)
 
     @property
     def parameters_identified(self) -> int:
-        """Machine parameters less the directions that were held."""
+        """Return the number of machine parameters less held directions."""
         return int(np.count_nonzero(~self.layout.known.random)) - len(self.solution.held)
 
 
 def default_sources() -> tuple[ErrorSource, ...]:
-    """Return the kinematic parameters of the paper and the random effects of every session."""
+    """Return the paper's kinematic parameters and every session's random effects."""
     return sources_named(KINEMATIC_SOURCES + MEASUREMENT_SOURCES)
 
 
@@ -152,27 +150,21 @@ def calibrate(
 ) -> Calibration:
     """Fit error sources to raw circles.
 
-    Directions that the runs cannot see are found at the nominal geometry, where they are lost exactly, judged by
-    the noise, and held at nominal. The fit looks for whole values, not for steps, so that nothing walks along a
-    direction that only the curvature of the model makes visible. Where the machine file states tolerances, these are
-    priors, and nothing that they bound is lost.
+    Lost directions are found at the nominal geometry by the noise, and held at nominal. The fit solves for values instead
+    of steps, so that curvature moves nothing along them. Tolerances of the machine file are priors.
 
     Args:
-        machine: nominal machine.
-        observations: raw runs; all share that machine.
-        sources: what to fit; the default sources if None.
-        start: values near the answer by source name, for sources with parameters of shape, which a fit that starts
-            at zero amplitude cannot see.
-        prescribe: parameters to hold at nominal in place of the lost directions, as many as are lost; an empty
-            sequence has them chosen among the base joints; None holds the directions themselves.
-        shapes_within: share of their starting values to which parameters of shape are known; None where they are
-            known to their usual sizes only.
-        amplitudes_within: plausible sizes to which amplitudes of sources with a start are known, one standard deviation.
-        must_settle: False to get the last step where none settles.
+        observations: raw, all of that machine.
+        sources: None: the default ones.
+        start: values by source, for shape parameters that a zero amplitude hides.
+        prescribe: parameters to hold in place of lost directions, equally many; empty: chosen among base joints; None: hold the
+            directions.
+        shapes_within: relative prior of shape parameters about the start; None: usual sizes.
+        amplitudes_within: prior of started amplitudes in plausible sizes, one standard deviation.
+        must_settle: False: return the last step anyway.
 
     Raises:
-        CalibrationError: centred circles, too few tests, parameters that cannot stand in for what is lost, or no
-            convergence.
+        CalibrationError: centred circles, too few tests, unsuitable prescribed parameters, or no convergence.
         ModelError: a source lacks what it needs.
     """
     check_raw(observations)
@@ -254,13 +246,13 @@ def _approached(
     left: Sequence[NDArray[np.float64]],
     motion_of: MotionOf,
 ) -> tuple[NDArray[np.float64], list[Block]]:
-    """Approach the values of a machine that is millimetres off by Gauss-Newton steps with the noise of a usual bar.
+    """Approach a machine that is millimetres off by Gauss-Newton steps with a usual bar's noise.
 
-    What the first steps leave is curvature. Taken for noise, it would hide directions that the runs do see; these would
-    be held at nominal, and the curvature would stay. So the noise is read only where steps no longer halve what is left.
+    Early residuals are curvature. Taken for noise they would hide visible directions. The noise is therefore read only
+    when steps no longer halve the residual.
 
     Args:
-        left: per run, what the starting values leave, shape (n,) [mm].
+        left: residual at the start per run, shape (n,) [mm].
 
     Returns:
         Values of all columns, shape (k,), and blocks of the circles about them.
@@ -282,7 +274,7 @@ def _rms_mm(left: Sequence[NDArray[np.float64]]) -> float:
 
 
 def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> NDArray[np.float64]:
-    """Orthonormal rows of fitted directions, in units of the scales, of which only priors say anything, shape (r, f)."""
+    """Return orthonormal rows of fitted directions that only priors bound, in scales, shape (r, f)."""
     known = layout.known
     if not layout.bounded.any():
         return np.zeros((0, int(np.count_nonzero(~known.random))))
@@ -291,12 +283,11 @@ def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> NDArray[np.
 
 
 def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64], share: float) -> float:
-    """Share of a step to take.
+    """Return the share of a step to take.
 
-    Gauss-Newton leaves out the curvature that a parameter of shape has while its amplitude is small, and that of combinations
-    which the runs hardly see, so that full steps swing to and fro about the answer. Two steps that differ by the ratio q after a
-    share s was taken say that s / (1 - q) would have hit it (Aitken's rule); the most cautious of these is taken: of parameters of
-    shape, and of the whole step along the last.
+    Full steps oscillate about shape parameters with small amplitude and about nearly invisible combinations. If
+    successive steps have ratio q after a share s, s / (1 - q) would have hit (Aitken's rule); the smallest of these is
+    taken.
     """
     shaped = np.array([bool(p.grid) for term in layout.terms for p in term.parameters])
     now, last = step / layout.known.scale, before / layout.known.scale
@@ -313,10 +304,7 @@ def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64
 def _near(
     layout: Layout, start: Mapping[str, NDArray[np.float64]], within: float | None, amplitudes_within: float
 ) -> Layout:
-    """Layout whose parameters of shape are nominally those of the start, and known to a share of them.
-
-    Amplitudes are known to so many plausible sizes: what the geometry conceals nearly whole has no other bound.
-    """
+    """Return the layout with shape parameters and amplitudes known about the start."""
     nominal, prior = layout.nominal.copy(), layout.known.prior.copy()
     for term in layout.terms:
         if term.source.name not in start:
@@ -350,7 +338,7 @@ def _start_values(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> N
 
 
 def looked_at(observations: Sequence[Observation], needs: frozenset[Need]) -> list[Observation | RunNodes]:
-    """Runs as a fit looks at them: through nodes where they are long and sources need no more than pose and time."""
+    """Return runs as nodes if long and sources need only pose and time."""
     if not needs <= AT_NODES:
         return list(observations)
     nodes = in_parallel(nodes_of, observations, _usual_length(observations))
@@ -358,7 +346,7 @@ def looked_at(observations: Sequence[Observation], needs: frozenset[Need]) -> li
 
 
 def _motions_of(runs: Sequence[Observation | RunNodes]) -> MotionOf:
-    """Motion of a run, kept with all that is worked out of it alone where all runs are short enough for that."""
+    """Return a function for the motion of a run, cached for short runs."""
     if _usual_length(runs) * len(runs) > MOST_KEPT:
         return Observation.motion
     short = {id(run.coarse if isinstance(run, RunNodes) else run) for run in runs}
@@ -380,7 +368,7 @@ def linearise(
     x: NDArray[np.float64],
     motion_of: MotionOf = Observation.motion,
 ) -> tuple[list[Block], list[NDArray[np.float64]]]:
-    """Compress every run about the values x, shape (k,), so that a solution of the blocks is x less its nominal.
+    """Compress every run about x, shape (k,); a solution of the blocks is x less its nominal.
 
     Returns:
         The blocks, and per run measured minus predicted length at x, shape (n,) [mm].
@@ -405,7 +393,7 @@ def linearise(
 def _predicted(
     layout: Layout, model: MachineModel, observation: Observation, motion: Motion, x: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Columns that act on a run, shape (k,), their derivatives, shape (n, k), and the reading, shape (n,) [mm]."""
+    """Return the active columns, shape (k,), derivatives, shape (n, k), and reading, shape (n,) [mm]."""
     reading = model.bar(motion)
     terms = [term for term in layout.terms if term.acts_on(motion)]
     jacobian = np.hstack([np.zeros((len(observation.raw), 0))] + [reading.by_fitted(term.fitted(x)) for term in terms])
@@ -415,7 +403,7 @@ def _predicted(
 def _settled(
     blocks: Sequence[Block], layout: Layout, noise: Noise, held: NDArray[np.float64]
 ) -> tuple[Solution, Noise]:
-    """Solve with the noise that the solution itself leaves: three rounds settle it to a per mille."""
+    """Solve with the noise of the own residual; three rounds settle within a per mille."""
     count = sum(block.count for block in blocks if block.noise is None)
     sigma = noise.sigma
     for _ in range(3):
@@ -433,7 +421,7 @@ SMALLEST_NOISE_MM = 1e-7
 
 @with_one_thread
 def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple[NDArray[np.float64], ...]:
-    """Measured minus predicted length of every run, shape (n,) each [mm]."""
+    """Return measured minus predicted length of every run, shape (n,) each [mm]."""
     return tuple(of_residuals(model, observations, lambda _, residual_mm: residual_mm))
 
 
@@ -443,7 +431,7 @@ def of_residuals(
     observations: Sequence[Observation],
     work: Callable[[Observation, NDArray[np.float64]], Found],
 ) -> list[Found]:
-    """What `work` makes of every run and its measured minus predicted length, shape (n,) [mm]; each is kept no longer than that."""
+    """Return `work` of each run and its measured minus predicted length, shape (n,) [mm], one at a time."""
     needs = frozenset[Need]().union(*(f.source.needs for f in model.sources if not f.source.of_currents))
     runs = looked_at(observations, needs)
 
@@ -469,16 +457,16 @@ def _residual(model: MachineModel, motion_of: MotionOf, run: Observation | RunNo
 
 
 def _usual_length(runs: Sequence[Observation | RunNodes]) -> int:
-    """Poses of a run at which a model is asked, on average."""
+    """Return the mean number of poses per run."""
     poses = sum(len((run.coarse if isinstance(run, RunNodes) else run).raw) for run in runs)
     return poses // max(len(runs), 1)
 
 
 def check_raw(observations: Sequence[Observation]) -> None:
-    """Refuse anything but raw circles: a removed centre is the machine's position error [CAL III-A].
+    """Refuse centred circles: a removed centre is the machine's position error [CAL III-A].
 
     Raises:
-        CalibrationError: names the test of the first other one.
+        CalibrationError: names the first such test.
     """
     for observation in observations:
         if not isinstance(observation.raw, RawCircle):
@@ -500,5 +488,5 @@ def _check_enough(observations: Sequence[Observation]) -> None:
 
 
 def machine_sources(sources: Sequence[ErrorSource]) -> tuple[ErrorSource, ...]:
-    """Those that belong to the machine and show in circles."""
+    """Return machine sources visible in circles."""
     return tuple(source for source in sources if source.belongs_to is Owner.MACHINE and not source.of_currents)

@@ -1,4 +1,4 @@
-"""Directions of the parameters that recordings cannot see, said in words."""
+"""Lost directions of parameters, in words."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SHOWS_IN_CIRCLES = 0.1
 
 @dataclass(frozen=True, eq=False)
 class RigidPattern:
-    """A way in which a machine can be wrong as a whole, by source and parameter order."""
+    """A rigid pattern of errors, by source and parameter order."""
 
     text: str
     strut_mm: NDArray[np.float64]
@@ -34,11 +34,11 @@ class RigidPattern:
 
 
 def patterns(base_joints_mm: NDArray[np.float64], axis_of_strut: NDArray[np.float64]) -> list[RigidPattern]:
-    """Rigid motions of the base, common strut length and uniform size, in the order they are tried.
+    """Return rigid motions of the base, common strut length and uniform size, in order of trial.
 
     Args:
-        base_joints_mm: nominal base joints, shape (6, 3) [mm].
-        axis_of_strut: unit vectors of the struts in the middle of the travel, shape (6, 3).
+        base_joints_mm: nominal, shape (6, 3).
+        axis_of_strut: unit vectors in the middle of the travel, shape (6, 3).
     """
     none, still = np.zeros(STRUTS), np.zeros((STRUTS, 3))
     found = [
@@ -63,11 +63,10 @@ def patterns(base_joints_mm: NDArray[np.float64], axis_of_strut: NDArray[np.floa
 
 
 def in_words(layout: Layout, held: NDArray[np.float64]) -> tuple[str, ...]:
-    """One text for every direction that was held.
+    """Return a text for every held direction.
 
     Args:
-        layout: columns of the fit.
-        held: orthonormal rows, fitted columns only, in units of the columns' scales, shape (h, f).
+        held: orthonormal rows over fitted columns in scales, shape (h, f).
     """
     fitted = np.flatnonzero(~layout.known.random)
     names = [layout.names[column] for column in fitted]
@@ -90,13 +89,10 @@ def in_words(layout: Layout, held: NDArray[np.float64]) -> tuple[str, ...]:
 
 
 def of_circles(layout: Layout, held: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Directions without their parts in sources of motor currents, and none that lie in these alone, shape (g, f).
-
-    Where the tool goes does not hang on them; what is open of the drives is said of each motor.
+    """Return directions without parts in motor currents, shape (g, f); purely electrical ones go.
 
     Args:
-        layout: columns of the fit.
-        held: orthonormal rows, fitted columns only, in units of the columns' scales, shape (h, f).
+        held: orthonormal rows over fitted columns in scales, shape (h, f).
     """
     fitted = np.flatnonzero(~layout.known.random)
     drives = [np.r_[term.columns] for term in layout.terms if term.source.of_currents]
@@ -107,7 +103,7 @@ def of_circles(layout: Layout, held: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _as_columns(pattern: RigidPattern, names: list[tuple[str, str, str]]) -> NDArray[np.float64] | None:
-    """Return the pattern as a vector over the fitted columns; None where the fit does not have them."""
+    """Return the pattern over the fitted columns, or None."""
     parts = {"strut-reference-length": pattern.strut_mm, "base-joints": pattern.base_mm.ravel()}
     present = {name for name, _, _ in names}
     if any(np.any(part) and source not in present for source, part in parts.items()):
@@ -121,7 +117,7 @@ def _as_columns(pattern: RigidPattern, names: list[tuple[str, str, str]]) -> NDA
 
 
 def _strut_axes(layout: Layout) -> NDArray[np.float64]:
-    """Unit vectors of the struts in the middle of the travel, shape (6, 3)."""
+    """Return struts' unit vectors in the middle of the travel, shape (6, 3)."""
     travel, hexapod = layout.machine.travel, layout.machine.hexapod
     middle = np.array([0.0, 0.0, sum(travel.z_mm) / 2.0])
     struts = hexapod.platform_joints_mm + middle - hexapod.base_joints_mm
@@ -129,7 +125,7 @@ def _strut_axes(layout: Layout) -> NDArray[np.float64]:
 
 
 def _largest_parts(row: NDArray[np.float64], names: list[tuple[str, str, str]]) -> str:
-    """Describe a direction without a name by its three largest parts, or by the parameter that it is alone."""
+    """Describe a direction by its largest parts, or by its only parameter."""
     largest = np.argsort(-np.abs(row))[:3]
     called = [f"{names[k][0]} {names[k][2].removesuffix('_mm').replace('_', ' ')}" for k in largest]
     if np.abs(row[largest[0]]) > 1.0 - ALONE:

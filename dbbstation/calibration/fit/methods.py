@@ -1,8 +1,7 @@
-"""The paper's three ways to calibrate [CAL IV]: one solver, fed with different knowledge of where balls stand.
+"""The paper's three methods [CAL IV]: one solver with different knowledge of ball positions.
 
-`jig`: a coordinate measuring machine knows every ball in the machine's coordinates.
-`conv-a`: the standard circular test; nobody knows where the ball stands, the centre of each circle says nothing.
-`conv-b`: as before, but a micrometer read how far the ball stands from the tool tip.
+`jig`: a CMM knows every ball. `conv-a`: standard circular test, ball position and centre unknown. `conv-b`: a micrometer
+read the ball's offset from the tool tip.
 """
 
 from __future__ import annotations
@@ -53,17 +52,16 @@ class Method(StrEnum):
 
 
 def as_known(method: Method, machine: Machine, observations: Sequence[Observation]) -> list[Observation]:
-    """Runs with what a method knows of their balls.
+    """Return runs with a method's knowledge of their balls.
 
     Args:
-        method: one of the paper's three.
-        observations: raw runs; the conventional methods take runs about the balls of a jig too, and forget where those stand.
+        observations: raw; conventional methods ignore known ball positions.
 
     Returns:
         The runs, their set-ups changed to what the method knows.
 
     Raises:
-        CalibrationError: a ball whose place the method needs and nobody knows; centred circles.
+        CalibrationError: an unknown but needed ball position; centred circles.
     """
     check_raw(observations)
     if method is Method.JIG:
@@ -79,7 +77,7 @@ def as_known(method: Method, machine: Machine, observations: Sequence[Observatio
 
 
 def _under_spindle(observation: Observation, machine: Machine) -> Observation:
-    """The run with its ball at the tool tip, as well as hand or micrometer had it there."""
+    """Return the run with its ball at the tool tip, as accurate as the set-up."""
     raised = observation.raw.circle.elevation_deg != 0.0
     unknown = np.array([BY_HAND_MM, BY_HAND_MM, BY_HAND_MM if raised else HEIGHT_MM])
     read = observation.setup.set_up_errors
@@ -117,7 +115,7 @@ def _check_read(observations: Sequence[Observation]) -> None:
 
 
 def _check_not_centred(observations: Sequence[Observation]) -> None:
-    """Refuse recordings from which software took the centres out: all stand truer than any ball can be put up."""
+    """Refuse centred recordings: all are truer than a ball's set-up."""
     if not observations:
         return
     seen = [figures(observation.raw) for observation in observations]

@@ -1,10 +1,9 @@
-"""Long runs seen through a few hundred nodes: all that the samples say, at a hundredth of the work.
+"""Long runs seen through a few hundred nodes, without loss.
 
-Where a reading depends on the pose and the time alone, it is as smooth along the circle as the circle itself. Over a
-sector of six degrees it and its derivatives are polynomials of degree five to parts in 1e8, given by their values at
-six nodes. The model is asked at the nodes only. With W the matrix that leads from nodes to samples, J = W Jn, and with
-W = Q R in each sector the samples' J^T J and J^T residual are those of R Jn and Q^T residual: the estimates, their
-covariance and the sum of squares are the samples' own, nothing is averaged. See docs/decisions.md, 2.
+A reading that depends on pose and time is smooth along the circle. Within six degrees it and its derivatives are
+polynomials of degree five to parts in 1e8, given at six nodes. With W from nodes to samples, J = W Jn, and W = Q R by
+sector, J^T J and J^T residual of the samples are those of R Jn and Q^T residual. Estimates, covariance and sum of squares
+are the samples' own. See docs/decisions.md, 2.
 """
 
 from __future__ import annotations
@@ -61,10 +60,10 @@ class RunNodes:
     """A run and its nodes.
 
     Attributes:
-        coarse: the same run with the nodes in place of the samples; its lengths say nothing.
+        coarse: the run with nodes as samples; its lengths mean nothing.
         roots: R of each sector, shape (sectors, nodes, nodes).
         seen: Q^T of measured less nominal length, shape (sectors, nodes) [mm].
-        unseen: length of its residual, which no smooth reading can explain [mm].
+        unseen: norm of the residual beyond smooth readings [mm].
     """
 
     run: Observation
@@ -74,10 +73,9 @@ class RunNodes:
     unseen: float
 
     def samples_of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at all samples, shape (n,), from those at the nodes, shape (m,).
+        """Return values at all samples, shape (n,), from those at the nodes, shape (m,).
 
-        By powers of the place within a sector: weights of all nodes at all samples would take 48 bytes a sample, three times what
-        a recording takes.
+        Powers of the place in a sector save memory: weights would take 48 bytes a sample.
         """
         sector, place = _in_sectors(self.run.raw.phi_deg)
         powers = values.reshape(SECTORS, PER_SECTOR) @ _TO_POWERS.T
@@ -97,10 +95,10 @@ class RunNodes:
         """Compress the run's samples.
 
         Args:
-            columns: of the fit, shape (k,).
-            jacobian: of the reading at the nodes, shape (m, k).
-            length_mm: reading at the nodes, shape (m,) [mm].
-            shift: what is added to measured less predicted length: jacobian times this, shape (k,).
+            columns: shape (k,).
+            jacobian: at the nodes, shape (m, k).
+            length_mm: at the nodes, shape (m,).
+            shift: jacobian times this is added to measured less predicted length, shape (k,).
         """
         nominal = self.run.raw.circle.bar_mm
         rows = self.roots @ jacobian.reshape(SECTORS, PER_SECTOR, -1)
@@ -112,7 +110,7 @@ class RunNodes:
 
 
 def nodes_of(run: Observation) -> RunNodes | None:
-    """Return a run's nodes; None for one that is short, or that was commanded sample by sample."""
+    """Return a run's nodes; None for short runs and those commanded by samples."""
     raw = run.raw
     if len(raw) < LONG * SECTORS * PER_SECTOR or run.commanded is not None:
         return None
@@ -149,17 +147,16 @@ def nodes_of(run: Observation) -> RunNodes | None:
 
 
 def _in_sectors(phi_deg: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Sector of each sample, and its place in it from -1 to 1, shapes (n,)."""
+    """Return each sample's sector and its place there from -1 to 1, shapes (n,)."""
     place = phi_deg * (SECTORS / FULL_TURN_DEG)
     sector = np.clip(place.astype(np.int64), 0, SECTORS - 1)
     return sector, 2.0 * (place - sector) - 1.0
 
 
 def smooth(values: NDArray[np.float64]) -> bool:
-    """Whether quantities at the nodes, shape (m, k), are polynomials within each sector and join between sectors.
+    """Return whether quantities at nodes, shape (m, k), are polynomials that join between sectors.
 
-    What is smaller than a billionth counts as smooth: readings in mm that agree with the nominal length, and
-    derivatives that ought to be zero, are rounding only.
+    Deviations below a billionth are rounding.
     """
     by_sector = values.reshape(SECTORS, PER_SECTOR, -1)
     last = np.abs(np.einsum("p,spk->sk", _LAST, by_sector)).max(axis=0)
@@ -170,7 +167,7 @@ def smooth(values: NDArray[np.float64]) -> bool:
 
 
 def _interpolation(place: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Polynomials that are one at one node and zero at the others, at places from -1 to 1, shape (n, nodes)."""
+    """Return the polynomials that are one at one node, at places from -1 to 1, shape (n, nodes)."""
     distance = place[:, None] - _PLACES
     exact = distance == 0.0
     terms = _WEIGHTS / np.where(exact, 1.0, distance)

@@ -1,7 +1,7 @@
-"""Parameters held at nominal in place of what circles cannot see, as the standard circular test must [CAL III-A-2].
+"""Parameters held at nominal in place of lost directions, as in the standard circular test [CAL III-A-2].
 
-Six directions are lost there. Six prescribed parameters define the machine's coordinates instead: whichever six are
-taken, the circles are explained alike, and the machine's place and tilt in space are what was assumed of them.
+Six directions are lost there. Any six prescribed parameters define coordinates and explain the circles alike; the
+machine's place in space follows from them.
 """
 
 from __future__ import annotations
@@ -33,19 +33,17 @@ LEAST_SHARE = 1e-3
 
 
 def prescribed(layout: Layout, lost: NDArray[np.float64], wanted: Sequence[Name]) -> NDArray[np.float64]:
-    """Rows that hold parameters in place of lost directions.
+    """Return rows that hold parameters in place of lost directions.
 
     Args:
-        layout: columns of the fit.
-        lost: orthonormal rows of lost directions, in units of the scales, shape (h, f).
-        wanted: as many parameters as directions are lost; where none is named, base joints that hold them best.
+        lost: orthonormal rows in scales, shape (h, f).
+        wanted: parameters, equally many; empty: the best base joints.
 
     Returns:
         Unit rows, shape (h, f).
 
     Raises:
-        CalibrationError: another number of parameters, a parameter that is not fitted, parameters that leave a lost
-            direction free.
+        CalibrationError: a wrong number, a parameter not fitted, or a lost direction left free.
     """
     fitted = _fitted(layout)
     if not wanted:
@@ -88,7 +86,7 @@ def _fitted(layout: Layout) -> list[Name]:
 
 
 def _best(fitted: Sequence[Name], lost: NDArray[np.float64]) -> list[int]:
-    """Parameters that hold the lost directions most firmly, base joints first; what nothing depends on holds itself."""
+    """Return the parameters that hold lost directions most firmly, base joints first."""
     if not len(lost):
         return []
     unseen = np.linalg.norm(lost, axis=0) > 1.0 - ROUNDING

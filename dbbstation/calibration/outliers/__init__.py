@@ -1,1 +1,1 @@
-"""Runs that are no circle of this machine and balls off their place: found, named, set free."""
+"""Find, name and free foreign runs and displaced balls."""

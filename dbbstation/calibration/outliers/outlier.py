@@ -1,4 +1,4 @@
-"""Outliers among the runs of a session, and their names."""
+"""Outliers among a session's runs."""
 
 from __future__ import annotations
 
@@ -47,19 +47,18 @@ SOURCE_OF = {
 
 @dataclass(frozen=True, kw_only=True)
 class Outlier:
-    """One outlier, which was kept out of the fit.
+    """An outlier kept out of the fit.
 
     Attributes:
-        test: name of the test; of the session for a bar.
-        runs: label of the run, or of the runs of one putting-up.
-        size_um: how far off: rms of a run, distance of a ball from its place, error of a bar's length [µm].
-        uncertainty_um: standard uncertainty of the size; None for a run [µm].
-        shift_um: where a ball stands, machine axes; None for a run [µm].
-        text: what it looks like, in words.
-        sure: False where a badly seated ball cannot be told from a wrong CMM row: it was put up once only.
-        alike: error sources that would explain the recordings about as well in its place.
-        freed: names of the mountings that may stand anywhere, or of the session whose bar may have any length.
-        why: end of the text, what it may come from.
+        test: or session, for a bar.
+        runs: one label, or those of a mounting.
+        size_um: rms of a run, displacement of a ball, error of a bar's length.
+        uncertainty_um: standard; None for a run.
+        shift_um: of a ball, machine axes; None for a run.
+        sure: False if one mounting cannot tell a bad seat from a wrong CMM row.
+        alike: error sources of about equal explanation.
+        freed: mountings with free ball, or session with free bar.
+        why: probable origin.
     """
 
     kind: OutlierKind

@@ -1,8 +1,7 @@
-"""Runs and balls that do not belong: found one at a time, named, and kept from pulling the fit.
+"""Find outlying runs and balls one at a time and free them.
 
-What is found is freed, not weighted: a ball that stands where it should not may stand anywhere, a run that is no
-circle of this machine is left out. The rest is fitted as before, so that one solver serves and the intervals of
-what remains are those of sound data.
+A displaced ball gets a free position, a foreign run is left out. The same solver fits the rest, whose intervals are those
+of sound data.
 """
 
 from __future__ import annotations
@@ -33,14 +32,14 @@ def calibrate_robust(
     """Fit, and fit again without the outliers.
 
     Args:
-        balls: look for balls off their place too, not only for runs that are no circle of this machine.
-        begun: what was returned for these runs without balls, to go on from.
+        balls: look for displaced balls too.
+        begun: earlier result without balls, to continue.
 
     Returns:
         The last fit, and what was found, in the order in which it stood out.
 
     Raises:
-        CalibrationError: as `fit` does.
+        CalibrationError: as `fit`.
     """
     calibration, before = begun or (fit(list(observations)), ())
     runs, found = list(calibration.observations), list(before)
@@ -54,7 +53,7 @@ def calibrate_robust(
 
 
 def _next(fit: Fit, calibration: Calibration, runs: Sequence[Observation], *, balls: bool) -> Step | None:
-    """Return what stands out most, the runs without its pull, and their fit; None where nothing does."""
+    """Return the worst outlier, the freed runs and their fit, or None."""
     strange = strange_runs(calibration)
     if strange:
         return leave_out(fit, runs, strange)

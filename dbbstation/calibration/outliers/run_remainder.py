@@ -1,4 +1,4 @@
-"""What a fit leaves of a run, and of it what a shift of the run's ball does not explain."""
+"""A run's residual, and its part beyond a shift of the ball."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def left_of(calibration: Calibration) -> list[tuple[Observation, NDArray[np.floa
 
 
 def shift_of(observation: Observation, residual: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Shift of the ball that would explain a residual best, in X and Y, shape (2,) [mm]."""
+    """Return the ball's shift that best explains a residual, in X and Y, shape (2,) [mm]."""
     return -np.asarray(np.linalg.lstsq(_harmonics(observation), residual, rcond=None)[0][:2], dtype=np.float64)
 
 
 def without_shift(observation: Observation, residual: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a residual, shape (n,) [mm], less what the best shift of the ball in the plane explains."""
+    """Return a residual, shape (n,) [mm], less its best in-plane shift."""
     columns = _harmonics(observation)[:, :2]
     return residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
 

@@ -1,4 +1,4 @@
-"""Runs that are no circle of this machine: found, left out, and taken back where physics explains them."""
+"""Find runs that are no circle of this machine, and reinstate explained ones."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ ALONE = 1.2
 
 
 def strange_runs(calibration: Calibration) -> list[int]:
-    """Indices of the runs of one test that are no circle of this machine; empty where all are."""
+    """Return indices of a test's foreign runs; may be empty."""
     return _strange_test(calibration) or _strange_run(calibration)
 
 
 def _strange_test(calibration: Calibration) -> list[int]:
-    """Indices of the runs of a test without which all others fall into place; empty where there is none.
+    """Return indices of a test without which all others fit; may be empty.
 
-    Both directions filed under the wrong test bend the whole fit and hardly stand out of it.
+    Two directions under a wrong test bend the fit and hardly stand out.
     """
     # Run by run: all residuals in one array are a number a sample more.
     squares_um2 = [rms_um(residual) ** 2 for residual in calibration.residual_mm]
@@ -68,26 +68,26 @@ def _strange_test(calibration: Calibration) -> list[int]:
 
 
 def _strange_run(calibration: Calibration) -> list[int]:
-    """Index of the run that leaves most beside a shift of its own ball, if that is far more than usual."""
+    """Return the run with far more than the usual residual beside a shift of its ball."""
     rest = _rests_um(calibration)
     worst = int(np.argmax(rest))
     return [worst] if rest[worst] > _strange_from_um(rest) else []
 
 
 def _rests_um(calibration: Calibration) -> NDArray[np.float64]:
-    """What every run leaves beside a shift of its own ball, shape (r,) [µm]."""
+    """Return every run's residual beside a shift of its ball, shape (r,) [µm]."""
     return np.array([rms_um(without_shift(run, left)) for run, left in left_of(calibration)])
 
 
 def _strange_from_um(rests_um: NDArray[np.float64]) -> float:
-    """What a run must leave to be no circle of the machine [µm]."""
+    """Return the residual that marks a foreign run [µm]."""
     return max(STANDS_OUT * float(np.median(rests_um)), LEAST_UM)
 
 
 def in_place_after_all(
     calibration: Calibration, runs: Sequence[Observation], outliers: Sequence[Outlier]
 ) -> tuple[list[Observation], tuple[Outlier, ...]]:
-    """Runs that belong, and the outliers that stay, where a fit knows physics that was not known when runs were left out."""
+    """Return the sound runs and remaining outliers under newly known physics."""
 
     def named(run: Observation) -> tuple[str, str]:
         return run.setup.session, run.label
@@ -106,7 +106,7 @@ def in_place_after_all(
 
 
 def leave_out(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> Step:
-    """Leave runs of one test out, and see under the fit of the others what they are."""
+    """Leave runs of one test out, and identify them by the fit of the others."""
     kept = [run for i, run in enumerate(runs) if i not in strange]
     again = fit(kept)
     run = runs[strange[0]]
@@ -149,7 +149,7 @@ def _looks_like(
 
 
 def _step(residual: NDArray[np.float64]) -> tuple[float, int]:
-    """Largest difference of means before and after a sample, and that sample; ends of a twentieth are not looked at."""
+    """Return the largest step of means and its sample, without twentieths at the ends."""
     count = len(residual)
     at = np.arange(count // 20 + 1, count - count // 20)
     total = np.cumsum(residual)

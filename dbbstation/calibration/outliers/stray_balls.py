@@ -1,4 +1,4 @@
-"""Balls that are off their place, and bars that are off their length: found and set free."""
+"""Find and free displaced balls and bars of wrong length."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ SAME_SIGMAS = 3.0
 
 
 def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
-    """Give the run whose ball moved within its putting-up one of its own.
+    """Give a run whose ball moved within its mounting an own one.
 
-    None where none moved, or where its mounting has no other run to be apart from.
+    Return None if none moved or the mounting has no other run.
     """
     k = _moved_in(calibration)
     if k is None:
@@ -59,7 +59,7 @@ def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) 
 
 
 def _moved_in(calibration: Calibration) -> int | None:
-    """Index of the run whose ball stands elsewhere than in the other runs of its putting-up."""
+    """Return the run whose ball stands elsewhere than in its mounting's others."""
     shifts = np.array([shift_of(o, r) for o, r in left_of(calibration)])
     away = np.hypot(*shifts.T)
     worst = int(np.argmax(away))
@@ -68,7 +68,7 @@ def _moved_in(calibration: Calibration) -> int | None:
 
 
 def off_its_place(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
-    """Free the ball that is furthest off its place in units of what is usual."""
+    """Free the ball with the greatest displacement in usual units."""
     seats = [seat for seat in seats_of(calibration) if seat.freedom > 0]
     if not seats:
         return None
@@ -89,13 +89,11 @@ def free_ball(
     *,
     together: bool | None = None,
 ) -> Step:
-    """Let the ball of a mounting stand anywhere, with all its other mountings if it stands alike in them.
+    """Free the ball of a mounting, with its other mountings if displaced alike.
 
     Args:
-        fit: calibrates runs.
-        mounting: name of the putting-up that is off.
         seats: of a fit of these runs.
-        together: whether it stands alike in all of them, where that is known; seen from the seats if None.
+        together: None: judged by the seats.
 
     Returns:
         What was found, the runs without its pull, and their fit.
@@ -118,12 +116,12 @@ def free_ball(
 
 
 def set_free(fit: Fit, before: Calibration, source: str, of: str) -> Step | None:
-    """Let what is off be anything from here on; None where the runs cannot be fitted without knowing it.
+    """Free an outlier; None if the runs cannot be fitted then.
 
     Args:
-        before: the last fit.
+        before: last fit.
         source: `mounting`, `ball-coordinate` or `bar-offset`.
-        of: name of the mounting, ball or session that is off.
+        of: mounting, ball or session.
     """
     runs = before.observations
     try:
@@ -137,10 +135,7 @@ def set_free(fit: Fit, before: Calibration, source: str, of: str) -> Step | None
 
 
 def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
-    """Let the bar of a session have any length.
-
-    Args:
-        fit: calibrates runs.
+    """Free the bar length of a session.
 
     Returns:
         What was found, the runs without its pull, and their fit.
@@ -155,7 +150,7 @@ def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
 
 
 def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
-    """What was set free as another fit finds it, such as one with the physics that pulled it; others as they are."""
+    """Return a freed outlier by another fit; others unchanged."""
     if outlier.kind is OutlierKind.BAR:
         found = _bar(calibration, outlier.freed[0], outlier.why)
     elif outlier.freed:
@@ -166,7 +161,7 @@ def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
 
 
 def _ball(calibration: Calibration, kind: OutlierKind, freed: tuple[str, ...], why: str, *, sure: bool) -> Outlier:
-    """A ball that may stand anywhere, as a fit finds it in the first of its mountings."""
+    """Return a freed ball by a fit, in its first mounting."""
     seat = next(seat for seat in seats_of(calibration) if seat.mounting == freed[0])
     of = [run for run in calibration.observations if run.setup.mounting in freed]
     which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {_tests(of)}"
@@ -211,7 +206,7 @@ def _same(a: MountingOffset, b: MountingOffset) -> bool:
 
 
 def _freed(run: Observation) -> Observation:
-    """The run about a ball that may stand anywhere, in height only where a raised bar sees it."""
+    """Return the run with a free ball, in height only if visible."""
     size = np.zeros(3) + run.setup.mounting_repeatability_mm
     seen = 3 if run.raw.circle.elevation_deg != 0.0 else 2
     size[:seen] = UNKNOWN_MM
@@ -228,6 +223,6 @@ def _um(shift_mm: NDArray[np.float64]) -> tuple[float, float, float]:
 
 
 def _towards(shift_mm: NDArray[np.float64]) -> str:
-    """Length and direction of a shift in the plane, such as `31 µm towards 270°`."""
+    """Return length and direction of an in-plane shift, such as `31 µm towards 270°`."""
     angle = np.degrees(np.arctan2(shift_mm[1], shift_mm[0])) % 360.0
     return f"{1e3 * float(np.hypot(*shift_mm[:2])):.1f} µm towards {angle:.0f}°"

@@ -1,1 +1,1 @@
-"""A fit as figures: circles before and after, the machine's plane, maps over the jig plate, plain numbers."""
+"""A fit as figures: circles, plane, maps, plain numbers."""

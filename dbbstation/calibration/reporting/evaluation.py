@@ -1,4 +1,4 @@
-"""Figures of circles before and after, and of the machine's plane, as [CAL Table III] and [CAL Fig 7] have them."""
+"""Figures of circles and plane before and after [CAL Table III, Fig 7]."""
 
 from __future__ import annotations
 
@@ -43,11 +43,10 @@ class CircleDeviations:
     """Figures of one circle [CAL Table III].
 
     Attributes:
-        centre_deviation_um: length of the least-squares centre's offset [µm].
-        mean_radial_error_um: mean of length less radius about the commanded centre [µm].
-        circularity_um: greatest less least deviation from the least-squares circle [µm].
-        centre_deviation_from_first_um: distance of the centre from that of the first test in this direction; None of readings
-            themselves [µm].
+        centre_deviation_um: least-squares centre's offset.
+        mean_radial_error_um: mean length less radius about the commanded centre.
+        circularity_um: range about the least-squares circle.
+        centre_deviation_from_first_um: from the first test's centre in this direction; None for readings.
     """
 
     centre_deviation_um: float
@@ -58,13 +57,13 @@ class CircleDeviations:
 
 @dataclass(frozen=True)
 class LowPassedCircularity:
-    """Circular deviation G of readings low-passed at 30 undulations per revolution.
+    """Circular deviation G, low-passed at 30 undulations per revolution [µm].
 
     Attributes:
-        measured: of the readings [µm].
-        predicted: of what the model makes the bar read [µm].
-        before: of what the nominal machine leaves [µm].
-        after: of what the model leaves [µm].
+        measured: of readings.
+        predicted: of predicted readings.
+        before: of the nominal residual.
+        after: of the model's residual.
     """
 
     measured: float
@@ -75,15 +74,13 @@ class LowPassedCircularity:
 
 @dataclass(frozen=True)
 class EvaluatedRun:
-    """One run before, under the nominal machine, and after, under the model.
+    """One run under the nominal machine (before) and the model (after).
 
     Attributes:
-        direction: `ccw` or `cw`.
-        repeat: counts runs of this test and direction.
-        measured: figures of the readings.
-        before: figures of what the nominal machine leaves.
-        after: figures of what the model leaves.
-        circularity_30_upr_um: the circular deviation without the bar's noise; None where it was not asked for.
+        measured: of readings.
+        before: of the nominal residual.
+        after: of the model's residual.
+        circularity_30_upr_um: without the bar's noise; None if not asked for.
     """
 
     test: str
@@ -100,7 +97,7 @@ class Evaluation:
     """What a model makes of recordings.
 
     Attributes:
-        residual_rms_um: measured minus predicted length over all runs, machine's sources only [µm].
+        residual_rms_um: measured minus predicted length over all runs, machine's sources only.
     """
 
     runs: tuple[EvaluatedRun, ...]
@@ -114,7 +111,7 @@ def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evalua
 
     Raises:
         TraceError: a run that is no circle.
-        ModelError: a source needs what the runs do not give.
+        ModelError: a source needs missing data.
     """
     before, nominal_rms_um = _under(MachineModel(model.machine), observations)
     after, left_rms_um = _under(model.of_the_machine(), observations)
@@ -139,7 +136,7 @@ def _deviations(of: CircleFigures, first: CircleFigures | None = None) -> Circle
 
 
 def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[list[CircleFigures], float]:
-    """Return the figures of every run under a model, and the root mean square of what it leaves of all [µm]."""
+    """Return every run's figures under a model, and the rms of all residuals [µm]."""
 
     def of_run(observation: Observation, residual_mm: NDArray[np.float64]) -> tuple[CircleFigures, float, int]:
         return _figures_of(observation, residual_mm), float(residual_mm @ residual_mm), len(residual_mm)
@@ -156,11 +153,11 @@ def rms_um(residual_mm: Sequence[NDArray[np.float64]]) -> float:
 
 @dataclass(frozen=True)
 class PlaneFigures:
-    """How true the machine moves over a plane when programs are not compensated [CAL Fig 7].
+    """Accuracy of uncompensated motion over a plane [CAL Fig 7].
 
     Attributes:
-        flatness_um: greatest minus least height over eight points of the square [µm].
-        parallelism_um: greatest minus least sideways deviation of a move along X [µm].
+        flatness_um: height range over eight points of the square.
+        parallelism_um: range of lateral deviation of a move along X.
     """
 
     flatness_um: float
@@ -169,16 +166,15 @@ class PlaneFigures:
 
 @with_one_thread
 def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel | None = None) -> PlaneFigures:
-    """Flatness over eight points of X, Y = ±190 mm and parallelism of a move along X through its middle.
+    """Return flatness over eight points of X, Y = ±190 mm, and parallelism of a move along X.
 
-    Of what hangs on the pose alone: backlash has no place of its own, and a machine that warms none that stays.
+    Only pose-dependent sources count.
 
     Args:
-        corrected: what the machine's control believes instead, where a calibration has been entered; the deviation is then what
-            that calibration leaves.
+        corrected: the control's calibrated belief; the deviation is then its residual.
 
     Raises:
-        KinematicsError: the plane lies outside the workspace.
+        KinematicsError: the plane is outside the workspace.
     """
     heights = _error_mm(model, _RING, height_mm, corrected)[:, 2]
     sideways = _error_mm(model, _ALONG, height_mm, corrected)[:, 1]
@@ -187,7 +183,7 @@ def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel
 
 @with_one_thread
 def plane_uncertainty_um(identified: IdentifiedModel, height_mm: float) -> tuple[float | None, float | None]:
-    """Standard uncertainties of flatness and parallelism as a model predicts them [µm]; None where not known."""
+    """Return standard uncertainties of flatness and parallelism [µm], None if unknown."""
     identified = replace(identified, model=identified.model.anywhere())
     found = [
         range_uncertainty_mm(identified, Motion(_level(points, height_mm)), axis)
@@ -206,7 +202,7 @@ def _level(xy_mm: NDArray[np.float64], height_mm: float) -> NDArray[np.float64]:
 def _error_mm(
     model: MachineModel, xy_mm: NDArray[np.float64], height_mm: float, corrected: MachineModel | None
 ) -> NDArray[np.float64]:
-    """Actual minus wanted position at points, shape (n, 3) [mm]."""
+    """Return actual minus wanted positions, shape (n, 3) [mm]."""
     poses = _level(xy_mm, height_mm)
     motion = Motion(poses)
     actual = model.anywhere().actual_poses(motion)
@@ -215,7 +211,7 @@ def _error_mm(
 
 
 def _figures_of(observation: Observation, residual_mm: NDArray[np.float64]) -> CircleFigures:
-    """Figures of the circle that has the nominal bar length plus this residual."""
+    """Return figures of a circle of nominal bar length plus this residual."""
     return figures(observation.raw, observation.raw.circle.bar_mm + residual_mm)
 
 
@@ -229,5 +225,5 @@ def _first_in_direction(observations: Sequence[Observation], k: int) -> int:
 
 
 def apart_um(a: CircleFigures, b: CircleFigures) -> float:
-    """Distance of two circles' centres [µm]."""
+    """Return the distance of two centres [µm]."""
     return 1e3 * float(np.hypot(a.centre_mm[0] - b.centre_mm[0], a.centre_mm[1] - b.centre_mm[1]))

@@ -1,4 +1,4 @@
-"""Everything that a fit says."""
+"""All figures of a fit."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class SourceValues:
     """Parameters of one error source.
 
     Attributes:
-        shared: what has these values, such as a session or mounting; None of the machine.
+        shared: session or mounting; None for the machine.
     """
 
     name: str
@@ -52,11 +52,7 @@ class SourceValues:
 
 @dataclass(frozen=True)
 class ParameterName:
-    """Name of a row of a covariance.
-
-    Attributes:
-        source: error source that it belongs to.
-    """
+    """Name of a row of a covariance."""
 
     source: str
     parameter: str
@@ -65,12 +61,12 @@ class ParameterName:
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Covariance of the machine's parameters, as identified.
+    """Covariance of the machine's identified parameters.
 
-    Along `directions_lost` it has no variance: nothing was identified there, and values stay nominal.
+    It vanishes along `directions_lost`, where values stay nominal.
 
     Attributes:
-        matrix: in the products of their units, shape (k, k).
+        matrix: in products of units, shape (k, k).
     """
 
     rows: tuple[ParameterName, ...]
@@ -79,22 +75,20 @@ class Covariance:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CalibrationFigures:
-    """Everything that a fit says, and what was kept from pulling it.
+    """All figures of a fit, and its outliers.
 
     Attributes:
-        runs: figures of every run, under the nominal machine and under the model.
-        nominal_rms_um: measured less predicted length under the nominal machine [µm].
-        noise_um: of one reading, from differences of neighbours [µm].
-        misfit: the residual beyond noise and mountings.
-        directions_lost: what the tests cannot identify, in words.
-        gaps: what is known of these all the same, in words.
-        directions_regularised: what only tolerances of the machine file tell, in words.
-        parameters_prescribed: held at nominal in place of directions, as `source.parameter`.
-        scatter: whether balls scatter as stated.
-        observability: what the circles see.
-        sources: values of the machine's parameters.
-        measurement_effects: values of what belongs to session, mounting or instrument.
-        motor_currents: what these say; None for circles alone.
+        runs: nominal and under the model.
+        nominal_rms_um: measured less nominally predicted length.
+        noise_um: of a reading, from neighbours.
+        misfit: beyond noise and mountings.
+        directions_lost: in words.
+        gaps: remaining knowledge of them, in words.
+        directions_regularised: known by tolerances only, in words.
+        parameters_prescribed: held in place of directions, as `source.parameter`.
+        sources: of the machine.
+        measurement_effects: of session, mounting or instrument.
+        motor_currents: None for circles alone.
     """
 
     runs: tuple[EvaluatedRun, ...]
@@ -119,7 +113,7 @@ class CalibrationFigures:
 
     @property
     def parameters(self) -> dict[str, Value]:
-        """The machine's parameters as `source.parameter`, with their standard uncertainties."""
+        """Return the machine's parameters as `source.parameter` with standard uncertainties."""
         return {f"{one.name}.{name}": value for one in self.sources for name, value in one.parameters.items()}
 
 
@@ -127,11 +121,10 @@ class CalibrationFigures:
 def calibration_figures(
     calibration: Calibration, evaluation: Evaluation, outliers: Sequence[Outlier] = ()
 ) -> CalibrationFigures:
-    """Return everything that a fit says.
+    """Return all figures of a fit.
 
     Args:
-        evaluation: of its model, with the runs that it was made from.
-        outliers: what was kept from pulling it.
+        evaluation: of its model.
     """
     u = _uncertainties(calibration)
     values = [(term, _values(calibration, term, u)) for term in calibration.layout.terms]
@@ -159,7 +152,7 @@ def calibration_figures(
 
 
 def report_of(figures: CalibrationFigures, **more: Any) -> dict[str, object]:  # noqa: ANN401 - what the file takes
-    """Return the numbers that a model file keeps of its fit.
+    """Return the numbers that a model file keeps.
 
     Args:
         more: further numbers, by name.
@@ -168,7 +161,7 @@ def report_of(figures: CalibrationFigures, **more: Any) -> dict[str, object]:  #
 
 
 def covariance_of(identified: IdentifiedModel) -> Covariance:
-    """Return the covariance of a model's parameters, rows named."""
+    """Return a model's covariance with named rows."""
     units = {
         (fitted.source.name, fitted.shared, parameter.name): parameter.unit
         for fitted in identified.model.sources
@@ -179,7 +172,7 @@ def covariance_of(identified: IdentifiedModel) -> Covariance:
 
 
 def _uncertainties(calibration: Calibration) -> NDArray[np.float64]:
-    """Standard uncertainty of every column, as the model file has it, shape (k,); NaN where not known."""
+    """Return every column's standard uncertainty, shape (k,); NaN if unknown."""
     variance = np.maximum(calibration.solution.variance, 0.0)
     variance += calibration.layout.formula_variance(calibration.x)
     if calibration.prescribed:  # they define coordinates, and all parameters are known in these

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def identified_model(
     calibration: Calibration, report: Mapping[str, Any], sessions: Mapping[str, str]
 ) -> IdentifiedModel:
-    """Return the model to keep: values with the covariance of what belongs to the machine, and where it comes from."""
+    """Return the model to keep, with covariance of the machine's part, and provenance."""
     machines = [term for term in calibration.layout.terms if term.source.belongs_to is Owner.MACHINE]
     rows = np.concatenate([np.r_[term.columns] for term in machines])
     names = calibration.layout.names

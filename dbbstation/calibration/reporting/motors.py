@@ -1,4 +1,4 @@
-"""What the motor currents of a calibration say."""
+"""Motor currents of a calibration."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ MM_PER_M = 1e3
 
 @dataclass(frozen=True)
 class Motor:
-    """One motor; None where the recordings leave a number open.
+    """One motor; None for undetermined numbers.
 
     Attributes:
         motor: 1 to 6.
-        gain_a_kn: current per force of the strut.
+        gain_a_kn: current per strut force.
         force_per_current: of the strut [N/A].
-        torque_per_current: at the screw [Nm/A]; None where the machine file does not say its lead.
-        residual_a: root mean square that the model leaves [A].
-        samples: readings that went in.
+        torque_per_current: at the screw [Nm/A]; None without its lead.
+        residual_a: rms.
+        samples: used readings.
     """
 
     motor: int
@@ -55,9 +55,9 @@ class CurrentsFigures:
     """Motor currents.
 
     Attributes:
-        weight_taken_as_known_n: of the platform, on which forces rest [N].
-        centre_of_gravity: by coordinate and channel, `circles`, `currents` and `both` [mm]; None where a channel leaves it open.
-        notes: what was left out and what cannot be told, in words.
+        weight_taken_as_known_n: of the platform, the basis of forces.
+        centre_of_gravity: by coordinate and channel, `circles`, `currents`, `both` [mm]; None if undetermined.
+        notes: omissions and limits.
     """
 
     weight_taken_as_known_n: float
@@ -67,9 +67,9 @@ class CurrentsFigures:
 
 
 def motor_currents(calibration: Calibration) -> CurrentsFigures | None:
-    """Gains, friction, noise and what is left of each motor, and the centre of gravity by channel.
+    """Return gain, friction, noise and residual of motors, and the centre of gravity by channel.
 
-    None for a calibration from circles alone. A number that the recordings leave open is None.
+    Return None for circles alone; undetermined numbers are None.
     """
     found = calibration.currents
     if found is None:
@@ -117,7 +117,7 @@ def _motor(calibration: Calibration, found: MotorFindings, motor: int) -> Motor:
 
 
 def _centre_of_gravity(calibration: Calibration, found: MotorFindings) -> dict[str, dict[str, Value | None]]:
-    """Each coordinate's shift by circles alone, by currents alone and by both."""
+    """Return each coordinate's shift by circles, by currents and by both."""
     together = _fitted(calibration, "cog-shift")
     shifts: dict[str, dict[str, Value | None]] = {}
     for name in next(iter(found.alone.values()), {}):

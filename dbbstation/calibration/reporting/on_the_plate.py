@@ -1,4 +1,4 @@
-"""Circles before and after a calibration, test by test, and where their centres lie over the jig plate [CAL Fig 6]."""
+"""Circles before and after by test, and their centres over the plate [CAL Fig 6]."""
 
 from __future__ import annotations
 
@@ -30,11 +30,9 @@ class CircleBeforeAfter:
     """One run, by rising angle, shape (s,) each.
 
     Attributes:
-        direction: sense of travel.
         theta_deg: angle from +X towards +Y [deg].
-        before_um: measured length less that of the nominal machine; where a plain circle was commanded, less the bar's
-            nominal length [µm].
-        after_um: measured length less that of the model's machine; balls and bar where plan and session say [µm].
+        before_um: measured less nominally predicted length; less nominal bar length for plain circles.
+        after_um: measured less the model's length; balls and bar as stated.
     """
 
     direction: Direction
@@ -48,8 +46,8 @@ class CircleTest:
     """One test, all its runs together.
 
     Attributes:
-        ball_mm: centre of the fixed ball as the CMM knows it, machine frame, shape (3,) [mm].
-        centre_um: centre of the circle from the ball, mean of its runs, before and after, rows of x, y, shape (2, 2) [µm].
+        ball_mm: by CMM, machine frame, shape (3,).
+        centre_um: from the ball, mean of runs, before and after, rows of x, y, shape (2, 2).
     """
 
     name: str
@@ -61,13 +59,13 @@ class CircleTest:
 
 @dataclass(frozen=True, eq=False)
 class BallShift:
-    """Where the fit finds a ball that was put up.
+    """Where the fit finds a ball.
 
     Attributes:
-        tests: those run about it in that mounting.
-        stated_um: standard deviation per axis, as plan and CMM sheet state it [µm].
-        shift_um: found less stated place in X and Y, shape (2,) [µm].
-        sigma_um: standard deviations of that, shape (2,) [µm].
+        tests: in that mounting.
+        stated_um: standard deviation per axis.
+        shift_um: found less stated place in X and Y, shape (2,).
+        sigma_um: standard deviations, shape (2,).
     """
 
     tests: tuple[str, ...]
@@ -77,7 +75,7 @@ class BallShift:
 
 
 def circle_tests(calibration: Calibration) -> tuple[CircleTest, ...]:
-    """Circles and centres of every test of a fit, in the order of the recordings."""
+    """Return every test's circles and centres, in recording order."""
     observations, model = calibration.observations, calibration.model
     nominal = residuals(MachineModel(model.machine), observations)
     names = names_of_tests(observations)
@@ -97,7 +95,7 @@ def circle_tests(calibration: Calibration) -> tuple[CircleTest, ...]:
 
 
 def ball_shifts(calibration: Calibration) -> tuple[BallShift, ...]:
-    """Where balls stand that are known to stand somewhere: not those put up under the spindle or set free."""
+    """Return shifts of balls at stated places, not under the spindle or freed."""
     tests: dict[str, list[str]] = {}
     for observation, name in zip(calibration.observations, names_of_tests(calibration.observations), strict=True):
         tests.setdefault(observation.setup.mounting, []).append(name)

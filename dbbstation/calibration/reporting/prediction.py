@@ -1,4 +1,4 @@
-"""Circularity as measured and as a model predicts it, run by run: [GRAV Table 3]."""
+"""Measured and predicted circularity, run by run [GRAV Table 3]."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class PredictedCircle:
     """One run.
 
     Attributes:
-        measured_um: circularity of the recording up to 30 undulations per revolution [µm].
-        predicted_um: of what the machine's own sources make the bar read, by the same figure [µm].
-        before_um: of what the nominal machine leaves; the same as measured where a plain circle was commanded [µm].
+        measured_um: up to 30 undulations per revolution.
+        predicted_um: of the machine's predicted readings.
+        before_um: of the nominal residual; as measured for a plain circle.
     """
 
     measured_um: float
@@ -49,14 +49,11 @@ def predicted_circles(
     observations: Sequence[Observation],
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[PredictedCircle, ...]:
-    """Compare the circularity of recordings with what a model says of them.
-
-    Args:
-        progress: called with how many of how many runs are done.
+    """Compare measured and predicted circularity.
 
     Raises:
         TraceError: a run that is no circle.
-        ModelError: a source needs what the runs do not give.
+        ModelError: a source needs missing data.
     """
     nominal = residuals(MachineModel(model.machine), observations)
     left = residuals(model.of_the_machine(), observations)
@@ -75,12 +72,12 @@ def predicted_circles(
 
 
 def smooth_circularity_um(raw: RawCircle, length_mm: NDArray[np.float64]) -> float:
-    """Circularity up to 30 undulations per revolution of lengths, shape (n,) [mm], at a circle's angles [µm]."""
+    """Return circularity up to 30 undulations per revolution of lengths, shape (n,) [mm], at a circle's angles [µm]."""
     return smooth_circularities_um(raw, [length_mm])[0]
 
 
 def smooth_circularities_um(raw: RawCircle, lengths_mm: Sequence[NDArray[np.float64]]) -> list[float]:
-    """The same of several lengths, each of shape (n,) [mm], at one circle's angles [µm]."""
+    """Return the same of several lengths, each of shape (n,) [mm] [µm]."""
     return [figures(raw, smooth_mm).circularity_um for smooth_mm in _smooth_mm(raw, lengths_mm)]
 
 

@@ -1,4 +1,4 @@
-"""What a model leaves of every run, as a map over test and angle."""
+"""A model's residual of every run over test and angle."""
 
 from __future__ import annotations
 
@@ -27,9 +27,8 @@ class ResidualMap:
     """Mean smooth residuals over test and angle.
 
     Attributes:
-        tests: names of the rows, in the order of the recordings.
-        um: by direction, rows by tests, columns by angle from +X towards +Y, NaN where nothing was recorded, shape
-            (tests, 36) each [µm].
+        tests: in recording order.
+        um: by direction, tests by angle from +X towards +Y, NaN for gaps, shape (tests, 36) each [µm].
     """
 
     tests: tuple[str, ...]
@@ -43,10 +42,10 @@ class ResidualMap:
 
 @with_one_thread
 def residual_map(observations: Sequence[Observation], residual_mm: Sequence[NDArray[np.float64]]) -> ResidualMap:
-    """Average what is left of every run, noise taken off, over ten degrees of angle.
+    """Return residuals averaged over ten degrees, noise removed.
 
     Args:
-        residual_mm: what a model leaves of each, shape (n,) [mm].
+        residual_mm: shape (n,) each.
     """
     names = names_of_tests(observations)
     rows = {name: k for k, name in enumerate(dict.fromkeys(names))}
@@ -57,7 +56,7 @@ def residual_map(observations: Sequence[Observation], residual_mm: Sequence[NDAr
 
 
 def names_of_tests(observations: Sequence[Observation]) -> list[str]:
-    """Test of every run, with a number where tests were repeated and the session where there are several."""
+    """Return each run's test, numbered if repeated, with session if several."""
     repeated = any(o.repeat > 1 for o in observations)
     several = len({o.setup.session for o in observations}) > 1
     return [

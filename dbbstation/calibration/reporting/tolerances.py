@@ -1,4 +1,4 @@
-"""Tolerances of the shop, held against what a model makes of runs."""
+"""The shop's tolerances against a model's view of runs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class WorstRun:
-    """The run with the largest figure that a tolerance is for.
+    """The run with the largest toleranced figure.
 
     Attributes:
         run: test, direction and repeat.
@@ -32,10 +32,10 @@ class EvaluatedTolerance:
     """A tolerance, and the worst run under the nominal machine and under the model.
 
     Attributes:
-        tests: that it holds for; empty for all.
-        directions: that it holds for; empty for both.
-        before: under the nominal machine; None where it holds for no run.
-        after: under the model; None where it holds for no run.
+        tests: empty for all.
+        directions: empty for both.
+        before: nominal; None without applicable run.
+        after: under the model; None without applicable run.
     """
 
     quantity: str
@@ -49,10 +49,10 @@ class EvaluatedTolerance:
 def evaluated_tolerances(
     tolerances: Iterable[Tolerance], runs: Sequence[EvaluatedRun]
 ) -> tuple[EvaluatedTolerance, ...]:
-    """Hold tolerances against runs, under the nominal machine and under the model.
+    """Apply tolerances to runs, nominal and under the model.
 
     Args:
-        runs: with the circular deviation of low-passed readings.
+        runs: with low-passed circular deviation.
     """
     return tuple(
         EvaluatedTolerance(

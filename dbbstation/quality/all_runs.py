@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, undecided
-from dbbstation.quality.forms import SIZES, by_place, stacked
+from dbbstation.quality.forms import Forms, form_of
 from dbbstation.quality.knowledge import COEFFICIENTS, HIGHEST_HARMONIC
 from dbbstation.quality.limits import length_quantile
 from dbbstation.quality.together import expected_um, read_um
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.plan.circle import Circle
+    from dbbstation.quality.forms import FormsBesides, RunForm
     from dbbstation.quality.knowledge import Seen
 
 PROBABILITY = 1e-6
@@ -70,26 +71,58 @@ PLANNED = Way("as planned", reverses=False, begin_deg=lambda start: start)
 KEEPING, REVERSING = (tuple(way for way in WAYS if way.reverses is reverses) for reverses in (False, True))
 
 
-def programs_of_all(runs: Sequence[Seen]) -> Finding:
-    """Test whether programs ran in another way than planned.
+class AllForms:
+    """Forms of all runs of a session.
+
+    Attributes:
+        planned: as planned, a column each for the plan and the ways of KEEPING, and one of what a longer bar reads.
+        turned: each as if it had run as the other direction of its test, a column for each way of REVERSING.
+    """
+
+    def __init__(self) -> None:
+        self.planned, self.turned = Forms(_as_planned), Forms(_as_turned)
+
+
+def _as_planned(runs: tuple[Seen, ...]) -> RunForm:
+    return form_of(runs[0], np.column_stack([_off(runs[0], runs[0], (PLANNED, *KEEPING)), np.eye(COEFFICIENTS)[:, :1]]))
+
+
+def _as_turned(runs: tuple[Seen, ...]) -> RunForm:
+    """The form of the first run as it would be judged if it were of the direction of the second."""
+    one, other = runs
+    as_other = replace(one, run=replace(one.run, circle=other.run.circle, expected=other.run.expected))
+    return form_of(as_other, _off(one, as_other, REVERSING))
+
+
+def _off(one: Seen, judged_as: Seen, ways: Sequence[Way]) -> NDArray[np.float64]:
+    """Columns of a form less what is expected, one for each way, shape (7, k) [µm]."""
+    read, run = read_um(one), judged_as.run
+    return np.column_stack([_begun(read, run.circle, way) - expected_um(run) for way in ways])
+
+
+def programs_of_all(runs: Sequence[Seen], forms: AllForms | None = None) -> Finding:
+    """Return whether all runs together are likelier those of programs that ran in another way than the plan's.
 
     Args:
-        runs: all that count; used are those with the other direction on the same mounting, from two tests on.
+        runs: all that count. Those of which the other direction was measured on the same mounting are used, from two tests on.
+        forms: of runs of this session, as far as they are worked out.
     """
-    pairs = [(one, other) for one in runs if (other := _other_direction(one, runs)) is not None]
+    pairs = _pairs(runs)
     if len({one.run.test for one, _ in pairs}) < FEWEST_TESTS:
         return undecided(Name.PROGRAMS, f"fewer than {FEWEST_TESTS} tests were measured in both directions")
-    planned = [one for one, _ in pairs]
-    other_way = [_run_as(one, other) for one, other in pairs]
-    read = [read_um(one) for one in planned]
-    kept, turned = _Likelihood(planned, read, (PLANNED, *KEEPING)), _Likelihood(other_way, read, REVERSING)
-    tried = np.concatenate([kept.logarithms[1:], turned.logarithms])
+    forms = forms or AllForms()
+    forms.planned.hold(_known(runs))
+    forms.turned.hold(pairs)
+    dimensions = COEFFICIENTS * len(pairs)
+    kept = _Likelihood(forms.planned.part([(one,) for one, _ in pairs]), dimensions)
+    turned = _Likelihood(forms.turned.part(pairs), dimensions)
+    tried = np.concatenate([kept.logarithms[1 : len(KEEPING) + 1], turned.logarithms])
     # No way is likelier than another before.
     value = float(logsumexp(tried) - np.log(len(tried)) - kept.logarithms[0])
     best = int(np.argmax(tried))
     way = (*KEEPING, *REVERSING)[best]
     limit = -float(np.log(PROBABILITY))
-    stated = f"all {len(planned)} runs together"
+    stated = f"all {len(pairs)} runs together"
     if value <= 0.0:
         return Finding(
             Name.PROGRAMS,
@@ -109,12 +142,13 @@ def programs_of_all(runs: Sequence[Seen]) -> Finding:
     return Finding(Name.PROGRAMS, value, limit, "", FindingVerdict.WRONG, why, f"all programs ran {way.label}")
 
 
-def bar_of_all(runs: Sequence[Seen], *, by_model: bool) -> Finding:
-    """Test whether the bar had another length.
+def bar_of_all(runs: Sequence[Seen], forms: AllForms | None = None, *, by_model: bool) -> Finding:
+    """Return whether all runs together are likelier those of a bar of another length.
 
     Without a model, an oversized machine explains the same readings, and it is undecided.
 
     Args:
+        forms: of runs of this session, as far as they are worked out.
         by_model: whether a model says where circles lie.
     """
     known = [one for one in runs if one.run.expected is not None and one.run.bar_stated]
@@ -123,7 +157,9 @@ def bar_of_all(runs: Sequence[Seen], *, by_model: bool) -> Finding:
     fewest = 1 if by_model else FEWEST_TESTS
     if len({one.run.test for one in known}) < fewest:
         return undecided(Name.BAR, f"fewer than {fewest} tests were measured")
-    as_stated = _Likelihood(known, [read_um(one) for one in known], (PLANNED,), longer=True)
+    forms = forms or AllForms()
+    forms.planned.hold(_known(runs))
+    as_stated = _Likelihood(forms.planned.part([(one,) for one in known]), COEFFICIENTS * len(known))
     ratio, by_um = as_stated.gained(BAR_UM)
     limit = -float(np.log(PROBABILITY))
     if ratio > limit and not as_stated.fits(0, by_um):
@@ -138,22 +174,22 @@ def bar_of_all(runs: Sequence[Seen], *, by_model: bool) -> Finding:
     return Finding(Name.BAR, ratio, limit, "", FindingVerdict.CANNOT_TELL, why, stated)
 
 
-def _other_direction(one: Seen, runs: Sequence[Seen]) -> Seen | None:
-    """Return the other direction of the same test and mounting with known place."""
-    if one.run.expected is None:
-        return None
-    others = (
-        other
-        for other in runs
-        if (other.run.test, other.run.mounting) == (one.run.test, one.run.mounting)
-        and other.run.circle.direction is not one.run.circle.direction
-        and other.run.expected is not None
-    )
-    return next(others, None)
+def _known(runs: Sequence[Seen]) -> list[tuple[Seen]]:
+    return [(one,) for one in runs if one.run.expected is not None]
 
 
-def _run_as(one: Seen, other: Seen) -> Seen:
-    return replace(one, run=replace(one.run, circle=other.run.circle, expected=other.run.expected))
+def _pairs(runs: Sequence[Seen]) -> list[tuple[Seen, Seen]]:
+    """Return each run with the first of its test and mounting in the other direction, in the order in which both were there."""
+    first: dict[tuple[str, str, float], int] = {}
+    for k, one in enumerate(runs):
+        if one.run.expected is not None:
+            first.setdefault((one.run.test, one.run.mounting, one.run.circle.direction.sign), k)
+    found: list[tuple[int, int]] = []
+    for k, one in enumerate(runs):
+        other = first.get((one.run.test, one.run.mounting, -one.run.circle.direction.sign))
+        if one.run.expected is not None and other is not None:
+            found.append((k, other))
+    return [(runs[k], runs[other]) for k, other in sorted(found, key=max)]
 
 
 def _begun(read: NDArray[np.float64], circle: Circle, way: Way) -> NDArray[np.float64]:
@@ -169,51 +205,36 @@ class _Likelihood:
     """Likelihood of readings by ways, for any size of machine errors.
 
     Args:
-        read: along the plan's travel, shape (7,) each [µm].
-        longer: include readings of a longer bar.
+        part: forms of runs, a column for each way.
+        dimensions: numbers of them.
 
     Attributes:
         logarithms: by way, shape (k,).
     """
 
-    def __init__(
-        self, runs: Sequence[Seen], read: Sequence[NDArray[np.float64]], ways: Sequence[Way], *, longer: bool = False
-    ) -> None:
-        bar = np.eye(COEFFICIENTS)[:, :1] if longer else np.zeros((COEFFICIENTS, 0))
-        off = [
-            np.column_stack([*(_begun(each, one.run.circle, way) - expected_um(one.run) for way in ways), bar])
-            for one, each in zip(runs, read, strict=True)
-        ]
-        self._dimensions = COEFFICIENTS * len(runs)
-        self._few = stacked(by_place(runs, off)).apart()
-        self._by_size = self._few.log_likelihoods()
-        self.logarithms = logsumexp(self._by_size[:, : len(ways)], axis=0)
+    def __init__(self, part: FormsBesides, dimensions: int) -> None:
+        self._part, self._dimensions = part, dimensions
+        self._by_size = part.log_likelihoods()
+        self.logarithms = logsumexp(self._by_size, axis=0)
 
     def fits(self, way: int, longer_um: float = 0.0) -> bool:
         """Return whether readings fit a machine with the known causes.
 
         Args:
-            longer_um: excess of the bar's reading.
+            longer_um: by how much the bar reads too long, which the last column is for [µm].
         """
-        off = self._few.off[:, way] - (longer_um * self._few.off[:, -1] if longer_um else 0.0)
-        distances = [float(np.sum(off**2 / self._few.variances(float(size)))) for size in SIZES]
-        unlikeliness = [
-            distance + float(np.sum(np.log(self._few.variances(float(size)))))
-            for distance, size in zip(distances, SIZES, strict=True)
-        ]
-        return distances[int(np.argmin(unlikeliness))] <= length_quantile(self._dimensions) ** 2
+        white = self._part.white
+        off = white[:, :, way] - (longer_um * white[:, :, -1] if longer_um else 0.0)
+        distances = np.sum(off**2, axis=1)
+        likeliest = int(np.argmin(distances + self._part.log_determinant))
+        return float(distances[likeliest]) <= length_quantile(self._dimensions) ** 2
 
     def gained(self, sigma_um: float) -> tuple[float, float]:
-        """Return the log gain of a longer bar, and its excess [µm]."""
-        off, column = self._few.off.T
-        logarithms, amounts = [], []
-        for size in SIZES:
-            pulled = column / self._few.variances(float(size))
-            # Matrix determinant lemma, and the conditional mean of one normal amount [Rasmussen and Williams, eq. A.9, A.10].
-            weight = float(column @ pulled) + sigma_um**-2
-            amount = float(pulled @ off) / weight
-            logarithms.append(0.5 * (amount**2 * weight - float(np.log(weight * sigma_um**2))))
-            amounts.append(amount)
-        joint = self._by_size[:, 0] + np.array(logarithms)
-        amount = float(np.exp(joint - logsumexp(joint)) @ np.array(amounts))
+        """Return by how much a longer bar makes the readings likelier, as a logarithm, and how much longer it is [µm]."""
+        off, column = self._part.white[:, :, 0], self._part.white[:, :, -1]
+        # Matrix determinant lemma, and the conditional mean of one normal amount [Rasmussen and Williams, eq. A.9, A.10].
+        weights = np.sum(column**2, axis=1) + sigma_um**-2
+        amounts = np.sum(column * off, axis=1) / weights
+        joint = self._by_size[:, 0] + 0.5 * (amounts**2 * weights - np.log(weights * sigma_um**2))
+        amount = float(np.exp(joint - logsumexp(joint)) @ amounts)
         return float(logsumexp(joint) - self.logarithms[0]), amount

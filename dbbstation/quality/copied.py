@@ -47,8 +47,12 @@ def copied(one: Seen, others: Sequence[Seen]) -> Finding:
     places = len(raw) * max(sum(len(length) for _, length in them), 1)
     row = 1 + ceil(log(places / PROBABILITY) / -log(chance))
     share, label = 0.0, ""
+    block = (row + 1) // 2
+    length = 1 << (block.bit_length() - 1)
+    begins = _stretches(raw.length_mm, length)[: max(len(raw) - block + 1, 0) : block]
     for other, length_mm in them:
-        there = _shared(raw.length_mm, length_mm, row) / len(raw) if _may_share(one, other, row) else 0.0
+        shares = min(len(raw), len(length_mm)) >= row and _may_share(begins, other, length)
+        there = _shared(raw.length_mm, length_mm, row) / len(raw) if shares else 0.0
         if there > share:
             share, label = there, other.run.label
     stated = f"{100.0 * share:.0f} % of the readings are those of run {label}, in their order"
@@ -77,21 +81,20 @@ def _chance(analysis: CircleAnalysis) -> float:
     return max(by_turn, chance_of((1e-3 * known * noise.reading_um) ** 2, step_mm))
 
 
-def _may_share(one: Seen, other: Seen, row: int) -> bool:
-    """Return whether neighbouring blocks of a run begin with successive readings of another.
+def _may_share(begins: NDArray[np.uint64], other: Seen, length: int) -> bool:
+    """Return whether two neighbouring blocks of a run begin with readings that follow one another in another run.
 
-    Else `_shared` is zero. The other run's stretches are sorted once for each power-of-two length.
+    Otherwise `_shared` is zero. Stretches of the other run are sorted once for each length, which is a power of two.
+
+    Args:
+        begins: with what each block of the run begins.
+        other: the other run.
+        length: readings of each beginning.
     """
-    assert one.analysis is not None  # noqa: S101 - asked before
     assert other.analysis is not None  # noqa: S101 - asked before
-    own_mm, other_mm, block = one.analysis.raw.length_mm, other.analysis.raw.length_mm, (row + 1) // 2
-    if min(len(own_mm), len(other_mm)) < row:
-        return False
-    length = 1 << (block.bit_length() - 1)
     if length not in other.stretches:
-        other.stretches[length] = np.sort(_stretches(other_mm, length))
+        other.stretches[length] = np.sort(_stretches(other.analysis.raw.length_mm, length))
     known = other.stretches[length]
-    begins = _stretches(own_mm, length)[: len(own_mm) - block + 1 : block]
     at = known[np.minimum(np.searchsorted(known, begins), len(known) - 1)] == begins
     return bool(np.any(at[1:] & at[:-1]))
 

@@ -1,12 +1,14 @@
-"""Forms of runs that share causes, as few numbers whatever the number of runs.
+"""Forms of runs that share causes, as one normal variable: a run more costs its own rows, however many stand beside it.
 
-Each place's own part of the covariance (noise, seat) is whitened. An orthogonal transformation leaves as many rows as
-causes and keeps likelihoods [Bierman, Factorization Methods for Discrete Sequential Estimation (1977), ch. V].
+The covariance of forms is that of the machine's causes, of what several runs share, and of what each has alone. For each size of the machine's
+errors a matrix is kept that makes all forms independent with a variance of one. A run more adds rows to it, as to a Cholesky factor [Golub and
+Van Loan, Matrix Computations, 4.2]. Runs are left out by a projection [Rasmussen and Williams, Gaussian Processes for Machine Learning
+(2006), section 5.4.2].
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +17,7 @@ from dbbstation.quality.knowledge import COEFFICIENTS, HIGHEST_HARMONIC, along_t
 from dbbstation.quality.stated import unseen_um2
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -35,158 +37,33 @@ ANYWHERE_UM = 1e4
 LEAST_UM2 = 1e-12
 """Variance below which no coefficient is known, a picometre squared: recordings without noise are white, too [µm²]."""
 
-UNMOVED = 1e-5
-"""A row that causes of usual size move by less than this share of its noise has noise alone: a likelihood changes by 1e-9 of itself."""
-
 
 @dataclass(frozen=True, eq=False)
-class Forms:
-    """Whitened forms of runs along their travel, and effects of causes.
+class RunForm:
+    """The form of one run along its travel, and what causes do to it.
 
     Attributes:
-        machine: effects of machine causes at usual or stated size, shape (r, p).
-        rest: other shared effects, shape (r, q).
-        off: forms less expectation, shape (r, k).
-        log_determinant: of the own covariance before whitening.
-        dimensions: coefficients of each test.
-        root: from rows of one place to coefficients, shape (r, r) [µm]; empty for several.
+        effects_um: what one standard deviation of each cause does, shape (7, p) each, by the cause and the set of values that it shares
+            with other runs, which is empty for causes of the machine [µm].
+        own_um: standard deviation of what it shares with no other run, shape (7,) [µm].
+        off_um: columns of forms less what is expected without other runs, shape (7, k) [µm].
+        started_s: when its run began [s].
+        drift_um_s: how fast the reading of one place grew on its turn [µm/s].
     """
 
-    machine: NDArray[np.float64]
-    rest: NDArray[np.float64]
-    off: NDArray[np.float64]
-    log_determinant: float
-    tests: tuple[str, ...]
-    dimensions: Mapping[str, int]
-    root: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
-
-    def apart(self) -> Independent:
-        """Return an orthogonal transformation to as many rows as causes and columns, with separate causes."""
-        p, q = self.machine.shape[1], self.rest.shape[1]
-        few = np.hstack([self.machine, self.rest, self.off])
-        if len(few) > few.shape[1]:
-            few = np.asarray(np.linalg.qr(few, mode="r"), dtype=np.float64)
-        axes, grown = _whitening(few[:, p : p + q])
-        few = axes.T @ few / grown[:, None]
-        # Rounding leaves 1e-16 of the largest variance, which is some 1e6 times that of noise, beside which all count.
-        variance, axes = np.linalg.eigh(few[:, :p] @ few[:, :p].T)
-        few, variance = axes.T @ few, np.maximum(variance, 0.0)
-        log_determinant = self.log_determinant + 2.0 * float(np.sum(np.log(grown)))
-        return Independent(few[:, :p], few[:, p : p + q], few[:, p + q :], variance, log_determinant)
+    effects_um: Mapping[tuple[str, str], NDArray[np.float64]]
+    own_um: NDArray[np.float64]
+    off_um: NDArray[np.float64]
+    started_s: float
+    drift_um_s: float
 
 
-@dataclass(frozen=True, eq=False)
-class Independent:
-    """Rows that are independent for any size of machine errors.
-
-    Attributes:
-        machine: effects of machine causes at usual or stated size, shape (r, p).
-        rest: other shared effects, shape (r, q).
-        off: forms less expectation, shape (r, k).
-        variance: by machine causes, beside one by all else, shape (r,).
-    """
-
-    machine: NDArray[np.float64]
-    rest: NDArray[np.float64]
-    off: NDArray[np.float64]
-    variance: NDArray[np.float64]
-    log_determinant: float
-
-    def variances(self, size: float | NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return row variances at a multiple of usual machine errors, shape (r,)."""
-        return 1.0 + size**2 * self.variance
-
-    def log_likelihoods(self) -> NDArray[np.float64]:
-        """Return each column's log density by each of SIZES, shape (9, k), without a constant."""
-        variances = self.variances(SIZES[:, None])
-        squares: NDArray[np.float64] = (1.0 / variances) @ self.off**2
-        return -0.5 * (squares + np.sum(np.log(variances), axis=1)[:, None] + self.log_determinant)
-
-
-def _whitening(shared: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return axes with unit variance and shared causes, and standard deviations along them."""
-    axes, sizes, _ = np.linalg.svd(shared)
-    return axes, np.sqrt(1.0 + np.pad(sizes, (0, len(axes) - len(sizes))) ** 2)
-
-
-def stacked(forms: Sequence[Forms]) -> Forms:
-    """Return stacked rows, for one test no more than causes distinguish."""
-    of_test: dict[tuple[str, ...], list[Forms]] = {}
-    for each in forms:
-        of_test.setdefault(tuple(each.dimensions), []).append(each)
-    return _above([_repeated(_above(each)) if len(each) > 1 else each[0] for each in of_test.values()])
-
-
-def _above(forms: Sequence[Forms]) -> Forms:
-    return Forms(
-        np.vstack([each.machine for each in forms]),
-        np.vstack([each.rest for each in forms]),
-        np.vstack([each.off for each in forms]),
-        sum(each.log_determinant for each in forms),
-        tuple(test for each in forms for test in each.tests),
-        {test: sum(each.dimensions.get(test, 0) for each in forms) for each in forms for test in each.dimensions},
-    )
-
-
-def _repeated(forms: Forms) -> Forms:
-    """Return repeats in rows that causes move, and one row of noise per column."""
-    p, q = forms.machine.shape[1], forms.rest.shape[1]
-    together = np.hstack([forms.machine, forms.rest])
-    axes, sizes, _ = np.linalg.svd(together, full_matrices=len(together) > p + q)
-    moved = int(np.count_nonzero(sizes > UNMOVED))
-    rows = axes.T @ np.hstack([together, forms.off])
-    still = np.linalg.qr(rows[moved:, p + q :], mode="r")
-    kept = np.vstack([rows[:moved], np.hstack([np.zeros((len(still), p + q)), still])])
-    tests = (forms.tests[0],) * len(kept)
-    return Forms(kept[:, :p], kept[:, p : p + q], kept[:, p + q :], forms.log_determinant, tests, forms.dimensions)
-
-
-def by_place(runs: Sequence[Seen], off_um: Sequence[NDArray[np.float64]]) -> list[Forms]:
-    """Return the forms by place: one test on one mounting.
-
-    Args:
-        runs: n, with known places.
-        off_um: forms along the travel less expectation, shape (7, k) each.
-    """
-    effects = [_effects(each) for each in runs]
-    places: dict[tuple[str, str], list[int]] = {}
-    holders: dict[tuple[str, str], set[tuple[str, str]]] = {}
-    for k, each in enumerate(runs):
-        place = each.run.test, each.run.mounting
-        places.setdefault(place, []).append(k)
-        for key in effects[k]:
-            holders.setdefault(key, set()).add(place)
-    width = {key: effect.shape[1] for each in effects for key, effect in each.items()}
-
-    def columns(rows: Sequence[int], keys: Sequence[tuple[str, str]]) -> NDArray[np.float64]:
-        wide = [[effects[k].get(key, np.zeros((COEFFICIENTS, width[key]))) for key in keys] for k in rows]
-        return np.vstack([np.hstack([np.zeros((COEFFICIENTS, 0)), *each]) for each in wide])
-
-    machine = [key for key in holders if not key[1]]
-    shared = [key for key, where in holders.items() if key[1] and len(where) > 1]
-    # What the overlaps show of a drift may have gone on through the session.
-    rate = float(np.sqrt(np.mean([each.drift_um_s**2 for each in runs])))
-    found = []
-    for place, rows in places.items():
-        alone = columns(rows, [key for key, where in holders.items() if key[1] and where == {place}])
-        drift = np.concatenate([rate * (runs[k].run.started_s or 0.0) * np.eye(COEFFICIENTS)[0] for k in rows])
-        rest = np.column_stack([columns(rows, shared), drift])
-        off = np.concatenate([off_um[k] for k in rows])
-        sigma = np.sqrt(np.concatenate([own_um2(runs[k]) for k in rows]))
-        axes, grown = _whitening(alone / sigma[:, None])
-        white = axes.T / grown[:, None] / sigma
-        found.append(
-            Forms(
-                white @ columns(rows, machine),
-                white @ rest,
-                white @ off,
-                2.0 * float(np.sum(np.log(sigma)) + np.sum(np.log(grown))),
-                (place[0],) * len(sigma),
-                {place[0]: len(sigma)},
-                sigma[:, None] * axes * grown,
-            )
-        )
-    return found
+def form_of(one: Seen, off_um: NDArray[np.float64]) -> RunForm:
+    """Return the form of a run of which it is known where it should lie; columns as of `RunForm.off_um`."""
+    signs = along_travel(one.run.circle)[:, None]
+    effects = {} if one.run.expected is None else one.run.expected.effects_um
+    along = {key: signs * effect for key, effect in effects.items()}
+    return RunForm(along, np.sqrt(own_um2(one)), off_um, one.run.started_s or 0.0, one.drift_um_s)
 
 
 def own_um2(one: Seen) -> NDArray[np.float64]:
@@ -197,7 +74,192 @@ def own_um2(one: Seen) -> NDArray[np.float64]:
     return own
 
 
-def _effects(one: Seen) -> dict[tuple[str, str], NDArray[np.float64]]:
-    signs = along_travel(one.run.circle)
-    effects = {} if one.run.expected is None else one.run.expected.effects_um
-    return {key: signs[:, None] * effect for key, effect in effects.items()}
+Held = tuple["Seen", ...]
+"""What a form is made of: a run, or a run and the one as which it is looked at."""
+
+
+class Forms:
+    """Forms of the runs of a session; those that are held stay worked out, and a run more is added to them.
+
+    Args:
+        form: makes the form of what is held.
+    """
+
+    def __init__(self, form: Callable[[Held], RunForm]) -> None:
+        self._form = form
+        self._held: list[tuple[Held, RunForm]] = []
+        self._machine, self._rest = _Columns(), _Columns()
+        self._whitening = np.zeros((len(SIZES), 0, 0))
+        self._white = np.zeros((len(SIZES), 0, 0))
+        self._log_determinants: list[NDArray[np.float64]] = []
+
+    def hold(self, runs: Sequence[Held]) -> None:
+        """Hold these runs: what was held behind the first that differs is given up."""
+        pairs = enumerate(zip(runs, self._held, strict=False))
+        alike = next((k for k, (one, (held, _)) in pairs if _key(one) != _key(held)), min(len(runs), len(self._held)))
+        del self._held[alike:], self._log_determinants[alike:]
+        for one in runs[alike:]:
+            self._add(one, self._form(one))
+
+    def _add(self, one: Held, form: RunForm) -> None:
+        """Add the rows of one form, in units of what its run has alone."""
+        n = COEFFICIENTS * len(self._held)
+        behind = n + COEFFICIENTS
+        unit = 1.0 / form.own_um[:, None]
+        of_machine = {key: unit * effect for key, effect in form.effects_um.items() if not key[1]}
+        of_rest = {key: unit * effect for key, effect in form.effects_um.items() if key[1]}
+        by_machine, by_rest = self._machine.add(n, of_machine), self._rest.add(n, of_rest)
+        columns = unit * np.column_stack([form.off_um, form.started_s * np.eye(COEFFICIENTS)[0]])
+        self._make_room(behind, columns.shape[1])
+        covariance = SIZES[:, None, None] ** 2 * by_machine + by_rest
+        before = self._whitening[:, :n, :n]
+        shared = covariance[:, :, :n] @ _turned(before)
+        variance, axes = np.linalg.eigh(covariance[:, :, n:] + np.eye(COEFFICIENTS) - shared @ _turned(shared))
+        variance = np.maximum(variance, 1.0)  # what the run has alone; rounding may leave less
+        white = _turned(axes) / np.sqrt(variance)[:, :, None]
+        self._whitening[:, :n, n:behind] = 0.0
+        self._whitening[:, n:behind, :n] = -white @ (shared @ before)
+        self._whitening[:, n:behind, n:behind] = white
+        self._white[:, n:behind] = white @ (columns - shared @ self._white[:, :n])
+        self._held.append((one, form))
+        self._log_determinants.append(np.sum(np.log(variance), axis=1))
+
+    def _make_room(self, rows: int, columns: int) -> None:
+        room = self._whitening.shape[1]
+        if rows > room:
+            wider = np.zeros((len(SIZES), 2 * rows, 2 * rows))
+            wider[:, :room, :room] = self._whitening
+            white = np.zeros((len(SIZES), 2 * rows, columns))
+            white[:, :room] = self._white[:, :room] if room else 0.0
+            self._whitening, self._white = wider, white
+
+    def part(self, runs: Sequence[Held], beside: Held | None = None) -> FormsBesides:
+        """Return the forms of some of the runs that are held, and what they say of the others.
+
+        A drift that overlaps show may have gone on through the session: its usual size is that of all these runs.
+
+        Args:
+            runs: which.
+            beside: run that is held against them, whose overlap counts, too.
+        """
+        chosen = {_key(one) for one in runs}
+        left_out = [k for k, (held, _) in enumerate(self._held) if _key(held) not in chosen]
+        counted = chosen if beside is None else {*chosen, _key(beside)}
+        rates = [form.drift_um_s for held, form in self._held if _key(held) in counted]
+        return FormsBesides(self, left_out, float(np.sqrt(np.mean(np.square(rates)))))
+
+    def rows(self, runs: Sequence[Held]) -> NDArray[np.int64]:
+        """Return which rows are those of runs that are held."""
+        wanted = {_key(one) for one in runs}
+        return rows_of([k for k, (held, _) in enumerate(self._held) if _key(held) in wanted])
+
+    def all(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return what makes all forms independent, shape (9, n, n), their columns and that of a drift, so, (9, n, k + 1), and log-determinants."""
+        n = COEFFICIENTS * len(self._held)
+        return self._whitening[:, :n, :n], self._white[:, :n], np.sum(self._log_determinants, axis=0)
+
+    def place(self, one: Held) -> tuple[int, NDArray[np.float64]]:
+        """Return the place of a run among all that are held, and what it has alone, shape (7,) [µm]."""
+        return next((k, form.own_um) for k, (held, form) in enumerate(self._held) if _key(held) == _key(one))
+
+
+class FormsBesides:
+    """Forms of some of the runs that are held, for each of SIZES, and what they say of the runs left out.
+
+    What overlaps show of a drift is one cause more of all of them: a change of rank one [Golub and Van Loan, 2.1.4].
+
+    Args:
+        forms: of all runs.
+        left_out: places of those left out.
+        rate_um_s: standard deviation of the drift [µm/s].
+
+    Attributes:
+        white: columns of the part as independent numbers with a variance of one, shape (9, n, k).
+        log_determinant: of its covariance, in units of what each run has alone, shape (9,).
+    """
+
+    def __init__(self, forms: Forms, left_out: Sequence[int], rate_um_s: float) -> None:
+        self._forms, self._left_out = forms, left_out
+        self._whitening, columns, log_determinant = forms.all()
+        self._basis, self._root = np.linalg.qr(self._whitening[:, :, rows_of(left_out)])
+        self._along = _turned(self._basis) @ columns
+        columns = columns - self._basis @ self._along
+        sizes = np.abs(np.diagonal(self._root, axis1=1, axis2=2))
+        self._drift, off = columns[:, :, -1:], columns[:, :, :-1]
+        square = np.sum(self._drift**2, axis=(1, 2))
+        grown = 1.0 + rate_um_s**2 * square
+        self._share = ((1.0 - 1.0 / np.sqrt(grown)) / np.where(square > 0.0, square, 1.0))[:, None, None]
+        self._variance = (rate_um_s**2 / grown)[:, None, None]
+        self._amount = self._variance * (_turned(self._drift) @ off)
+        self.white = off - self._share * self._drift @ (_turned(self._drift) @ off)
+        self.log_determinant = log_determinant + 2.0 * np.sum(np.log(sizes), axis=1) + np.log(grown)
+
+    def log_likelihoods(self) -> NDArray[np.float64]:
+        """Return the logarithm of the density of each column, by each of SIZES, shape (9, k); without a constant."""
+        return -0.5 * (np.sum(self.white**2, axis=1) + self.log_determinant[:, None])
+
+    def beside(self, one: Held) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return columns of a run left out less what the part says of it, shape (9, 7, k) [µm], and their covariance, (9, 7, 7) [µm²]."""
+        place, own_um = self._forms.place(one)
+        rows = rows_of([self._left_out.index(place)])
+        # Of all runs left out: residual e = B^-1 p with covariance B^-1, where B is their block of the inverse and p its pull.
+        root = np.linalg.inv(self._root)[:, rows]
+        apart = root @ self._along
+        drift, off = apart[:, :, -1:], apart[:, :, :-1]
+        covariance = root @ _turned(root) + self._variance * drift @ _turned(drift)
+        return own_um[:, None] * (off - drift @ self._amount), own_um[:, None] * covariance * own_um
+
+    def length_without(self, size: int, rows: NDArray[np.int64]) -> float:
+        """Return how far runs of the part are from what its other runs say of them, in standard deviations.
+
+        Args:
+            size: which of SIZES.
+            rows: of these runs.
+        """
+        basis, drift = self._basis[size], self._drift[size]
+        seen = self._whitening[size][:, rows]
+        seen = seen - basis @ (basis.T @ seen)
+        seen -= self._share[size] * drift @ (drift.T @ seen)
+        pull = seen.T @ self.white[size][:, 0]
+        return float(np.sqrt(pull @ np.linalg.solve(seen.T @ seen, pull)))
+
+
+class _Columns:
+    """What causes do to forms, side by side, with room for more of both."""
+
+    def __init__(self) -> None:
+        self._of: dict[tuple[str, str], slice] = {}
+        self._effects = np.zeros((0, 0))
+
+    def add(self, n: int, effects: Mapping[tuple[str, str], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Add the rows of one form behind n others; return its covariance with them and with itself, shape (7, n + 7)."""
+        wide = max((place.stop for place in self._of.values()), default=0)
+        for cause, effect in effects.items():
+            if cause not in self._of:
+                self._of[cause] = slice(wide, wide + effect.shape[1])
+                wide = self._of[cause].stop
+        behind = n + COEFFICIENTS
+        room = tuple(
+            most if need <= most else max(2 * most, need)
+            for need, most in zip((behind, wide), self._effects.shape, strict=True)
+        )
+        if room != self._effects.shape:
+            effects_before, self._effects = self._effects, np.zeros(room)
+            self._effects[:n, : effects_before.shape[1]] = effects_before[:n]
+        self._effects[n:behind] = 0.0
+        for cause, effect in effects.items():
+            self._effects[n:behind, self._of[cause]] = effect
+        return self._effects[n:behind, :wide] @ self._effects[:behind, :wide].T
+
+
+def rows_of(places: Sequence[int]) -> NDArray[np.int64]:
+    """Return the rows of forms by their places."""
+    return (COEFFICIENTS * np.array(places, dtype=np.int64)[:, None] + np.arange(COEFFICIENTS)).ravel()
+
+
+def _key(one: Held) -> tuple[int, ...]:
+    return tuple(map(id, one))
+
+
+def _turned(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.swapaxes(matrices, -1, -2)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.quality.all_runs import bar_of_all, programs_of_all
+from dbbstation.quality.all_runs import AllForms, bar_of_all, programs_of_all
 from dbbstation.quality.between import direction, other_direction, repeat
 from dbbstation.quality.copied import copied
 from dbbstation.quality.finding import Finding, Name, stricter
@@ -95,7 +95,8 @@ class SessionRuns:
     """A session's analysed runs with pairs; judges any of them or a new one.
 
     Args:
-        runs: in recording order.
+        runs: in the order in which they were recorded.
+        known: other runs of the same session, of which pairs and forms are known.
     """
 
     def __init__(self, runs: Sequence[Seen], known: SessionRuns | None = None) -> None:
@@ -105,6 +106,7 @@ class SessionRuns:
             self._of_test.setdefault(one.run.test, []).append(one)
         self._pairs: dict[tuple[Seen, Seen], _Pair] = {} if known is None else known._pairs  # noqa: SLF001 - the same class
         self._without: SessionRuns | None = None if known is None else known._without  # noqa: SLF001
+        self._forms: AllForms = AllForms() if known is None else known._forms  # noqa: SLF001
         taken: set[int] = set()
         self._directions, self._repeats = [], []
         for one in self._runs:
@@ -129,7 +131,7 @@ class SessionRuns:
         findings = list(by_itself(one, others))
         if one.analysis is not None:
             findings.append(copied(one, others.every))
-            known = self._beside(one, one.analysis)
+            known = self._beside(one, one.analysis, others)
             if one.run.usual is not None:
                 without = self._without_model._beside(one.without_model, one.analysis)  # noqa: SLF001 - the same class
                 known = [stricter(by_model, by_usual) for by_model, by_usual in zip(known, without, strict=True)]
@@ -143,9 +145,10 @@ class SessionRuns:
         self._without = SessionRuns([one.without_model for one in self._runs], self._without)
         return self._without
 
-    def _beside(self, one: Seen, analysis: CircleAnalysis) -> list[Finding]:
-        others = self._others(one)
-        both = together(one, others)
+    def _beside(self, one: Seen, analysis: CircleAnalysis, others: Others | None = None) -> list[Finding]:
+        """What is found of a run by what is known of its circle and by the other runs."""
+        others = others or self._others(one)
+        both = together(one, self._runs if one in self._runs else [*self._runs, one], self._forms.planned)
         by_others = expected_beside(both)
         expected = by_others or one.run.expected
         return [
@@ -164,10 +167,10 @@ class SessionRuns:
     @cached_property
     def _of_all(self) -> tuple[Finding, Finding]:
         by_model = any(one.run.usual is not None for one in self._runs)
-        return programs_of_all(self._runs), bar_of_all(self._runs, by_model=by_model)
+        return programs_of_all(self._runs, self._forms), bar_of_all(self._runs, self._forms, by_model=by_model)
 
     def _with(self, one: Seen) -> SessionRuns:
-        return SessionRuns([*self._runs, one])
+        return SessionRuns([*self._runs, one], self)
 
     def _others(self, one: Seen) -> Others:
         directions = [pair for pair in self._directions if not pair.has(one)]
@@ -176,9 +179,7 @@ class SessionRuns:
         return Others(
             noise_um=tuple(a.noise.reading_um for a in analyses),
             closure_um=tuple((a.closure.height_um, a.closure.u_um) for a in analyses if a.closure is not None),
-            drift_um=tuple(
-                (a.passes.mean_um, a.passes.u_mean_um(a.noise.sigma_um)) for a in analyses if a.passes is not None
-            ),
+            drift_um=tuple(o.drift_um for o in self._runs if o is not one and o.drift_um is not None),
             longer_s=tuple(o.longer_s for o in self._runs if o is not one and o.longer_s is not None),
             directions_um=tuple(pair.apart_um for pair in directions),
             repeats_um=tuple(pair.apart_um for pair in repeats),

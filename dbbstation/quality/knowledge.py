@@ -195,6 +195,13 @@ class Seen:
         return self.analysis.noise.sigma_um / float(np.sqrt(len(self.analysis.raw)))
 
     @cached_property
+    def drift_um(self) -> tuple[float, float] | None:
+        """Drift over the turn by the overlap and its standard uncertainty by noise; None where it has none [µm]."""
+        if self.analysis is None or self.analysis.passes is None:
+            return None
+        return self.analysis.passes.mean_um, self.analysis.passes.u_mean_um(self.analysis.noise.sigma_um)
+
+    @cached_property
     def drift_um_s(self) -> float:
         """Return the drift at one place by the overlap; zero without overlap [µm/s]."""
         passes = None if self.analysis is None else self.analysis.passes

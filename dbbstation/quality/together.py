@@ -8,51 +8,71 @@ Learning (2006), eq. 2.23 and 2.24]. How large this machine's errors are beside 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import logsumexp
 
-from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE, SIZES, by_place, stacked
+from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import FEWEST_OTHERS, median_length
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import NDArray
 
     from dbbstation.plan.circle import Circle
-    from dbbstation.quality.forms import Forms, Independent
-    from dbbstation.quality.knowledge import Expected, Others, Planned, Run, Seen
+    from dbbstation.quality.forms import Forms, FormsBesides
+    from dbbstation.quality.knowledge import Expected, Planned, Run, Seen
 
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Runs of different tests beside one another; the first is the one that is judged."""
+    """Runs of different tests beside one another; the first is the one that is judged.
+
+    Attributes:
+        runs: n runs.
+        others: forms of all but the first.
+        rows: where the rows of each other test stand among those that are held.
+        apart_um: form of the first less what the others say of it, for each of SIZES, shape (9, 7) [µm].
+        covariance_um2: of that, shape (9, 7, 7) [µm²].
+    """
 
     runs: tuple[Seen, ...]
-    first: Forms
-    others: Forms
-
-    @cached_property
-    def apart(self) -> Independent:
-        """The others in independent rows."""
-        return self.others.apart()
+    others: FormsBesides
+    rows: Mapping[str, NDArray[np.int64]]
+    apart_um: NDArray[np.float64]
+    covariance_um2: NDArray[np.float64]
 
     def log_likelihoods(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return those of all runs, and of all but the first, for each of SIZES, shape (9,) each."""
-        whole = stacked([self.first, self.others]).apart()
-        return whole.log_likelihoods()[:, 0], self.apart.log_likelihoods()[:, 0]
+        of_others = self.others.log_likelihoods()[:, 0]
+        pulls = np.linalg.solve(self.covariance_um2, self.apart_um[:, :, None])[:, :, 0]
+        squares = np.sum(self.apart_um * pulls, axis=1)
+        return of_others - 0.5 * (squares + np.linalg.slogdet(self.covariance_um2)[1]), of_others
 
 
-def together(one: Seen, others: Others) -> Together | None:
-    """Return a run beside the runs of other tests; None where nothing is known of it, or no other test was measured."""
-    them = [o for o in others.every if o.run.test != one.run.test and o.run.expected is not None]
+def together(one: Seen, runs: Sequence[Seen], forms: Forms) -> Together | None:
+    """Return a run beside the runs of other tests; None where nothing is known of it, or no other test was measured.
+
+    Args:
+        one: the run.
+        runs: all that count, this one among them.
+        forms: of runs of this session; the first column is that of forms as planned.
+    """
+    known = [other for other in runs if other.run.expected is not None]
+    them = [other for other in known if other.run.test != one.run.test]
     if one.run.expected is None or not them:
         return None
-    runs = (one, *them)
-    first, *rest = by_place(runs, [(read_um(each) - expected_um(each.run))[:, None] for each in runs])
-    return Together(runs, first, stacked(rest))
+    forms.hold([(each,) for each in known])
+    others = forms.part([(each,) for each in them], (one,))
+    of_test: dict[str, list[tuple[Seen]]] = {}
+    for each in them:
+        of_test.setdefault(each.run.test, []).append((each,))
+    apart_um, covariance_um2 = others.beside((one,))
+    rows = {test: forms.rows(each) for test, each in of_test.items()}
+    return Together((one, *them), others, rows, apart_um[:, :, 0], covariance_um2)
 
 
 def expected_beside(both: Together | None) -> Expected | None:
@@ -67,42 +87,22 @@ def expected_beside(both: Together | None) -> Expected | None:
     """
     if both is None or (own := both.runs[0].run.expected) is None:
         return None
-    of_others = both.apart.log_likelihoods()[:, 0]
+    of_others = both.others.log_likelihoods()[:, 0]
     weights = np.exp(of_others - logsumexp(of_others))
-    first, others = both.first, both.apart
-    by_rest = first.rest @ others.rest.T
-    by_machine = first.machine @ others.machine.T
-    means, conditional = [], []
-    for size in SIZES:
-        across = size**2 * by_machine + by_rest
-        gain = across / others.variances(float(size))
-        means.append(gain @ others.off[:, 0])
-        whole = np.eye(len(first.off)) + size**2 * first.machine @ first.machine.T + first.rest @ first.rest.T
-        conditional.append(whole - gain @ across.T)
-    mean = np.einsum("s,si->i", weights, means)
-    scatter = np.array(means) - mean
-    covariance = np.einsum("s,sij->ij", weights, conditional) + np.einsum("s,si,sj->ij", weights, scatter, scatter)
-    covariance *= _straying(both.others, float(SIZES[int(np.argmax(of_others))])) ** 2
-    root = both.first.root
-    return _placed(own, both.runs[0].run.circle, root @ mean, root @ covariance @ root.T)
+    apart = np.einsum("s,si->i", weights, both.apart_um)
+    scatter = both.apart_um - apart
+    covariance = np.einsum("s,sij->ij", weights, both.covariance_um2)
+    covariance += np.einsum("s,si,sj->ij", weights, scatter, scatter)
+    covariance *= _straying(both, int(np.argmax(of_others))) ** 2
+    one = both.runs[0]
+    return _placed(own, one.run.circle, read_um(one) - expected_um(one.run) - apart, covariance)
 
 
-def _straying(others: Forms, size: float) -> float:
+def _straying(both: Together, size: int) -> float:
     """By how many times more than they should the other tests differ from what the rest of them show; one at the least."""
-    of_test: dict[str, list[int]] = {}
-    for row, test in enumerate(others.tests):
-        of_test.setdefault(test, []).append(row)
-    if len(of_test) < FEWEST_OTHERS:
+    if len(both.rows) < FEWEST_OTHERS:
         return 1.0
-    columns = np.hstack([size * others.machine, others.rest])
-    # With F = Q R of the columns above ones, the inverse of 1 + F F' is 1 - Q Q' [Woodbury].
-    seen = np.linalg.qr(np.vstack([columns, np.eye(columns.shape[1])]))[0][: len(columns)]
-    pulled = others.off[:, 0] - seen @ (seen.T @ others.off[:, 0])
-    lengths = []
-    for test, rows in of_test.items():
-        # Of a test without the rest: residual e = B^-1 p, covariance B^-1, with B the test's block of the inverse and p its pull.
-        block, pull = np.eye(len(rows)) - seen[rows] @ seen[rows].T, pulled[rows]
-        lengths.append(float(np.sqrt(pull @ np.linalg.solve(block, pull))) / median_length(others.dimensions[test]))
+    lengths = [both.others.length_without(size, rows) / median_length(len(rows)) for rows in both.rows.values()]
     return max(float(np.median(lengths)), 1.0)
 
 

@@ -11,10 +11,10 @@ from scipy.stats import binom, chi2
 
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.quality.finding import FindingVerdict, Name
-from dbbstation.quality.forms import Forms
+from dbbstation.quality.forms import Forms, form_of
 from dbbstation.quality.judge import SessionRuns
-from dbbstation.quality.knowledge import COEFFICIENTS, Expected, seen
-from dbbstation.quality.together import Together, expected_beside
+from dbbstation.quality.knowledge import COEFFICIENTS, Expected, along_travel, seen
+from dbbstation.quality.together import Together, expected_beside, together
 from tests.quality.sessions import finding_of, sound
 from tests.quality.spoilers import elsewhere, larger, mirrored
 
@@ -22,26 +22,19 @@ N = COEFFICIENTS
 TESTS = 6
 
 
-def run(test: str, circle: Circle) -> SimpleNamespace:
-    expected = Expected(np.array([0.01, -0.02]), 0.005, np.eye(3))
-    return SimpleNamespace(run=SimpleNamespace(test=test, circle=circle, expected=expected))
+def run(test: str, circle: Circle, off_um: np.ndarray, effects_um: np.ndarray) -> SimpleNamespace:
+    """A run with a noise of one micrometre, whose form is off by so much along its travel."""
+    signs = along_travel(circle)
+    effects = {("machine", ""): signs[:, None] * effects_um}
+    expected = Expected(np.array([0.01, -0.02]), 0.005, np.eye(3), effects_um=effects)
+    of_it = SimpleNamespace(test=test, circle=circle, expected=expected, started_s=None)
+    return SimpleNamespace(run=of_it, coefficients_um=signs * off_um, u_um=1.0, drift_um_s=0.0)
 
 
-def beside(runs, off, effects) -> Together:
-    tests = tuple(each.run.test for each in runs for _ in range(N))
-    first, others = (
-        Forms(
-            effects[rows],
-            np.zeros((len(off[rows]), 0)),
-            off[rows, None],
-            0.0,
-            tests[rows],
-            dict.fromkeys(tests, N),
-            np.eye(len(off[rows])),
-        )
-        for rows in (slice(N), slice(N, None))
-    )
-    return Together(runs, first, others)
+def beside(circle: Circle, off: np.ndarray, effects: np.ndarray) -> Together:
+    runs = [run(str(k), circle, off[N * k : N * (k + 1)], effects[N * k : N * (k + 1)]) for k in range(TESTS)]
+    forms = Forms(lambda held: form_of(held[0], held[0].coefficients_um[:, None] * along_travel(circle)[:, None]))
+    return together(runs[0], runs, forms)  # type: ignore[arg-type, return-value]  # what is asked of runs is there
 
 
 @pytest.mark.parametrize("direction", list(Direction))
@@ -51,11 +44,10 @@ def test_a_circle_lies_where_draws_of_the_same_causes_put_it(direction: Directio
     start, elevation = np.radians(30.0), 60.0
     circle = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 30.0, 45, 1.5, elevation, direction)
     effects = rng.normal(0.0, 100.0, (N * TESTS, 6))
-    runs = tuple(run(str(k), circle) for k in range(TESTS))
     inside, draws, shifts = 0, 300, []
     for _ in range(draws):
         off = effects @ rng.normal(0.0, 0.3, 6) + rng.normal(0.0, 1.0, N * TESTS)
-        found = expected_beside(beside(runs, off, effects))  # type: ignore[arg-type]  # what is asked of runs is there
+        found = expected_beside(beside(circle, off, effects))
         # A shift d along the start of the turn, and one e across it along the travel, move readings by cos 60° (d cos phi + e sin phi).
         along, across = np.sqrt(2.0) * off[1] / 0.5, np.sqrt(2.0) * off[N // 2 + 1] / 0.5 * direction.sign
         turn = np.array([[np.cos(start), -np.sin(start)], [np.sin(start), np.cos(start)]])
@@ -72,12 +64,11 @@ def test_tests_that_stray_widen_what_is_expected() -> None:
     rng = np.random.default_rng(5)
     circle = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0.0, 45, 1.5, 0, Direction.CCW)
     effects = rng.normal(0.0, 100.0, (N * TESTS, 6))
-    runs = tuple(run(str(k), circle) for k in range(TESTS))
     of_machine = effects @ rng.normal(0.0, 1.0, 6)
     sizes = []
     for size_um in (1.0, 10.0):
         off = of_machine + rng.normal(0.0, size_um, N * TESTS)
-        found = expected_beside(beside(runs, off, effects))  # type: ignore[arg-type]
+        found = expected_beside(beside(circle, off, effects))
         sizes.append(float(np.sqrt(np.trace(found.covariance_mm2))))
     assert 5.0 < sizes[1] / sizes[0] < 20.0
 

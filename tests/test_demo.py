@@ -13,7 +13,9 @@ from pathlib import Path
 import pytest
 
 import dbbstation as dbb
+from dbbstation import demo
 from dbbstation.demo import QUICK, run_demo
+from tests.cli.conftest import call
 
 SCRIPT = Path(__file__).parents[1] / "docs" / "examples" / "whole_job.py"
 EIGHT = "abdfhjkn"
@@ -36,8 +38,18 @@ def test_the_whole_job(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tests", [QUICK, pytest.param(EIGHT, marks=pytest.mark.nightly)], ids=["quick", "eight"])
-def test_the_whole_job_on_some_of_its_circles(tmp_path, tests):
+def test_the_whole_job_on_some_of_its_circles(tmp_path, monkeypatch, tests):
+    """Machine and station are processes on a line; what computes from files runs in this one."""
     told = []
+
+    def answer(job, arguments):
+        job.tell(" ".join(["dbbstation", *arguments]))
+        with chdir(job.folder):
+            outcome = call(*arguments, "--json")
+        assert outcome.code == 0, outcome.err
+        return outcome.out
+
+    monkeypatch.setattr(demo._Job, "answer", answer)
     result = run_demo(tmp_path / "job", 3, told.append, lambda *_: None, tests)
     steps = [line.removeprefix("dbbstation ").split()[0] for line in told]
     assert steps == ["measure", "calibrate", "diagnose", "program", "measure", "evaluate", "evaluate", "report"]

@@ -3,7 +3,7 @@
     pytest -m nightly tests/station/test_failing_calls.py -s
 
 Every call on a file of the session, from opening it to the last fsync: EIO, ENOSPC, EINTR, half of a write, a disk that stays
-full, and SIGKILL before and behind it. In CI every forty-first of them.
+full, and SIGKILL before and behind it. In CI every eighty-third of them.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def library(tmp_path_factory) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("every", "begin"), [pytest.param(41, 7, marks=pytest.mark.slow), pytest.param(1, 1, marks=pytest.mark.nightly)]
+    ("every", "begin"), [pytest.param(83, 7, marks=pytest.mark.slow), pytest.param(1, 1, marks=pytest.mark.nightly)]
 )
 def test_each_ends_in_one_sentence_or_goes_on(library: Path, tmp_path: Path, every: int, begin: int) -> None:
     session = shipped_folder("fixtures") / "sessions" / "logged"

@@ -37,7 +37,7 @@ def judge(folder: Path, name: str, reason: str, begin: int, told: int) -> None:
 
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize(
-    "times", [pytest.param(20, marks=pytest.mark.slow), pytest.param(500, marks=pytest.mark.nightly)]
+    "times", [pytest.param(10, marks=pytest.mark.slow), pytest.param(500, marks=pytest.mark.nightly)]
 )
 def test_two_verdicts_at_once_are_both_there(tmp_path: Path, times: int) -> None:
     folder = Path(shutil.copytree(shipped_folder("fixtures") / "sessions" / "logged", tmp_path / "session"))

@@ -9,11 +9,22 @@ from dbbstation.files.shipped import shipped_folder
 from studies.table_iii import PUBLISHED, table_iii
 
 
-@pytest.fixture(scope="module", params=[pytest.param(False, marks=pytest.mark.nightly), True], ids=["rigid", "gravity"])
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param((False, 6), marks=pytest.mark.nightly),
+        (True, 3),
+        pytest.param((True, 6), marks=pytest.mark.nightly),
+    ],
+    ids=["rigid", "gravity", "gravity, six machines"],
+)
 def numbers(request, reference):
     plans = shipped_folder("protocols") / "plans"
     conventional, jig = read_plan(plans / "conventional.yaml"), read_plan(plans / "table2.yaml")
-    return table_iii(reference, conventional, jig, range(200, 206), lambda _: None, gravity=request.param).numbers()
+    gravity, machines = request.param
+    return table_iii(
+        reference, conventional, jig, range(200, 200 + machines), lambda _: None, gravity=gravity
+    ).numbers()
 
 
 @pytest.mark.slow

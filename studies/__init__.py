@@ -1,1 +1,1 @@
-"""Reproducible experiments, each from a seed to its numbers and figures. They run in a checkout: `dbbstation study`."""
+"""Reproducible experiments of a checkout: `dbbstation study`."""

@@ -1,7 +1,6 @@
-"""A blind study: sessions in which somebody else has hidden effects are diagnosed, and only then compared with the answers.
+"""A blind study: hidden effects are diagnosed, then compared with answers.
 
-The sessions of a folder are judged one by one, each verdict is kept beside them at once, and nothing but the sessions
-is read for that. `blind_score` opens the answers.
+Each verdict is kept at once and rests on the session alone; `blind_score` opens the answers.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ SECONDS_PER_HOUR = 3600.0
 
 
 def verdict_folder(folder: Path, candidates: Sequence[str]) -> Path:
-    """Where the verdicts of a study with these candidates are kept."""
+    """Return the folder of verdicts with these candidates."""
     names = ",".join(sorted(candidates))
     return folder / "verdicts" / hashlib.sha256(names.encode()).hexdigest()[:12]
 
@@ -43,12 +42,11 @@ def judge_sessions(
     *,
     again: bool = False,
 ) -> dict[str, dict[str, Any]]:
-    """Diagnose every session of a folder; those that have a verdict already are not judged twice.
+    """Diagnose every unjudged session of a folder.
 
     Args:
-        candidates: names of the error sources to look for.
-        progress: called with how many of how many sessions are judged.
-        again: judge all of them anew, for a diagnosis that has changed since.
+        candidates: source names.
+        again: judge all anew.
 
     Returns:
         By session, `seconds` it took and `summary` of the diagnosis, or `error` where there was none; `processor_s`, and `memory_mb`,
@@ -87,7 +85,7 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
     """Answers by session.
 
     Raises:
-        InputError: no file of answers, or not one of this format.
+        InputError: no file of answers, or another format.
     """
     path = folder / ANSWERS
     try:
@@ -102,7 +100,7 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def cost(verdicts: Sequence[dict[str, Any]]) -> dict[str, float | None] | None:
-    """Processor time and memory of the diagnoses; None where an earlier version did not measure them."""
+    """Return processor time and memory of diagnoses; None if not measured."""
     seconds = [verdict["processor_s"] for verdict in verdicts if "processor_s" in verdict]
     memory_mb = [verdict["memory_mb"] for verdict in verdicts if verdict.get("memory_mb")]
     if not seconds:
@@ -131,5 +129,4 @@ def _judge(path: Path, *, candidates: tuple[str, ...], kept: Path) -> None:
     write_text(kept / f"{path.name}.json", json.dumps(verdict, indent=1) + "\n", force=True)
 
 
-def _quiet(_: str) -> None:
-    """Say nothing."""
+def _quiet(_: str) -> None: ...

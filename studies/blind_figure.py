@@ -1,4 +1,4 @@
-"""Figure of a blind study: how often causes were there that were given a probability."""
+"""Reliability diagram of a blind study."""
 
 from __future__ import annotations
 
@@ -20,10 +20,7 @@ PANEL_IN = (4.2, 3.6)
 def reliability_figure(
     reliability: Mapping[str, Sequence[Mapping[str, Any]]], wanted: FigureFormat | Stamped = FigureFormat.SVG
 ) -> bytes:
-    """Draw a reliability diagram for each table of `blind_reliability.reliability`.
-
-    Bins have the same width whatever they span, since the outermost decide.
-    """
+    """Draw a diagram per table of `blind_reliability.reliability`, with bins of equal width."""
     with in_style():
         figure = Figure(figsize=(PANEL_IN[0] * len(reliability), PANEL_IN[1]), layout="constrained")
         panels = figure.subplots(1, len(reliability), sharey=True, squeeze=False)[0]

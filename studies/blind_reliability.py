@@ -1,7 +1,7 @@
-"""Do causes that were given a probability come true as often as it says? Reliability of the verdicts of a blind study.
+"""Reliability of verdicts: do probabilities come true?
 
-A reliability diagram sorts forecasts into bins of probability and compares each bin's mean forecast with how often it came
-true [Murphy and Winkler, Applied Statistics 26 (1977) 41].
+Forecasts are sorted into bins of probability and compared with outcomes [Murphy and Winkler, Applied Statistics 26 (1977)
+41].
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ MODEST = (3.0, 20.0)
 
 @dataclass(frozen=True)
 class Forecast:
-    """What a diagnosis says of one cause, or of causes that no test tells apart, and whether it is true.
+    """A forecast of one cause or indistinguishable causes, and its truth.
 
     Attributes:
-        probability: that the cause is there, 0 to 1.
-        log_evidence: conditional log Bayes factor of it; None where none is given.
-        right: it, or one that is observationally equivalent to it, is hidden in the session.
-        perturbed: what is hidden follows its law only roughly.
+        probability: 0 to 1.
+        log_evidence: conditional log Bayes factor, or None.
+        right: it or an equivalent is hidden.
+        perturbed: the hidden effect follows its law only roughly.
     """
 
     probability: float
@@ -45,22 +45,20 @@ class Forecast:
 
 
 def equivalents(source: Mapping[str, Any]) -> frozenset[str]:
-    """Name of a source and of all that are observationally equivalent to it."""
+    """Return a source with its observational equivalents."""
     return frozenset({source["name"], *(source.get("class") or ())})
 
 
 def forecasts(
     sources: Iterable[Mapping[str, Any]], hidden: Collection[str], *, perturbed: bool = False
 ) -> tuple[Forecast, ...]:
-    """Forecasts of one session.
+    """Return one session's forecasts.
 
-    A class of equivalent sources makes one, with the largest probability of its members. What is `not-testable` makes
-    none where its probability is that of the prior; what the recordings made more probable than that, and left open,
-    makes one. Verdicts without a probability make none.
+    An equivalence class counts once, with its largest probability. `not-testable` counts only above the prior.
 
     Args:
-        sources: as in the summary of a diagnosis.
-        perturbed: what is hidden follows its law only roughly.
+        sources: of a diagnosis's summary.
+        perturbed: the hidden effect follows its law only roughly.
     """
     best: dict[frozenset[str], Mapping[str, Any]] = {}
     for source in sources:
@@ -78,7 +76,7 @@ def forecasts(
 
 
 def reliability(said: Sequence[Forecast]) -> dict[str, list[dict[str, Any]]] | None:
-    """Tables of bins by which forecasts are in them; None where no verdict has a probability."""
+    """Return tables of bins by group; None without probabilities."""
     if not said:
         return None
     groups = {title: [one for one in said if belongs(one)] for title, belongs in _GROUPS.items()}
@@ -86,12 +84,12 @@ def reliability(said: Sequence[Forecast]) -> dict[str, list[dict[str, Any]]] | N
 
 
 def sure(said: Sequence[Forecast]) -> dict[str, Any]:
-    """Share of forecasts of 0.95 to 1 that are right."""
+    """Return the right share of forecasts of 0.95 to 1."""
     return share_of(one.right for one in said if one.probability >= SURE)
 
 
 def share_of(flags: Iterable[bool]) -> dict[str, Any]:
-    """How many are true, of how many, with the 95 % interval of the share."""
+    """Return the true count, total, and the share's 95 % interval."""
     seen = [bool(flag) for flag in flags]
     count, hits = len(seen), sum(seen)
     low, high = wilson(hits / count, count) if count else (0.0, 1.0)
@@ -110,7 +108,7 @@ _GROUPS: dict[str, Callable[[Forecast], bool]] = {
 
 
 def _table(said: Sequence[Forecast]) -> list[dict[str, Any]]:
-    """One entry per bin: the lower edge belongs to it, the upper one only in the last."""
+    """Return one entry per bin, lower edge included."""
     place = np.digitize([one.probability for one in said], BINS[1:-1])
     table = []
     for k, (low, high) in enumerate(pairwise(BINS)):

@@ -1,4 +1,4 @@
-"""Verdicts of a blind study against its answers: what was named rightly, wrongly or not, by kind and by effect."""
+"""Score a blind study's verdicts by kind and effect."""
 
 from __future__ import annotations
 
@@ -38,28 +38,27 @@ class Outcome:
     """One session, judged and compared.
 
     Attributes:
-        plan: what kind was measured.
-        angles: the recording has commanded angles.
+        plan: kind of measurement.
+        angles: commanded angles are recorded.
         kind: `clean`, `single`, `pair`, `triple`, `faint`, `disturbed`, `outside`, `concealed` or `not-a-candidate`.
-        perturbed: what is hidden follows its law only roughly.
-        truth: names of what is hidden, listed or not.
-        sizes: of each, in testable limits.
-        error: why there is no diagnosis; empty where there is one.
-        detected: the diagnosis says that something is missing.
-        identified: names that it gives, `identified` or `happened`.
-        declared: names that it says it cannot tell apart, with those that each is not told from.
+        perturbed: the hidden effect follows its law only roughly.
+        truth: hidden effects, listed or not.
+        sizes: in testable limits.
+        error: why there is no diagnosis; may be empty.
+        detected: the diagnosis reports missing physics.
+        identified: names given as `identified` or `happened`.
+        declared: ambiguous names with their rivals.
         named: each hidden effect is identified.
-        within: each hidden effect is identified or in a declared ambiguity of at most three: it with its own rivals, all that
-            hang together, or the class of what no test tells from a name that is given.
-        wrong: names given, alone or as an ambiguity, where nothing of the kind is hidden.
-        located: what is left, or the misfit, is put on the right strut or variable; None where nothing was asked.
-        quiet: none of the hidden effects is claimed at a size that it has not (for what nobody can see).
-        deviations: by parameter, estimate minus truth in standard deviations, of rightly named effects.
-        pulls: the same of strut lengths and base joints, where anything was named.
-        held_out: residual of left-out tests in units of their predicted covariance, with what was found.
-        gain: residual of left-out tests before over after.
+        within: each hidden effect is identified or in a declared ambiguity of at most three.
+        wrong: names given, alone or ambiguously, without such an effect.
+        located: residual or misfit on the right strut or variable; None if not asked.
+        quiet: no hidden effect is claimed at a wrong size.
+        deviations: estimate minus truth in standard deviations, of right names, by parameter.
+        pulls: the same of strut lengths and base joints, if anything was named.
+        held_out: residual in predicted covariance, with the findings.
+        gain: held-out residual before over after.
         said: the answer in short.
-        forecasts: causes with the probability that they were given; empty where a diagnosis gives none.
+        forecasts: causes with probabilities; may be empty.
     """
 
     session: str
@@ -89,22 +88,22 @@ class Outcome:
 
     @property
     def given_a_name(self) -> bool:
-        """Whether anything was named, alone or as an ambiguity."""
+        """Return whether anything was named."""
         return bool(self.identified or self.declared)
 
     @property
     def angles_from(self) -> str:
-        """Where the angles of the samples come from, and how finely the edges of a run were sampled if from these."""
+        """Return the origin of angles, and edge sampling."""
         return "recorded angles" if self.angles else f"angles from the edges, {self.rate_hz:g} Hz"
 
     @property
     def law(self) -> str:
-        """How closely what is hidden follows its law."""
+        """Return how closely the hidden effect follows its law."""
         return "law followed roughly" if self.perturbed else "law followed exactly"
 
     @property
     def right(self) -> bool:
-        """Whether the answer is what could be asked of it."""
+        """Return whether the answer is as good as possible."""
         if self.error:
             return False
         if self.kind == "clean":
@@ -117,7 +116,7 @@ class Outcome:
 
     @property
     def badness(self) -> float:
-        """How bad a failure is: wrong names before silence, loud effects before faint ones."""
+        """Return a failure's badness: wrong names and loud effects first."""
         loud = max(self.sizes, default=1.0)
         if self.error:
             return 1e4
@@ -130,12 +129,12 @@ def score(
     verdicts: Mapping[str, Mapping[str, Any]],
     candidates: Sequence[str] | None = None,
 ) -> list[Outcome]:
-    """Compare verdicts with answers, by session; sessions without a verdict are left out.
+    """Compare verdicts with answers by session, skipping sessions without verdict.
 
     Args:
-        answers: as `blind.read_answers` gives them.
-        verdicts: as `blind.judge_sessions` gives them.
-        candidates: names that were looked for; None for all that the list has.
+        answers: from `blind.read_answers`.
+        verdicts: from `blind.judge_sessions`.
+        candidates: None for all.
     """
     return [compare(answers[name], verdicts[name], candidates) for name in sorted(answers) if name in verdicts]
 
@@ -193,7 +192,7 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any], candidates: S
 
 
 def numbers(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """All tables of a study, for `--json` and the printed text."""
+    """Return all tables of a study."""
     kinds = {kind: [o for o in outcomes if o.kind == kind] for kind in dict.fromkeys(o.kind for o in outcomes)}
     table: dict[str, Any] = {}
     for kind, (title, target, of) in (
@@ -274,7 +273,7 @@ _NOTHING: dict[str, Any] = {
 
 
 def _hanging_together(declared: Mapping[str, Sequence[str]]) -> list[frozenset[str]]:
-    """Names that are not told apart, also by way of a third."""
+    """Return names connected by ambiguity."""
     groups: list[frozenset[str]] = []
     for name, others in declared.items():
         joined = frozenset({name, *others})
@@ -289,7 +288,7 @@ def _declared_closely(name: str, declared: Mapping[str, Sequence[str]], groups: 
 
 
 def _located(effects: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -> bool:
-    """Whether what is left, or else the misfit's largest place, is on the right strut or follows the right variable."""
+    """Return whether residual or misfit is on the right strut or variable."""
     places = [summary["unexplained"], *summary["locations"][:1]]
     place = next((p for p in places if p["strut"] or p["variable"]), None)
     if place is None:
@@ -302,7 +301,7 @@ def _located(effects: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -
 
 
 def _claimed(effect: Mapping[str, Any], source: Mapping[str, Any] | None) -> bool:
-    """Whether an effect that nobody can see is ruled out although it is there, or measured at another size."""
+    """Return whether an invisible effect is excluded or measured at another size."""
     if source is None or source["verdict"] in {"not-testable", "ambiguous"}:
         return False
     deviations = _deviations(effect["amplitudes"], source)
@@ -319,7 +318,7 @@ def _deviations(amplitudes: Mapping[str, float], source: Mapping[str, Any]) -> d
 
 
 def _pulls(answer: Mapping[str, Any], summary: Mapping[str, Any]) -> tuple[float, ...]:
-    """Strut lengths and base joints in standard deviations; without their common height where no bar was raised."""
+    """Return strut lengths and base joints in standard deviations, without common height for level bars."""
     truth = answer["truth"]
     base_um = 1e3 * np.array(truth["delta_base_mm"])
     if not answer["raised_bars"]:
@@ -373,7 +372,7 @@ def _by_effect(single: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def _confusion(outcomes: Sequence[Outcome]) -> dict[str, dict[str, int]]:
-    """How often what was hidden (one by one) got which names; `nothing` where it got none."""
+    """Return how often hidden effects got which names; `nothing` for none."""
     table: dict[str, Counter[str]] = {}
     for outcome in outcomes:
         row = table.setdefault(" + ".join(sorted(outcome.truth)) or "clean", Counter())

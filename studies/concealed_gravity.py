@@ -1,4 +1,4 @@
-"""Gravity hidden in a kinematic calibration: the residual looks fine on the jig and the tool is wrong elsewhere."""
+"""Gravity hidden in a kinematic calibration: small residuals on the jig, a wrong tool elsewhere."""
 
 from __future__ import annotations
 
@@ -38,11 +38,10 @@ class ConcealedGravity:
     """What the study found.
 
     Attributes:
-        numbers: for `--json` and the printed text.
-        theta_deg: angles of the tilted circle, shape (n,) [deg].
-        left_um: radial deviation of that circle about its own centre, by what compensates it, shape (n,) each [µm].
-        per_test_um: per test of the jig plan, (name, kinematic residual, joint residual) [µm rms].
-        diagnosis: of the jig session.
+        numbers: for `--json` and text.
+        theta_deg: of the tilted circle, shape (n,).
+        left_um: its centred radial deviation, by compensation, shape (n,) each.
+        per_test_um: (name, kinematic residual, joint residual) per jig test, rms.
     """
 
     numbers: dict[str, Any]
@@ -55,12 +54,11 @@ class ConcealedGravity:
 def concealed_gravity(
     machine: Machine, jig: Plan, conditions: Plan, seed: int, progress: Callable[[str], None]
 ) -> ConcealedGravity:
-    """Draw a machine with kinematic errors and gravity, calibrate it kinematically, diagnose it, look elsewhere.
+    """Draw a machine with gravity, calibrate kinematically, diagnose, look elsewhere.
 
     Args:
         jig: the fifteen circles of [CAL Table II].
         conditions: the nine of [GRAV Table 4].
-        progress: called with what is being done.
     """
     rng = np.random.default_rng(seed)
     kinematics = random_kinematics(machine, seed)
@@ -114,7 +112,7 @@ def concealed_gravity(
 def _left_um(
     truth: MachineModel, model: MachineModel, conditions: Plan, theta_deg: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float, float]:
-    """What the tilted circle would still show if programs were compensated with a model, to first order.
+    """Return the tilted circle's residual under a model's compensation, to first order.
 
     Returns:
         Radial deviation about its own centre, shape (n,) [µm]; centre deviation [µm]; greatest position error [µm].

@@ -1,4 +1,4 @@
-"""Do stated 95 % intervals contain the truth? Parameters and predicted positions of many random machines."""
+"""Do 95 % intervals contain the truth? Random machines."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ REACH_MM, REACH_DEG = 150.0, 10.0
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """Errors in units of their stated standard deviations.
+    """Errors in stated standard deviations.
 
     Attributes:
-        parameters: by machine and parameter, shape (m, 24).
+        parameters: shape (m, 24).
         positions: by machine, pose and axis, shape (m, 40, 3).
     """
 
@@ -54,7 +54,7 @@ class Coverage:
     names: tuple[str, ...]
 
     def numbers(self) -> dict[str, Any]:
-        """Shares inside the 95 % intervals, for `--json` and the printed text."""
+        """Return shares inside the 95 % intervals."""
         inside = np.abs(self.parameters) < WITHIN
         per_parameter = {
             name: {"inside": float(share), "sigma_um": float(sigma)}
@@ -80,12 +80,10 @@ class Coverage:
 def coverage(
     machine: Machine, plan: Plan, seeds: Sequence[int], progress: Callable[[int], None], *, level: bool
 ) -> Coverage:
-    """Draw machines, record the plan on each, calibrate, and compare with what was drawn.
+    """Draw machines, record, calibrate, and compare with the truth.
 
     Args:
-        progress: called with how many machines are done.
-        level: no raised bar in the plan: machines are drawn without a common height of their base joints, which level bars do not
-            see and which would reach the other parameters in second order.
+        level: no raised bar: base joints are drawn without common height, which level bars miss.
     """
     done = []
     for one in over_machines(partial(_machine, machine, plan, level=level), seeds):
@@ -96,7 +94,7 @@ def coverage(
 
 
 def wilson(share: float, count: int, sigmas: float = 1.96) -> tuple[float, float]:
-    """Interval of a share seen in `count` trials [Wilson, J. Am. Stat. Assoc. 22 (1927) 209]."""
+    """Return a share's interval in `count` trials [Wilson, J. Am. Stat. Assoc. 22 (1927) 209]."""
     centre = (share + sigmas**2 / (2 * count)) / (1 + sigmas**2 / count)
     half = sigmas * float(np.sqrt(share * (1 - share) / count + sigmas**2 / (4 * count**2))) / (1 + sigmas**2 / count)
     return max(centre - half, 0.0), min(centre + half, 1.0)  # of none and of all, rounding goes beyond
@@ -105,7 +103,7 @@ def wilson(share: float, count: int, sigmas: float = 1.96) -> tuple[float, float
 def _machine(
     machine: Machine, plan: Plan, seed: int, *, level: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], tuple[str, ...]]:
-    """Normalised errors of one machine's parameters, (24,), and positions, (40, 3), standard deviations [µm], names."""
+    """Return one machine's normalised parameter errors, (24,), position errors, (40, 3), standard deviations [µm], names."""
     rng = np.random.default_rng([seed, 7])
     kinematics = random_kinematics(machine, seed)
     if level:

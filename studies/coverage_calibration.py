@@ -1,7 +1,4 @@
-"""Coverage of calibrated parameters and of predicted positions, with sessions of the independent virtual machine of tests/plant.
-
-Each draw is a machine, its session in a folder, `calibrate` on it, and `predict` with the model; the truth is the generator's.
-"""
+"""Coverage of parameters and predictions with sessions of tests/plant, an independent machine."""
 
 from __future__ import annotations
 
@@ -69,7 +66,7 @@ OF_A_FORMULA = "u holds the 2 % by which real struts depart from the formula; th
 
 
 class KnownBar(Enum):
-    """What a session states of its bar; its error is drawn accordingly."""
+    """What a session states of its bar; errors are drawn accordingly."""
 
     CALIBRATED = "calibrated where it measures"
     WARM = "calibrated at 20 degC, shop at 28 degC"
@@ -88,9 +85,9 @@ class Case:
     """Circumstances of a calibration.
 
     Attributes:
-        raised: whether five bars are raised, which shows the height of the base.
-        tolerance: whether the machine file states the tolerance of joints.
-        gravity: whether struts are elastic, and their compliance fitted.
+        raised: five raised bars, which show the base's height.
+        tolerance: the machine file states joints' tolerance.
+        gravity: elastic struts with fitted compliance.
     """
 
     name: str
@@ -135,12 +132,11 @@ def coverage_of_calibration(
     progress: Callable[[int], None] = lambda _done: None,
     keep: Path | None = None,
 ) -> list[Row]:
-    """Draw machines, record, calibrate, predict, and compare with what was drawn.
+    """Draw machines, record, calibrate, predict, compare.
 
     Args:
-        cases: circumstances; each sees all machines, and they take turns.
-        progress: called with how many sessions are done.
-        keep: file of the draws; None where none are kept.
+        cases: each sees all machines.
+        keep: file of draws, or None.
     """
     what = f"calibrations, {'; '.join(case.name for case in cases)}, from seed {seeds.start}"
     results = drawn(partial(_numbered, tuple(cases), seeds.start), range(len(seeds) * len(cases)), keep, what)
@@ -163,7 +159,7 @@ def coverage_of_calibration(
 
 
 def _numbered(cases: Sequence[Case], seed: int, number: int) -> Figures:
-    """One draw by its number: cases take turns with each seed; empty where the fit says that it found no end, and states nothing."""
+    """Return one draw by number, cases in turn; empty if the fit does not settle."""
     try:
         found = drawn_figures(cases[number % len(cases)], seed + number // len(cases))
     except CalibrationError:
@@ -175,7 +171,7 @@ def _numbered(cases: Sequence[Case], seed: int, number: int) -> Figures:
 
 
 def drawn_figures(case: Case, seed: int) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Found less true values of one machine [mm, µm/kN], and their stated standard uncertainties, NaN for none, by figure."""
+    """Return found less true values [mm, µm/kN] and standard uncertainties, NaN for none, by figure."""
     with tempfile.TemporaryDirectory() as folder:
         plan = table_ii_plan(seed)
         truth = record(
@@ -202,7 +198,7 @@ def drawn_figures(case: Case, seed: int) -> dict[str, tuple[NDArray[np.float64],
 
 
 def _setup(known: KnownBar, seed: int) -> tuple[Mechanism, ...]:
-    """Errors of balls and bar; the readings of a bar that has grown are shorter by that."""
+    """Return errors of balls and bar, with the bar's growth."""
     balls = (MountingScatter(), CmmScatter())
     if known is KnownBar.NOBODY_KNOWS:
         return (*balls, RandomBarOffset(UNKNOWN_BAR_UM))
@@ -260,7 +256,7 @@ def _positions(
 
 
 def _plane(identified: IdentifiedModel, truth: Truth) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Flatness and parallelism as `evaluate` predicts them, and where the generator's machine goes."""
+    """Return predicted flatness and parallelism, and the generator's."""
     steps = np.linspace(-190.0, 190.0, 3)
     ring = [(x, y) for x in steps for y in steps if (x, y) != (0.0, 0.0)]
     found = plane_figures(identified.model, LOWEST_MM)

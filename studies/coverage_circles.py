@@ -1,4 +1,4 @@
-"""Do the intervals of figures of circles contain the truth? Circles of machines with serial axes that `tests/plant` makes."""
+"""Do intervals of circle figures contain the truth? Serial machines of `tests/plant`."""
 
 from __future__ import annotations
 
@@ -93,13 +93,13 @@ class Cell:
 
     @property
     def noise(self) -> Noise:
-        """The noise of the plant."""
+        """Return the plant's noise."""
         white, correlated = COLOURS[self.colour]
         return Noise(self.level_um * white, self.level_um * correlated, 0.8)
 
     @property
     def name(self) -> str:
-        """As it stands in a table."""
+        """Return its name in a table."""
         return f"{self.colour} {self.level_um:g} µm"
 
 
@@ -113,13 +113,12 @@ def coverage_of_circles(
     cells: Sequence[Cell] = CELLS,
     keep: Path | None = None,
 ) -> dict[str, Any]:
-    """Draw circles, and count how often U about each figure contains the truth.
+    """Draw circles and count how often U contains the truth.
 
     Args:
-        draws: for each noise; the three kinds of circles take turns.
-        progress: called with how many draws are done.
-        cells: noises; they take turns too, so that a study that is cut short has as many of each.
-        keep: file of the draws; None where none are kept.
+        draws: per noise, three kinds of circles in turn.
+        cells: noises, in turn.
+        keep: file of draws, or None.
     """
     counts: dict[str, dict[str, Any]] = {}
     what = f"figures of circles, {', '.join(cell.name for cell in cells)}, from seed {seed}"
@@ -145,7 +144,7 @@ def _kind(seed: int) -> str:
 
 
 def faults_of(found: dict[str, Any]) -> list[str]:
-    """Return the rows that are not as promised beyond chance: too few inside, or too many and no reason beside it."""
+    """Return rows that break their promise beyond chance."""
     faults = []
     for figure, row in found["rows"].items():
         inside, of = pooled(row)
@@ -160,7 +159,7 @@ def faults_of(found: dict[str, Any]) -> list[str]:
 
 
 def pooled(row: dict[str, Any], noise: str = "", kind: str = "") -> tuple[int, int]:
-    """Return how many intervals of a row hold the truth, of how many; of one noise or kind where it is given."""
+    """Return intervals of a row that hold the truth, and all; of one noise or kind if given."""
     chosen = [
         counts
         for name, kinds in row.items()
@@ -171,7 +170,7 @@ def pooled(row: dict[str, Any], noise: str = "", kind: str = "") -> tuple[int, i
 
 
 def _drawn(cell: Cell, seed: int) -> list[tuple[str, bool]]:
-    """One machine: its circle in both directions, noise and errors of bar and ball drawn; rows and whether they hold."""
+    """Return rows of one machine's circle in both directions."""
     rng = np.random.default_rng([seed, int(1000 * cell.level_um), len(cell.colour)])
     size = dict(zip(KINDS, (0.0, 0.3 * cell.level_um, 1.0), strict=True))[_kind(seed)]
     machine = _machine(rng, size)
@@ -224,7 +223,7 @@ def _machine(rng: np.random.Generator, size: float) -> SerialMachine:
 def _turn(
     machine: SerialMachine, direction: Direction, ball_mm: tuple[float, ...], radius_um: float, raised_deg: float
 ) -> RawCircle:
-    """A turn of the machine about a ball; of a raised bar the radius is smaller, and the tip is above the ball."""
+    """Return a machine's turn about a ball, raised ones smaller and higher."""
     circle = Circle((0, 0, 0), (0, 0, 0), RADIUS_MM, (0, 0, 0), FEED_MM_MIN, 0.0, 0.0, 1.5, raised_deg, direction)
     phi_deg = np.arange(0.0, 360.0, 360.0 / SAMPLES)
     radius_mm = RADIUS_MM * float(np.cos(np.radians(raised_deg)))
@@ -275,7 +274,7 @@ def _of_both(
 
 
 def _stated(budget: Budget, truth_um: float, read: CircleAnalysis, what: str = "") -> Iterator[tuple[str, bool]]:
-    """Row of a figure; the radius of a raised bar has no U."""
+    """Return a figure's row; a raised bar's radius has no U."""
     row = _row(budget.quantity) + what
     if read.raw.circle.elevation_deg and budget.quantity in ABSOLUTE - {BudgetQuantity.MEAN_RADIAL}:
         yield f"{row}, bar raised: {SURE}", budget.u_um is None

@@ -1,4 +1,4 @@
-"""Does U of the feed that a recording shows hold the feed? Whole recordings, feed-in and overlap, of circles of `tests/plant/serial.py`."""
+"""Does U of the shown feed contain the feed? Recordings of `tests/plant/serial.py`."""
 
 from __future__ import annotations
 
@@ -39,12 +39,11 @@ FIGURE = "feed shown"
 
 
 def coverage_of_feed(draws: int, seed: int, progress: Callable[[int], None], keep: Path | None = None) -> list[Row]:
-    """Draw recordings of circles, and count how often U = 2 u about the feed that they show holds the true one.
+    """Draw recordings and count how often U = 2 u contains the true feed.
 
     Args:
-        draws: recordings; noises take turns.
-        progress: called with how many are done.
-        keep: file of the draws; None where none are kept.
+        draws: noises in turn.
+        keep: file of draws, or None.
     """
     found = []
     for number, one in enumerate(drawn(partial(_numbered, seed), range(draws), keep, f"feeds, from seed {seed}")):
@@ -59,7 +58,7 @@ def _numbered(seed: int, number: int) -> tuple[float | None, float | None]:
 
 
 def drawn_feed(seed: int) -> tuple[float | None, float | None]:
-    """Found less true feed and its standard uncertainty [mm/min]; None where the recording shows none."""
+    """Return found less true feed and standard uncertainty [mm/min]; None without a shown feed."""
     rng = np.random.default_rng([seed, 31])
     feed_mm_min = CIRCLE.feed_mm_min * (1.0 + FEED_SHARE * float(rng.standard_normal()))
     scale, square = 100.0 * rng.standard_normal(2)

@@ -1,4 +1,4 @@
-"""Do the intervals hold under noise that the program has no model of? Lobes and perfect circles with the noises of `tests/plant/other_noise.py`."""
+"""Do intervals hold under unmodelled noise? Circles with `tests/plant/other_noise.py`."""
 
 from __future__ import annotations
 
@@ -55,13 +55,12 @@ def coverage_of_noises(
     kinds: Sequence[str] = tuple(KINDS),
     keep: Path | None = None,
 ) -> list[Row]:
-    """Draw circles in both directions, and count how often U = 2 u about each figure holds the truth.
+    """Draw circles in both directions and count how often U = 2 u contains the truth.
 
     Args:
-        draws: pairs of turns for each noise; noises take turns.
-        progress: called with how many draws are done.
-        kinds: noises, of `tests.plant.other_noise.KINDS`.
-        keep: file of the draws; None where none are kept.
+        draws: pairs of turns, noises in turn.
+        kinds: of `tests.plant.other_noise.KINDS`.
+        keep: file of draws, or None.
     """
     what = f"other noises, {', '.join(kinds)}, from seed {seed}"
     found: dict[str, list[Values]] = {kind: [] for kind in kinds}
@@ -85,7 +84,7 @@ def _numbered(kinds: Sequence[str], seed: int, number: int) -> dict[str, Any]:
 
 
 def drawn_values(kind: str, seed: int) -> Values:
-    """One pair of turns under a noise."""
+    """Return a pair of turns under a noise."""
     rng = np.random.default_rng([seed, list(KINDS).index(kind), 29])
     silent = [_turn(direction, lobes=seed % 2 > 0) for direction in Direction]
     truth = analyse_pair(*(analyse(raw) for raw in silent))
@@ -116,7 +115,7 @@ def _turn(direction: Direction, *, lobes: bool) -> RawCircle:
 
 
 def _read_mm(length_mm: NDArray[np.float64], kind: str, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Lengths with noise, in the steps of the gauge where it is coarse, shape (n,) [mm]."""
+    """Return lengths with noise, rounded if the gauge is coarse, shape (n,) [mm]."""
     read = length_mm + 1e-3 * LEVEL_UM * KINDS[kind](rng, SAMPLES)
     step_mm = 1e-3 * LEVEL_UM * STEP.get(kind, 0.0)
     return np.round(read / step_mm) * step_mm if step_mm else read

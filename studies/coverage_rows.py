@@ -1,4 +1,4 @@
-"""Rows of a table of coverage: how often stated 95 % intervals hold the truth, and whether that is what they promise."""
+"""Rows of a coverage table: how often 95 % intervals hold the truth."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ CHANCE = float(ndtri(0.9995))
 
 @dataclass(frozen=True)
 class Row:
-    """Coverage of one printed figure.
+    """Coverage of one figure.
 
     Attributes:
-        draws: machines or recordings that were drawn.
-        values: stated values, of all draws.
-        inside: share of those within 1.96 u of the truth, or within U = 2 u; None where none is stated.
-        error: its standard error, values of one draw taken for one; None likewise.
-        u: median stated standard uncertainty; None likewise.
-        reason: why more than 97 % are inside; empty where that is not so.
+        draws: machines or recordings.
+        values: of all draws.
+        inside: share within 1.96 u or U = 2 u; None if none is stated.
+        error: standard error by draws; or None.
+        u: median standard uncertainty, or None.
+        reason: for more than 97 % inside; may be empty.
     """
 
     case: str
@@ -47,7 +47,7 @@ class Row:
 
     @property
     def fault(self) -> str:
-        """What is wrong beyond chance; empty where nothing is."""
+        """Return a fault beyond chance, or an empty text."""
         if self.inside is None or self.error is None:
             return ""
         if self.inside + CHANCE * self.error < LEAST:
@@ -84,11 +84,10 @@ def row_of(
     """Return the row of one figure.
 
     Args:
-        off: found less true value, shape (draws, values of each).
-        u: stated standard uncertainty, NaN where none is, of the same shape.
-        reason: why more than 97 % may be inside.
-        within: standard uncertainties to each side of the interval: 2 of a printed U. An interval that reaches to zero has 1.96
-            to that side, and less would cut it off.
+        off: found less true, shape (draws, values of each).
+        u: standard uncertainty, same shape, NaN for none.
+        reason: for more than 97 % inside.
+        within: half-width in u: 2 for a printed U; 1.96 for intervals reaching zero.
     """
     known = np.isfinite(u)
     inside = np.abs(off) < within * np.where(known, u, 0.0)

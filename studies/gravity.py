@@ -1,7 +1,7 @@
-"""[GRAV Table 4] on many random machines: gravity compensated after the kinematics, as in the paper, and with them.
+"""[GRAV Table 4] on random machines: gravity compensated after the kinematics, and with them.
 
-[GRAV 4.3] asks why compensation gained less than was expected. Here every machine is drawn anew, so it is known what the
-struts' compliance is, what each way of identifying it finds, and what its compensation leaves without any noise.
+[GRAV 4.3] asks why compensation gained less than expected. Here the true compliance, each identification and noise-free
+residuals are known.
 """
 
 from __future__ import annotations
@@ -75,12 +75,11 @@ kinematics."""
 
 @dataclass(frozen=True)
 class Driven:
-    """The nine conditions under one kind of commands.
+    """Nine conditions under one kind of commands.
 
     Attributes:
-        circularity_um: as measured, mean of both directions, by condition [µm].
-        expected_um: of the uncompensated recording less its prediction, which is what [GRAV Fig 6] calls expected, by condition
-            [µm]; empty for commands without compensation.
+        circularity_um: measured, mean of directions, by condition.
+        expected_um: uncompensated recording less prediction, as in [GRAV Fig 6]; empty without compensation.
     """
 
     circularity_um: dict[str, float]
@@ -90,13 +89,13 @@ class Driven:
 
 @dataclass(frozen=True)
 class OneMachine:
-    """What was found on one machine.
+    """Results of one machine.
 
     Attributes:
-        driven: by way, and without compensation.
-        compliance: by way that identifies it.
-        position_only_um: circularity that a shifted path leaves, without noise, by condition [µm].
-        tilt_left_urad: greatest error of the spindle's direction over all conditions, by kind of commands [µrad].
+        driven: by way, and uncompensated.
+        compliance: by way.
+        position_only_um: noise-free circularity of a shifted path, by condition.
+        tilt_left_urad: greatest direction error of the spindle, by commands.
     """
 
     driven: dict[str, Driven]
@@ -110,9 +109,9 @@ class GravityStudy:
     """All machines.
 
     Attributes:
-        machines: in the order of their seeds.
-        tilt_deg: (A, B) of each condition [deg].
-        centre_mm: X, Y of each condition [mm].
+        machines: by seed.
+        tilt_deg: (A, B) of conditions.
+        centre_mm: X, Y of conditions.
     """
 
     machines: tuple[OneMachine, ...]
@@ -120,15 +119,15 @@ class GravityStudy:
     centre_mm: dict[str, tuple[float, float]]
 
     def figure(self, way: str, kind: str, condition: str) -> NDArray[np.float64]:
-        """Circularity on every machine, `kind` being an attribute of `Driven`, shape (m,) [µm]."""
+        """Return circularity on every machine, `kind` an attribute of `Driven`, shape (m,) [µm]."""
         return np.array([getattr(machine.driven[way], kind)[condition] for machine in self.machines])
 
     def removed(self, way: str, kind: str, condition: str) -> NDArray[np.float64]:
-        """Share of the circularity that compensation takes away, machine by machine, shape (m,)."""
+        """Return the compensated share of circularity, shape (m,)."""
         return 1.0 - self.figure(way, kind, condition) / self.figure(WITHOUT, kind, condition)
 
     def numbers(self) -> dict[str, Any]:
-        """Medians and 90 % ranges over the machines, beside what is published."""
+        """Return medians and 90 % ranges beside published values."""
         return {
             "machines": len(self.machines),
             "conditions": {name: self._condition(name) for name in PUBLISHED_UM},
@@ -178,13 +177,12 @@ class GravityStudy:
 def gravity_study(
     machine: Machine, jig: Plan, conditions: Plan, seeds: Sequence[int], progress: Callable[[int], None]
 ) -> GravityStudy:
-    """Draw machines, identify gravity in each way, compensate the nine conditions and measure them again.
+    """Draw machines, identify gravity each way, compensate and measure again.
 
     Args:
-        machine: reference machine, with masses.
+        machine: with masses.
         jig: the fifteen circles of [CAL Table II].
         conditions: the nine of [GRAV Table 4].
-        progress: called with how many machines are done.
     """
     done = []
     for one in over_machines(partial(_machine, machine, jig, conditions), seeds):
@@ -248,7 +246,7 @@ def _machine(machine: Machine, jig: Plan, conditions: Plan, seed: int) -> OneMac
 
 
 def _shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
-    """Commands shifted for gravity alone, for a control that knows the kinematics."""
+    """Return commands shifted for gravity alone."""
     gravity = tuple(fitted for fitted in model.sources if fitted.source.name == "gravity")
     path = replace(wanted, poses=shifted(replace(model, sources=gravity), wanted))
     kinematics = tuple(fitted for fitted in model.sources if fitted.source.name != "gravity")
@@ -256,7 +254,7 @@ def _shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
 
 
 def _another_day(runs: Sequence[Observation]) -> list[Observation]:
-    """Runs of a session of its own: another bar, of 144 mm, with a length error of its own."""
+    """Return runs of another session: a bar of 144 mm with own error."""
     return [replace(run, setup=replace(run.setup, session="conditions")) for run in runs]
 
 
@@ -273,7 +271,7 @@ def _both_directions(figures_um: Sequence[tuple[str, float]]) -> dict[str, float
 
 
 def _expected_um(model: MachineModel, uncompensated: Sequence[Observation]) -> dict[str, float]:
-    """Circularity of the difference between measured and simulated profiles [GRAV 4.3]."""
+    """Return circularity of measured less simulated profiles [GRAV 4.3]."""
     found = []
     for run in uncompensated:
         left = run.raw.length_mm - model.bar(run.motion()).length_mm
@@ -284,7 +282,7 @@ def _expected_um(model: MachineModel, uncompensated: Sequence[Observation]) -> d
 def _left_um(
     truth: MachineModel, conditions: Plan, command: Callable[[Motion], NDArray[np.float64]]
 ) -> dict[str, float]:
-    """Circularity of every condition without noise and mountings."""
+    """Return every condition's circularity without noise and mountings."""
     found = {}
     for name, test in conditions.tests.items():
         turn = simulate_circle(truth, test.run(test.directions[0]), setup_of(test), FINE, command=command)
@@ -294,7 +292,7 @@ def _left_um(
 
 
 def _tilt_left_urad(truth: MachineModel, conditions: Plan, command: Callable[[Motion], NDArray[np.float64]]) -> float:
-    """Greatest error of the tilts A and B over all conditions: what the ball at the tool tip cannot see."""
+    """Return the greatest error of A and B, invisible to a ball at the tip."""
     greatest = 0.0
     for test in conditions.tests.values():
         wanted = Motion(test.circle.poses(np.arange(0.0, 360.0, 1.0)), is_path=True)

@@ -1,4 +1,4 @@
-"""Figure of the study on gravity: circularity against tilt [GRAV Fig 6]."""
+"""Circularity against tilt [GRAV Fig 6]."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TICKS_UM = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
 
 
 def gravity_figure(study: GravityStudy, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
-    """Draw the circularity of the conditions about one centre against their tilt, for both identifications, as SVG."""
+    """Draw circularity of one centre's conditions against tilt, for both identifications."""
     with in_style():
         figure = Figure(figsize=(9.6, 4.2), layout="constrained")
         left, right = figure.subplots(1, 2, sharey=True)
@@ -34,7 +34,7 @@ def gravity_figure(study: GravityStudy, wanted: FigureFormat | Stamped = FigureF
 
 
 def same_place(study: GravityStudy) -> list[str]:
-    """Conditions about the centre of A, by tilt: [GRAV Fig 6] leaves B and C out."""
+    """Return conditions about the centre of A, by tilt; [GRAV Fig 6] omits B and C."""
     names = [name for name in PUBLISHED_UM if study.centre_mm[name] == study.centre_mm["A"]]
     return sorted(names, key=lambda name: study.tilt_deg[name][0])
 

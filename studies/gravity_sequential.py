@@ -1,4 +1,4 @@
-"""Gravity after the kinematics, as [GRAV 3.2] has it: the stiffness constant from two contouring error profiles."""
+"""Gravity after the kinematics [GRAV 3.2]: stiffness from two contouring error profiles."""
 
 from __future__ import annotations
 
@@ -26,11 +26,10 @@ AGREED = 1e-6
 
 @dataclass(frozen=True)
 class Compliance:
-    """Compliance of struts of 1000 mm, which stands for K_stiff of [GRAV eq 7].
+    """Compliance of struts of 1000 mm, for K_stiff of [GRAV eq 7].
 
     Attributes:
-        um_kn: value [µm/kN].
-        uncertainty_um_kn: standard deviation that the fit states [µm/kN].
+        uncertainty_um_kn: standard deviation of the fit.
     """
 
     um_kn: float
@@ -38,20 +37,19 @@ class Compliance:
 
 
 def with_gravity(kinematics: MachineModel, um_kn: float) -> MachineModel:
-    """Model with gravity on top of its kinematics, whose struts have this compliance [µm/kN]."""
+    """Return a model with gravity of this compliance."""
     gravity = Fitted(known_sources()["gravity"], np.array([um_kn]))
     return MachineModel(kinematics.machine, (*kinematics.of_the_machine().sources, gravity))
 
 
 def compliance_from_profiles(kinematics: MachineModel, runs: Sequence[Observation]) -> Compliance:
-    """Fit the compliance to the contouring errors of a few circles, kinematics held [GRAV 3.2].
+    """Fit the compliance to contouring errors of a few circles, kinematics held [GRAV 3.2].
 
-    A contouring error profile is the bar's deviation without centre and mean radius. The stated uncertainty is that
-    of any least-squares program: what the profiles leave, taken as noise.
+    A profile is the deviation without centre and mean radius; residuals count as noise.
 
     Args:
-        kinematics: calibrated before, without gravity.
-        runs: circles, such as those of conditions A and B.
+        kinematics: without gravity.
+        runs: such as conditions A and B.
 
     Raises:
         CalibrationError: the steps do not settle.
@@ -73,7 +71,7 @@ def compliance_from_profiles(kinematics: MachineModel, runs: Sequence[Observatio
 
 
 def _profile(model: MachineModel, run: Observation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Derivative of a run's profile by the compliance, and measured minus predicted profile, shape (n,) each."""
+    """Return a profile's derivative by compliance, and measured minus predicted, shape (n,) each."""
     reading = model.bar(run.motion())
     rows = np.column_stack([reading.by_fitted(model.sources[-1])[:, 0], run.raw.length_mm - reading.length_mm])
     theta = np.radians(run.raw.theta_deg)

@@ -1,4 +1,4 @@
-"""How often a history raises a false alarm, and how soon it finds a change: simulated tables of quantities."""
+"""False alarms and delays of a history, by simulation."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ class Size:
     """Size of a study.
 
     Attributes:
-        tables: histories without a change.
-        false_alarms: stated rate per session, of the whole table.
-        changes: histories of one quantity for each kind of change.
+        tables: histories without change.
+        false_alarms: per session, whole table.
+        changes: histories per kind of change.
     """
 
     tables: int
@@ -60,10 +60,10 @@ class Size:
 
 @dataclass(frozen=True)
 class Way:
-    """A way to watch, of which one is the program's.
+    """A way to watch.
 
     Attributes:
-        single_share: share of the false alarms for single sessions.
+        single_share: false alarms by single sessions.
     """
 
     name: str
@@ -83,11 +83,7 @@ WAYS = (
 
 
 def study(size: Size, progress: Callable[[int, int], None] = lambda _done, _of: None) -> dict[str, Any]:
-    """Simulate, and return shares and delays as plain numbers.
-
-    Args:
-        progress: called with how many of how many parts are done.
-    """
+    """Simulate; return shares and delays."""
     of = len(SCATTERS) + len(WAYS) + len(FEW)
     alarms, delays, few = [], [], []
     for done, scatter in enumerate(SCATTERS):
@@ -114,7 +110,7 @@ def study(size: Size, progress: Callable[[int, int], None] = lambda _done, _of: 
 
 
 def _few_sessions(size: Size, sessions: int, rng: np.random.Generator) -> dict[str, Any]:
-    """False alarms of tables of a few sessions, and how often a step in the last one is found."""
+    """Return false alarms of short tables, and detections of a last step."""
     few = replace(size, sessions=sessions)
     chart = chart_for(size.false_alarms / size.quantities)
     found = {}
@@ -148,11 +144,11 @@ def _false_alarms(size: Size, scatter: float, rng: np.random.Generator) -> dict[
 
 
 def stated_share(chart: Chart, quantities: int, sessions: int) -> float:
-    """Return the share of tables without a change that raise an alarm, by the Markov chain.
+    """Return the alarm share without change, by the Markov chain.
 
     Args:
-        chart: limits of one quantity.
-        sessions: of a history; the first is held against nothing.
+        chart: of one quantity.
+        sessions: the first has no comparison.
     """
     quiet = 1.0 - signalled_within(chart, [0.0] * (sessions - 1))[-1]
     return float(1.0 - quiet ** (2 * quantities))
@@ -183,7 +179,7 @@ def _delays(size: Size, way: Way, rng: np.random.Generator) -> list[dict[str, An
 
 
 def _delay(values: NDArray[np.float64], before: int, chart: Chart, baseline: int) -> float | None:
-    """Return after how many sessions a change is found, infinite where it is not; None after an alarm before it."""
+    """Return sessions until detection, infinite if never; None after an earlier alarm."""
     events = watch(values, np.ones(len(values)), chart, COVERAGE_FACTOR, baseline).events
     if not events:
         return float("inf")

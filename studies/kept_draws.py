@@ -1,4 +1,4 @@
-"""Draws of a long study in a file: an interrupted study goes on where it ended."""
+"""Draws of a long study in a file, to resume it."""
 
 from __future__ import annotations
 
@@ -14,18 +14,17 @@ if TYPE_CHECKING:
 
 
 def drawn(experiment: Callable[[int], Any], numbers: Sequence[int], path: Path | None, what: str) -> Iterator[Any]:
-    """Yield the experiment's result for every number, in their order.
+    """Yield the experiment's result for every number, in order.
 
-    A line of the file is one draw, after a first line that says of what. Draws that stand there are not drawn again, others are
-    added to it as they are done.
+    The file has a title line and a line per draw; known draws are reused.
 
     Args:
-        experiment: as of `over_machines`; its result can be written as JSON.
-        path: of the file; None where nothing is kept.
-        what: that is drawn: study, circumstances, first seed.
+        experiment: as of `over_machines`; JSON results.
+        path: None: keep nothing.
+        what: study, circumstances, first seed.
 
     Raises:
-        StationError: the file has draws of something else.
+        StationError: the file has other draws.
     """
     if path is None:
         yield from over_machines(experiment, numbers)
@@ -46,7 +45,7 @@ def drawn(experiment: Callable[[int], Any], numbers: Sequence[int], path: Path |
 
 
 def _read(path: Path, what: str) -> dict[int, Any]:
-    """Draws that stand in a file; a last line that was cut short by a loss of power is cut off."""
+    """Read draws; remove an incomplete last line."""
     if not path.exists() or not path.stat().st_size:
         return {}
     text = path.read_text(encoding="utf-8")

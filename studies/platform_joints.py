@@ -1,7 +1,6 @@
-"""The hard case: platform joints, which a kinematic calibration hides to 99 %, from "cannot tell" to a name.
+"""Platform joints, concealed to 99 % by kinematics, from "cannot tell" to a name.
 
-A machine whose platform joints are off by some µm are measured on the jig. The diagnosis says what
-it cannot tell and which tests would. Those are recorded on the same machine, and it is asked again.
+A machine is measured, diagnosed, and measured again with proposed tests.
 """
 
 from __future__ import annotations
@@ -37,17 +36,17 @@ MOST_ROUNDS = 5
 
 @dataclass(frozen=True)
 class Round:
-    """What one look at the machine said.
+    """One look at the machine.
 
     Attributes:
-        tests: measured so far.
-        added: texts of the tests that were added for this look.
+        tests: so far.
+        added: for this look.
         verdict: on platform joints.
-        gain: log evidence for them.
-        concealed: share of their signature that the kinematic parameters swallow.
-        kinematic_um: true position error over the workspace of the kinematic calibration, rms less its mean [µm].
-        stated_um: what the joint model states of itself, less a common shift [µm]; None where it is not known.
-        held_out: of left-out tests in units of the predicted covariance, before and after.
+        gain: log evidence.
+        concealed: share absorbed by kinematic parameters.
+        kinematic_um: true workspace error of the kinematic calibration, rms less mean.
+        stated_um: the joint model's own, less common shift; None if unknown.
+        held_out: in predicted covariance, before and after.
     """
 
     tests: int
@@ -70,13 +69,11 @@ def platform_joints(
     progress: Callable[[str], None],
     most_rounds: int = MOST_ROUNDS,
 ) -> list[Round]:
-    """Measure, ask, measure what was asked for, until platform joints are named.
+    """Measure as proposed until platform joints are named.
 
     Args:
         jig: the fifteen circles of [CAL Table II].
-        seed: of machine and measurements.
-        progress: called with what is being done.
-        most_rounds: times that tests are added.
+        most_rounds: of added tests.
     """
     rng = np.random.default_rng([seed, 9])
     source = known_sources()[NAME]
@@ -104,7 +101,7 @@ def _within(head: str, progress: Callable[[str], None]) -> Callable[[str], None]
 
 
 def numbers(rounds: Sequence[Round], seed: int, joint_error_mm: float) -> dict[str, Any]:
-    """All rounds as plain numbers."""
+    """Return all rounds as plain numbers."""
     return {
         "seed": seed,
         "joint_error_um": 1e3 * joint_error_mm,
@@ -146,7 +143,7 @@ def _round(found: Diagnosis, truth: MachineModel, tests: int, added: Sequence[st
 
 
 def _apart_um(model: MachineModel, truth: MachineModel) -> float:
-    """True position error of a model over the workspace, rms less its mean: a program's zero is set on the part [µm]."""
+    """Return a model's true workspace error, rms less mean [µm]."""
     motion = Motion(workspace(truth.machine))
     apart = model.actual_poses(motion)[:, :3] - truth.actual_poses(motion)[:, :3]
     apart -= apart.mean(axis=0)

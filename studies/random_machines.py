@@ -1,4 +1,4 @@
-"""The same experiment on many random machines, on all cores, with what is done so far kept at an interruption."""
+"""One experiment on many random machines, on all cores, resumable."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ TOGETHER = 4
 
 
 def over_machines(experiment: Callable[[int], Result], seeds: Sequence[int]) -> Iterator[Result]:
-    """Yield the experiment's result for every seed, in the order of the seeds.
+    """Yield results in the order of seeds.
 
     Args:
-        experiment: can be sent to another process: a function of a module, or a `functools.partial` of one.
+        experiment: can be pickled.
     """
     cores = os.cpu_count() or 1
     if cores == 1 or len(seeds) <= TOGETHER:

@@ -1,4 +1,4 @@
-"""How answers depend on the constants that decide them: each is halved and doubled, on recordings of anybody's."""
+"""Answers with their deciding constants halved and doubled."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Constant:
-    """A number of the program that decides an answer.
+    """A deciding constant.
 
     Attributes:
-        module: where it is declared, below `dbbstation`.
-        others: values to try in its place; empty: half and twice its own.
+        module: below `dbbstation`.
+        others: to try; empty: half and double.
     """
 
     module: str
@@ -44,12 +44,12 @@ class Constant:
 
     @property
     def value(self) -> float:
-        """As the program has it."""
+        """Return its value."""
         return getattr(import_module(f"dbbstation.{self.module}"), self.name)
 
     @property
     def tried(self) -> tuple[float, ...]:
-        """Values in its place, whole numbers where it is one."""
+        """Return values to try, integers if it is one."""
         own = self.value
         if self.others:
             return self.others
@@ -112,13 +112,13 @@ TABLE = (
 
 @dataclass(frozen=True)
 class Variation:
-    """One answer to be asked for.
+    """One question.
 
     Attributes:
-        constant: which is another; None: the program as it is.
-        paths: one drive recording or table, or the sessions A and B.
-        force_per_ampere: of a drive recording with a current; None: it has a force [N/A].
-        columns: measured and simulated column of a table; None for what is no table.
+        constant: that is changed; None: none.
+        paths: a drive recording, a table, or sessions A and B.
+        force_per_ampere: [N/A]; None: the recording has a force.
+        columns: measured and simulated column of a table, else None.
     """
 
     constant: Constant | None
@@ -135,11 +135,11 @@ class Variation:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the program says.
+    """One answer.
 
     Attributes:
-        verdicts: by the name of what was asked.
-        values: value and standard uncertainty of every parameter that is there, by name.
+        verdicts: by name.
+        values: value and standard uncertainty by parameter.
     """
 
     verdicts: dict[str, str]
@@ -148,11 +148,11 @@ class Answer:
 
 @dataclass(frozen=True)
 class Change:
-    """What another value of a constant does to one answer.
+    """The effect of another value on one answer.
 
     Attributes:
-        constant: name, with the module that has it.
-        parameter: that one; empty where no parameter is in both answers.
+        constant: with its module.
+        parameter: may be empty.
     """
 
     constant: str
@@ -172,17 +172,16 @@ def study(
     only: Collection[str] = (),
     tables: Sequence[tuple[Path, str, str]] = (),
 ) -> list[Change]:
-    """Ask for every answer with every constant as it is, halved and doubled.
+    """Ask for every answer with every constant as is, halved and doubled.
 
     Args:
-        drives: recordings, and the force that an ampere makes in each [N/A].
+        drives: with force per ampere [N/A].
         pairs: sessions A and B.
-        progress: called with how many answers of how many there are.
-        only: names of the constants to vary; all if empty.
-        tables: with the names of the measured and of the simulated column.
+        only: constants to vary; empty for all.
+        tables: with measured and simulated column.
 
     Raises:
-        StationError: a recording cannot be read, or nothing can be said of it.
+        StationError: a recording cannot be read or judged.
     """
     asked: list[tuple[Variation, tuple[Constant, ...]]] = [
         *((Variation(None, 0.0, (path,), scale), DRIVE) for path, scale in drives),
@@ -219,7 +218,7 @@ def study(
 
 
 def answer_to(variation: Variation) -> Answer:
-    """Return what the program says with another constant, which has its own value again afterwards."""
+    """Return the answer with another constant, restored afterwards."""
     ask = partial(_drive_answer, variation)
     if variation.columns is not None:
         ask = partial(_table_answer, variation.paths[0], *variation.columns)

@@ -1,8 +1,7 @@
-"""[CAL Table III] on many random machines: three ways to calibrate, verified by circles on the jig.
+"""[CAL Table III] on random machines: three methods, verified on the jig.
 
-The paper measured one machine. Here every machine is drawn anew, calibrated from a session of the conventional plan
-(balls put up under the spindle) and one of the jig plan, and verified on the jig with commands that each calibration
-corrects. Its machine has gravity on elastic struts, as the paper's had, which none of the three models.
+Each machine is calibrated on conventional and jig plans, and verified with corrected commands. Gravity on elastic struts,
+as in the paper, is not modelled.
 """
 
 from __future__ import annotations
@@ -63,9 +62,9 @@ class Verified:
     """One calibration of one machine, verified.
 
     Attributes:
-        centre_deviation_um: by position, relative to position a [µm].
-        flatness_um: over eight points of X, Y = ±190 mm [µm].
-        parallelism_um: of a move along X, ±190 mm [µm].
+        centre_deviation_um: by position, relative to a.
+        flatness_um: over eight points of X, Y = ±190 mm.
+        parallelism_um: along X, ±190 mm.
     """
 
     centre_deviation_um: dict[str, float]
@@ -75,7 +74,7 @@ class Verified:
     parallelism_um: float
 
     def figure(self, name: str) -> float:
-        """Mean over positions as the paper takes it, position a left out of the centre deviations."""
+        """Return the mean over positions, without a in centre deviations."""
         value = getattr(self, name)
         if not isinstance(value, dict):
             return float(value)
@@ -90,7 +89,7 @@ class TableIII:
     verified: dict[str, list[Verified]]
 
     def numbers(self) -> dict[str, Any]:
-        """Median and 90 % range of every figure, by method, beside what is published."""
+        """Return median and 90 % range by method, beside published values."""
         found: dict[str, Any] = {"machines": len(next(iter(self.verified.values())))}
         for figure, published in PUBLISHED.items():
             rows = {}
@@ -112,7 +111,7 @@ class TableIII:
         return found
 
     def _gain(self, figure: str) -> dict[str, Any]:
-        """How many times smaller the proposed way leaves a figure than Conv-A, machine by machine."""
+        """Return the proposed method's gain over Conv-A, by machine."""
         pairs = zip(self.verified[Method.CONV_A], self.verified["proposed"], strict=True)
         ratios = [a.figure(figure) / proposed.figure(figure) for a, proposed in pairs]
         low, median, high = np.percentile(ratios, [5.0, 50.0, 95.0]).tolist()
@@ -132,9 +131,8 @@ def table_iii(
     """Calibrate and verify random machines.
 
     Args:
-        conventional: plan with balls put up under the spindle.
-        progress: called with how many machines are done.
-        gravity: the machines' struts are elastic, which no calibration models.
+        conventional: balls under the spindle.
+        gravity: elastic struts, unmodelled.
     """
     verified: dict[str, list[Verified]] = {str(method): [] for method in METHODS}
     work = partial(_machine, machine, conventional, jig, gravity=gravity)
@@ -171,7 +169,7 @@ def _calibrated(machine: Machine, method: Method, runs: Sequence[Observation]) -
 
 
 def _verify(truth: MachineModel, model: MachineModel, plan: Plan, rng: np.random.Generator) -> Verified:
-    """Run the eight circles with corrected commands, every ball put up anew."""
+    """Run the eight circles with corrected commands and new mountings."""
     runs = draw_session(truth, plan, rng, NOISE_MM, SAMPLES, command=partial(compensated, model))
     first = {run.test: figures(run.raw) for run in reversed(runs)}
     plane = plane_figures(truth, PLANE_MM, model)

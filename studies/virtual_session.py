@@ -1,4 +1,4 @@
-"""Sessions drawn from a model in memory: what a bar would have recorded, with every scatter that a real one has."""
+"""Sessions drawn from a model, with all scatter."""
 
 from __future__ import annotations
 
@@ -37,16 +37,14 @@ def draw_session(
     micrometer_mm: float | None = None,
     command: Callable[[Motion], NDArray[np.float64]] | None = None,
 ) -> list[Observation]:
-    """Record a plan once on the machine `truth`, every ball put up anew for each test.
+    """Record a plan once, with new mountings for each test.
 
-    Whether a micrometer is at hand does not change anything else that is drawn.
+    A micrometer changes no other draw.
 
     Args:
-        rng: of mountings, CMM entries, bar length and noise, each with the size that the plan states; of balls put up under the
-            spindle with `SET_UP_MM`.
-        micrometer_mm: uncertainty of its readings, one standard deviation [mm]: balls that the plan puts up under the spindle
-            come with their set-up errors as read; None: nobody measured them.
-        command: from the wanted motion to the poses that are commanded instead, as a compensation does.
+        rng: of mountings, CMM, bar and noise at the plan's sizes; `SET_UP_MM` under the spindle.
+        micrometer_mm: standard deviation; None: no micrometer.
+        command: from wanted motion to commands.
     """
     known = known_sources()
     bar = Fitted(known["bar-offset"], rng.normal(0.0, BAR_UNCERTAINTY_MM, 1), "study")

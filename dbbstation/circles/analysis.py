@@ -37,7 +37,6 @@ class Deviations:
 
     Attributes:
         largest_um: Fmax, outwards positive [µm].
-        least_um: Fmin [µm].
     """
 
     largest_um: float
@@ -49,22 +48,16 @@ class CircleAnalysis:
     """One circle in one direction.
 
     Attributes:
-        raw: as measured.
         chosen: filter of G, F and H.
-        path: filtered.
         g_um: circular deviation G, minimum zone [µm].
-        g_least_squares_um: the same about the least-squares circle, which is permitted too [µm].
         centre_mm: of the least-squares circle less the commanded one, X and Y [mm].
         radius_error_um: radius of the least-squares circle less the nominal one [µm].
         mean_radial_error_um: mean reading less nominal length of the bar [CAL Table III] [µm].
-        f_centred: F about the least-squares centre.
-        f_commanded: F about the commanded centre.
         steps: at the reversals of X and Y that can be seen.
         harmonics: 2 to 10 undulations per revolution.
         closure: end of the turn less its beginning; None where too few samples lie there.
         passes: of the overlap; None where there is none.
         feed_mm_min: feed that the overlap shows and its standard uncertainty [mm/min]; None where it shows none.
-        noise: of the readings.
         lost: samples that are missing in the recording.
         residual_um: deviations from the least-squares circle, not filtered, in time order, shape (n,) [µm].
     """
@@ -165,8 +158,6 @@ def feed_shown(recording: Recording, circle: Circle, noise_mm: float = 0.0) -> t
     """Return the feed that the overlap shows and its standard uncertainty [mm/min]; None where it shows none.
 
     Args:
-        recording: with its overlap.
-        circle: as commanded.
         noise_mm: of a sample, as slow figures see it [mm].
 
     Raises:
@@ -183,14 +174,10 @@ class PairAnalysis:
 
     Attributes:
         one: in the sense that was run first.
-        other: in the other sense.
-        together: both paths as one, that of `one` first.
         g_um: bi-directional circular deviation G(b), minimum zone of both paths [µm].
-        g_least_squares_um: the same about the least-squares circle of both paths [µm].
-        d_um: mean bi-directional radial deviation D: radius of the least-squares circle of both paths less the nominal
-            radius [µm].
+        d_um: mean bi-directional radial deviation D: radius of the least-squares circle of both paths less the nominal radius
+            [µm].
         h_um: circular hysteresis H: greatest radial difference between both paths at one angle [µm].
-        h_deg: that angle, from +X [deg].
     """
 
     one: CircleAnalysis

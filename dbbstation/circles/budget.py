@@ -46,11 +46,9 @@ class SetUpKnowledge:
     """What the session states of bar and ball; None where it does not.
 
     Attributes:
-        u_bar_um: standard uncertainty of the bar's calibrated length [µm].
         u_temperature_um: standard uncertainty of what the bar has grown by since, which readings were corrected by [µm].
         not_absolute: why figures that rest on the bar's length have no uncertainty; empty where they have one.
         u_ball_um: standard uncertainty of the ball's place in X and in Y, coordinate and mounting together [µm].
-        u_ball_z_um: the same for its height [µm].
     """
 
     u_bar_um: float | None = None
@@ -70,7 +68,6 @@ class Budget:
         missing: causes that count for it and that nobody stated.
         why_not: why it has no uncertainty; empty where it has one.
         value_um: the figure, without what noise adds to it [µm].
-        as_read_um: the figure of the readings [µm].
     """
 
     u_um: float | None
@@ -116,8 +113,6 @@ def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowled
     """Return the budget of a figure of one circle.
 
     Args:
-        one: the circle.
-        quantity: which figure.
         known: what the session states.
     """
     if quantity in RANGES:
@@ -215,7 +210,6 @@ def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[BudgetQuanti
     """Return the budgets of G(b), D and H of a circle in both directions on one mounting.
 
     Args:
-        pair: the circle in both directions.
         known: what the session states; bar and ball are the same in both.
     """
     radius = [budget_of(one, BudgetQuantity.RADIUS, known) for one in (pair.one, pair.other)]

@@ -36,12 +36,7 @@ CLEAR = 2.0
 
 
 def estimate_of(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate | None:
-    """Return G, G(LS), Fmax or Fmin of a circle; None where it has too few samples to separate noise from form.
-
-    Args:
-        one: the circle.
-        quantity: which.
-    """
+    """Return G, G(LS), Fmax or Fmin of a circle; None where it has too few samples to separate noise from form."""
     if not one.noise.known:
         return None
     found = _FOUND.setdefault(one, {})
@@ -111,7 +106,6 @@ def _drawn(one: CircleAnalysis, taken: int) -> tuple[NDArray[np.float64], DrawnP
     """Form by samples, shape (n,) [µm], and drawn noise of a circle: each direction has draws of its own, as both stand beside each other in a pair.
 
     Args:
-        one: the circle.
         taken: lines of the noise, from 0, that were taken out of the deviations.
     """
     known = _DRAWN.setdefault(one, {})
@@ -126,12 +120,7 @@ def _drawn(one: CircleAnalysis, taken: int) -> tuple[NDArray[np.float64], DrawnP
 
 
 def pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate | None:
-    """Return G(b), G(b)(LS) or H of both directions; None where one has too few samples to separate noise from form.
-
-    Args:
-        pair: the circle in both directions.
-        quantity: which.
-    """
+    """Return G(b), G(b)(LS) or H of both directions; None where one has too few samples to separate noise from form."""
     if not (pair.one.noise.known and pair.other.noise.known):
         return None
     found = _OF_PAIRS.setdefault(pair, {})

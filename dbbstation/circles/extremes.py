@@ -58,9 +58,7 @@ class Estimate:
     """A figure without what noise adds to it.
 
     Attributes:
-        value_um: the figure [µm].
         u_um: its standard uncertainty by noise: half-width of its 95 % interval over 1.96, of the longer side [µm].
-        as_read_um: the figure of the readings, noise included [µm].
     """
 
     value_um: float
@@ -77,7 +75,6 @@ class DrawnPath:
         highest_um: greatest noise in it, shape (draws, s) [µm].
         lowest_um: least noise in it, shape (draws, s) [µm].
         theta_deg: its middle, rising, shape (s,) [deg].
-        sigma_um: standard deviation of one sample's noise [µm].
         least: share of that which noise has where all of its spectrum is as low as at its end.
         order: samples by angle, shape (m,).
         starts: where each sector begins among them, shape (s,).
@@ -106,7 +103,6 @@ def drawn_path(
         apart: form and noise of its deviations, in time order; the form filtered already.
         theta_deg: angles of its samples, shape (n,) [deg].
         passed: share of the noise's amplitude that the figure's filter lets pass, by line, shape (n // 2 + 1,).
-        seed: of the draws.
     """
     count = len(theta_deg)
     power = apart.power_um2 * passed**2
@@ -170,7 +166,6 @@ def estimated(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
         paths: one, or both directions of a circle, with deviations from one circle.
         statistic: of greatest and least deviations, shape (draws, s), at angles, shape (s,): a range that is as many times larger
             as they are.
-        as_read_um: that of the readings [µm].
     """
     if not max(path.sigma_um for path in paths) > 0.0:
         return Estimate(as_read_um, 0.0, as_read_um)

@@ -140,8 +140,6 @@ def drawn_noise(
     Args:
         apart: a series taken apart.
         passed: share of the amplitude that a filter lets pass, by line, shape (n // 2 + 1,).
-        draws: how many.
-        rng: generator.
     """
     count = len(apart.form_um)
     lines = np.fft.rfft(apart.pushes.drawn(rng, draws, count), axis=1)

@@ -31,8 +31,6 @@ class CircleNoise:
     Attributes:
         slow_um: standard deviation of white noise, per sample, that would give slow figures the same uncertainty [µm]; NaN where
             there are too few samples.
-        reading_um: standard deviation of single readings [µm].
-        reading_freedom: degrees of freedom of that.
         resolution_um: step in which the readings come [µm]; zero where none shows.
         freedom: degrees of freedom of `slow_um`.
     """

@@ -69,7 +69,6 @@ class CirclePath:
         radius_mm: nominal radius of the tool tip's path, R cos e [mm].
         theta_deg: angles about the ball, from +X towards +Y, shape (n,) [deg].
         about_ball_mm: distances from the vertical through the ball, shape (n,) [mm].
-        least_squares: the least-squares circle, deviations from it with it.
     """
 
     radius_mm: float

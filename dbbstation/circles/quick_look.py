@@ -66,12 +66,10 @@ class Symptom:
     """Size of one signature.
 
     Attributes:
-        signature: which.
         place: end or axis; empty where it belongs to both axes.
         value: its size; None where it cannot be determined.
         u: standard uncertainty of that; None likewise.
         below: with 95 % probability it is less, where it is not seen and only that can be told; None otherwise.
-        unit: of all of these.
         seen: whether it is larger than four times its uncertainty.
         text: further information, such as the period of a cyclic error.
     """
@@ -91,10 +89,7 @@ class QuickLook:
     """All signatures of one circle.
 
     Attributes:
-        symptoms: all of them.
-        form_rms_um: of the deviations from the least-squares circles [µm].
         left_rms_um: of what the signatures leave of them, noise included [µm].
-        spike_deg: most likely length of the spikes [deg].
         sigma_um: standard deviation of white noise, per sample, that would give these figures the same uncertainty [µm].
     """
 

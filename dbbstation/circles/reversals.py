@@ -35,9 +35,7 @@ class ReversalStep:
     """How much the path rises from before a place to behind it, in the sense of travel.
 
     Attributes:
-        theta_deg: the place [deg].
         height_um: outwards positive [µm].
-        u_um: its standard uncertainty by noise [µm].
     """
 
     theta_deg: float
@@ -50,8 +48,6 @@ class Harmonic:
     """One undulation A cos k(θ - θ_0) of the path about its least-squares circle.
 
     Attributes:
-        undulations: k, per revolution.
-        amplitude_um: A [µm].
         peak_deg: angle θ_0 of its first peak from +X, below 360 / k [deg].
     """
 
@@ -66,10 +62,7 @@ def step_at(
     """Return the step of a path at a place, by straight lines on both its sides.
 
     Args:
-        raw: the circle.
         deviation_um: of its samples, shape (n,) [µm].
-        theta_deg: the place [deg].
-        sigma_um: noise of a sample [µm].
 
     Returns:
         None where the turn begins and ends there, or where too few samples lie beside it: what differs between a

@@ -38,9 +38,7 @@ class SignatureColumn:
     """One column of the fit.
 
     Attributes:
-        signature: that it belongs to.
         place: end or axis that it belongs to; empty where it belongs to both axes.
-        unit: of its size.
     """
 
     signature: Signature
@@ -63,7 +61,6 @@ def shapes_of(
     Args:
         theta_deg: angles, shape (n,) [deg].
         circle: radius, feed and sense of travel.
-        spike_deg: length of a spike [deg].
     """
     theta, sign = np.radians(theta_deg), circle.direction.sign
     radius_mm = circle.radius_mm
@@ -94,9 +91,7 @@ def cyclic_shapes(theta_deg: NDArray[np.float64], circle: Circle, axis: str, per
 
     Args:
         theta_deg: angles, shape (n,) [deg].
-        circle: radius.
         axis: `X` or `Y`.
-        period_mm: way of the axis after which the error comes back [mm].
     """
     theta = np.radians(theta_deg)
     along = np.cos(theta) if axis == "X" else np.sin(theta)

@@ -30,11 +30,7 @@ class AfterReversals:
 
     Attributes:
         strut: 1 to 6.
-        within_s: time after the reversal [s].
         probability: that noise which is the same everywhere is as much larger there, over all struts and times.
-        rms_um: of the readings there [µm].
-        elsewhere_um: of the readings elsewhere [µm].
-        beyond_um: what is there beyond what is elsewhere [µm].
     """
 
     strut: int

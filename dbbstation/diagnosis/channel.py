@@ -61,15 +61,11 @@ class CircleChannel:
 
     Args:
         calibration: the base model, fitted; its runs as thinned.
-        sources: named candidates, several laws of one cause under one name; each must be given what it needs by every
-            run.
+        sources: named candidates, several laws of one cause under one name; each must be given what it needs by every run.
 
     Attributes:
         calibration: the base fit.
-        motions: of the runs.
         readings: as the base fit predicts them.
-        columns: of all causes.
-        named: causes that have a name.
         set_up: balls and bars that are off by far more than stated, a variant for each of them.
         sources: by name and law.
     """
@@ -195,7 +191,6 @@ class CircleChannel:
         Args:
             target: shape (n,) [mm].
             others: causes beside the named ones.
-            noise_mm: of one sample, about [mm].
         """
         sd = np.zeros(self.columns.count)
         for cause in (*self.named, *self.set_up, *others):
@@ -223,10 +218,7 @@ class CircleChannel:
         """Lay out a cause at values of all its parameters, with tangents and slack.
 
         Args:
-            name: of the cause.
-            law: which one it follows.
             values: by set, shape (p,).
-            fit: about which.
         """
         source = self.sources[name, law]
         readings = self._readings_about(fit)
@@ -298,7 +290,6 @@ class CircleChannel:
         return fit.x[fit.layout.columns_of(key[0])[0]]
 
     def _base(self) -> NDArray[np.float64]:
-        """Columns of the base over all samples."""
         layout = self.calibration.layout
         samples = np.zeros((self.runs[-1].stop, len(layout.known.prior)))
         for rows, motion, reading in zip(self.runs, self.motions, self.readings, strict=True):
@@ -351,7 +342,6 @@ class CircleChannel:
         )
 
     def _on_a_grid(self, source: ErrorSource) -> tuple[Variant, ...]:
-        """Variants of a source at all points of the grid of its nonlinear parameters."""
         parameters = source.parameters(self.machine)
         amplitudes = [k for k, p in enumerate(parameters) if not p.grid]
         shaped = [k for k, p in enumerate(parameters) if p.grid]
@@ -376,10 +366,7 @@ class CircleChannel:
         """Forms of a source at one point, by its parts.
 
         Args:
-            source: the cause.
             derivatives: of the readings by its amplitudes, per run, shape (n, p).
-            shared: set of each run.
-            nonlinear: the point.
         """
         amplitudes = [p for p in source.parameters(self.machine) if not p.grid]
         sets = list(dict.fromkeys(shared))
@@ -405,7 +392,6 @@ class CircleChannel:
 
 
 def _spacing(parameter: Parameter, value: float) -> float:
-    """Spacing of the grid of a nonlinear parameter about a value."""
     grid = np.sort(np.array(parameter.grid))
     if len(grid) == 1:
         return parameter.plausible

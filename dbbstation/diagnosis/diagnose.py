@@ -122,7 +122,6 @@ def _cancelling(explained: Explained) -> Cancelling | None:
 
 
 def _widened(explained: Explained) -> Explained:
-    """The same with uncertainties of both fits by what tests say of each other."""
     before, settled = widened_by_tests(explained.before), explained.settled
     after = before if settled.after is explained.before else widened_by_tests(settled.after)
     return replace(explained, before=before, settled=replace(settled, after=after))

@@ -41,7 +41,6 @@ class Effects:
     """What a source does to one run.
 
     Attributes:
-        motion: the run.
         reading: what a model predicts for it.
         values: of all parameters of the source, shape (p,).
         derivative: of the reading by these, shape (n, p).

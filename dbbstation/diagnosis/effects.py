@@ -38,16 +38,13 @@ class CuredCircle:
     """One run with and without a cause.
 
     Attributes:
-        test: name.
         direction: `ccw` or `cw`.
         repeat: of the test and direction.
         g_um: circular deviation that the cause would make by itself, up to 30 undulations per revolution [µm].
         centre_um: how far it moves the centre, X and Y, shape (2,) [µm].
         measured_g_um: circular deviation as measured, by the same figure [µm].
-        cured_g_um: the same if the cause were cured [µm].
         measured_centre_um: centre less the commanded one as measured, shape (2,) [µm].
         cured_centre_um: the same if it were cured, shape (2,) [µm].
-        raw: the run as measured.
         effect_mm: what the cause does to its readings, shape (n,) [mm].
     """
 
@@ -75,11 +72,9 @@ class CauseEffect:
         g_u_um: standard uncertainty of that; None where the covariance of its parameters is not known.
         centre_um: mean distance by which it moves the centres [µm].
         centre_u_um: standard uncertainty of that; None likewise.
-        workspace_um: root mean square distance over the workspace by which it moves the tool, about a common shift [µm]; None where it
-            follows more than the pose.
+        workspace_um: root mean square distance over the workspace by which it moves the tool, about a common shift [µm]; None
+            where it follows more than the pose.
         workspace_u_um: standard uncertainty of that; None likewise.
-        cure: how to cure it.
-        confirm: how to confirm it.
         circles: run by run.
     """
 
@@ -118,13 +113,12 @@ def effects_of(
 
     Args:
         model: with its sources, those of the measurement too.
-        observations: runs.
         rows: source, set and parameter of each row of the covariance.
         covariance: of these, in the products of their units, shape (k, k); None where it is not known.
-        unseen: combinations of these that the recordings did not determine, each at its plausible size, shape (h, k). Circles do not show
-            them; over the workspace the uncertainty is not known where they are its greater part.
-        formula_variance: part of the variances that is what formulas may be off by, shape (k,); None where there is none. What the shape of
-            a formula lacks it lacks on every strut, so that all amplitudes of a source are off by one share.
+        unseen: combinations of these that the recordings did not determine, each at its plausible size, shape (h, k). Circles do
+            not show them; over the workspace the uncertainty is not known where they are its greater part.
+        formula_variance: part of the variances that is what formulas may be off by, shape (k,); None where there is none. What
+            the shape of a formula lacks it lacks on every strut, so that all amplitudes of a source are off by one share.
 
     Raises:
         ModelError: a source needs what the runs do not give.

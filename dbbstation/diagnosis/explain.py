@@ -352,7 +352,6 @@ def _estimated(
 
 
 def _values_in(fit: Calibration, name: str) -> dict[str, NDArray[np.float64]]:
-    """Values of all parameters of a cause in a fit, by set."""
     return {term.shared: fit.x[term.columns] for term in fit.layout.terms if term.source.name == name}
 
 
@@ -371,7 +370,6 @@ def _lay_out(
     fit: Calibration,
     target: NDArray[np.float64],
 ) -> None:
-    """Lay out a rival at the values that are best in the place of a member, with its slack."""
     others = best.without(member.cause.name)
     name, law = rival.cause.name, rival.variant.law
     sets = list(dict.fromkeys(channel.sources[name, law].shared_by(motion) for motion in channel.motions))

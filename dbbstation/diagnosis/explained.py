@@ -32,8 +32,6 @@ class SettledCircles:
         after: joint fit of base and named causes of the most probable hypothesis.
         posterior: over sets of causes, about that fit.
         best: its most probable hypothesis, or one as probable, whose named causes were fitted.
-        comparison: that it came from.
-        causes: that were compared.
         unmodelled: those among them that have no name.
         noise: measured on what all causes together leave.
         left: misfit of the joint fit.
@@ -75,8 +73,6 @@ class Explained:
     Attributes:
         before: fit of the base model.
         outliers: balls and runs that are off, kept from pulling it.
-        channel: about that fit.
-        first: what it leaves.
         settled: what the comparison came to.
     """
 

@@ -37,19 +37,17 @@ class SourceFinding:
     """What is said of one source.
 
     Attributes:
-        name: of the source.
-        verdict: what can be said.
         ambiguous_with: sources that would explain the recordings about as well in its place.
         gain: difference in log evidence that it brings.
         concealed: share of its signature's sum of squares that the fitted machine parameters take up.
         whole_um: root mean square of its signature over the runs [µm].
         rest_um: of what the fitted parameters leave of it [µm].
-        parameters: values with their uncertainty as fitted; for a source that was not, the best amplitudes beside those
-            that were, whose uncertainty says how much could hide.
+        parameters: values with their uncertainty as fitted; for a source that was not, the best amplitudes beside those that
+            were, whose uncertainty says how much could hide.
         text: one sentence for people.
         probability: that it is there, given the recordings and the catalogue of causes; of its class where it has one.
-        stability: selection frequency: share of draws of seven tenths of the tests in which it is found again; None where
-            it was not tried.
+        stability: selection frequency: share of draws of seven tenths of the tests in which it is found again; None where it was
+            not tried.
         equivalent: causes that are observationally equivalent to it, itself among them; empty where there are none.
         acts: in the whole session, or once.
         sigmas: norm of its effect over its standard deviation; 0 for a cause that the most probable set has not.
@@ -83,7 +81,6 @@ class Location:
     """Where the misfit is.
 
     Attributes:
-        test: name.
         direction: `ccw` or `cw`.
         theta_deg: from, to: angles from +X towards +Y [deg].
         strut: 1 to 6 that contributes most there; None where no strut does.
@@ -115,8 +112,6 @@ class Curve:
     """An unmodelled effect as a function of what organises it.
 
     Attributes:
-        follows: what it is a function of, and what it moves.
-        unit: of the variable.
         strut: 1 to 6; None where all struts follow it, or no strut's error is meant.
         form: which of its kind, such as the period of a wave or the place of a step, in words; empty where there is one.
         period: of a wave [unit of the variable]; None for what is none.
@@ -184,10 +179,7 @@ class Shift:
     """How far a parameter of the earlier calibration had been pulled.
 
     Attributes:
-        parameter: source and parameter.
         before_um: without the sources that were found [µm].
-        after_um: with them [µm].
-        uncertainty_um: of the latter [µm].
     """
 
     parameter: str
@@ -206,13 +198,10 @@ class NextTest:
     """A test worth measuring next.
 
     Attributes:
-        text: what to measure, in words.
         circle: ball, bar and path: x_mm, y_mm, z_mm, a_deg, b_deg, elevation_deg, feed_mm_min, wait_s.
         source: what it is to reveal or to tell apart.
-        sigma_before: standard deviation of its amplitude, or of the combination of its amplitudes that gains most, with
-            the tests before it.
-        sigma_after: with the test.
-        unit: of both.
+        sigma_before: standard deviation of its amplitude, or of the combination of its amplitudes that gains most, with the tests
+            before it.
     """
 
     text: str
@@ -238,9 +227,6 @@ class Diagnosis:
         outliers: balls and runs that do not belong, kept from pulling the fits.
         workspace: how far the earlier calibration was off elsewhere; None where nothing was found.
         locations: largest share first.
-        sources: best first.
-        unexplained: the residual.
-        shifts: largest first.
         second_start_agrees: a second search came to the same set of causes; None where the comparison ended at its limit.
         next_tests: best first, each beside those before it; empty where nothing is to be asked.
         cancelling: effects of named causes on the readings that cancel each other [mm]; None where none do.

@@ -84,14 +84,7 @@ class _Run:
 
 
 class ForeseenTests:
-    """Tests that could be measured beside those of a channel; what each would say is worked out once, whatever is asked of it.
-
-    Args:
-        channel: what was measured.
-
-    Attributes:
-        channel: the same.
-    """
+    """Tests that could be measured beside those of a channel; what each would say is worked out once, whatever is asked of it."""
 
     def __init__(self, channel: CircleChannel) -> None:
         self.channel = channel
@@ -145,8 +138,6 @@ class ForeseenTests:
         Its mounting is new and tells nothing else, so what a shift of the ball could do is taken out of the rows.
 
         Args:
-            proposal: the test.
-            direction: of the run.
             asked: sources, whose columns stand behind those of the base, in all sets that they have.
         """
         run = self._run(proposal, direction, asked)
@@ -170,7 +161,6 @@ class ForeseenTests:
         return self._reachable[circle]
 
     def _run(self, proposal: Proposal, direction: Direction, asked: Sequence[tuple[ErrorSource, Variant]]) -> _Run:
-        """The run with what it would say of these sources; what it says of base and sources is kept, its reading is not."""
         wait_s = proposal.wait_s if Need.TIME in self.channel.calibration.layout.needs else 0.0
         key = replace(proposal.circle, direction=direction), wait_s, proposal.observation.setup.ball
         run = self._runs.get(key)

@@ -26,7 +26,6 @@ def held_variance(calibration: Calibration, held: NDArray[np.float64]) -> NDArra
     runs see it is hardly less than 20 µm off where they do not.
 
     Args:
-        calibration: the fit.
         held: orthonormal rows over the fitted columns, in units of their scales, shape (h, f).
     """
     known = calibration.layout.known
@@ -58,7 +57,6 @@ def held_beside(before: Calibration, after: Calibration) -> NDArray[np.float64]:
     The base's own are a convention, such as base joints that are all higher or lower.
 
     Args:
-        before: the base fit.
         after: the joint fit, which keeps the base's columns where they were and adds others behind.
     """
     wide = np.zeros((len(before.solution.held), after.solution.held.shape[1]))

@@ -31,10 +31,7 @@ def locations_of(
     """Where what the base model leaves is largest, and which strut the found sources say most of it comes from.
 
     Args:
-        before: the base fit.
         after: the joint fit.
-        found: sources that were named.
-        first: misfit of the base fit.
         unnamed: variable of what has no name; None where nothing organises it.
     """
     fitted = [f for f in after.model.sources if f.source in found]
@@ -53,11 +50,9 @@ def locate(
     """Stretches of the circles where the misfit exceeds the noise, largest share first.
 
     Args:
-        observations: runs.
         residual_mm: what the base model leaves of each, shape (n,) [mm].
         noise_mm: of one sample, as it acts on smooth effects [mm].
         struts: per run, what each strut contributes to the reading, shape (n, 6) [mm]; None where none does.
-        variable: what organises the misfit.
     """
     smoothed = [smooth(r, np.radians(o.raw.phi_deg)) for o, r in zip(observations, residual_mm, strict=True)]
     total = sum(float(s @ s) for s in smoothed)

@@ -94,8 +94,6 @@ def propose(
     Args:
         could_be: tests to choose from, beside what was measured.
         asked: the source to reveal, with its columns; then those that it must be told apart from.
-        noise_mm: of one sample [mm].
-        most: tests at the most.
     """
     if not all(source.needs <= PROPOSED for source, _ in asked):
         return ()

@@ -25,7 +25,6 @@ class Part:
     Attributes:
         label: strut or part; empty for all of them.
         amplitudes: that it has, among those of all sets, one set after the other; all of them, added up, where `alike`.
-        log_weight: log of its probability among the forms of the cause.
     """
 
     label: str
@@ -42,10 +41,6 @@ def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
     """Forms of a cause, whose log weights are those of one distribution: kinds of forms are equally likely, and members of a kind.
 
     What wears or was made badly is often one strut, or all alike; all others free beside it would hide what is faint.
-
-    Args:
-        amplitudes: of one set.
-        sets: how many sets of values there are.
     """
     every = tuple(range(len(amplitudes) * sets))
     labels = [p.alone_with for p in amplitudes] * sets

@@ -46,10 +46,7 @@ class GainOfTest:
     """One test, all its runs together.
 
     Attributes:
-        name: as in maps.
         residual_um: root mean square of the residual within the mounting, before and after [µm].
-        circularity_um: greatest of its runs, of the residual, before and after [µm].
-        traces: its runs.
     """
 
     name: str

@@ -102,9 +102,7 @@ class TemplateScan:
         runs: as shapes see them.
         residual: per run, what the fit leaves, shape (n,) [mm].
         jacobian: per run, of all base columns, shape (n, k); each is asked for once.
-        base: what is known of these.
         held: directions that are kept at nominal.
-        noise_mm: of one sample [mm].
     """
 
     def __init__(

@@ -107,9 +107,7 @@ class Follows:
     """What an unmodelled error is a function of, and what it moves.
 
     Attributes:
-        variable: one of `UNITS`.
         kind: of curve, such as `wave`; empty for the usual one.
-        moves: what moves.
     """
 
     variable: str
@@ -137,7 +135,6 @@ class Shape:
         kind: of curve, such as `wave`; empty for the usual one.
         strut: 1 to 6; None where all struts follow the same curve, or where it is no strut's error.
         moves: what moves; where that is every strut and a strut is given, only that one.
-        form: of the curve.
         tried: how many independent forms it was picked from.
         explained: sum of squares that it explains by itself where it was picked, in units of the noise.
     """
@@ -253,7 +250,6 @@ def _since_reversal_s(time_s: NDArray[np.float64], speed_mm_s: NDArray[np.float6
 
 
 def _temperatures(motion: Motion) -> dict[str, NDArray[np.float64]]:
-    """What was logged, as `variables` names it."""
     logged = known_thermometers(motion)
     found = {f"{name}-temperature": logged_degc(motion, name)[0] for name in THERMOMETERS if name in logged}
     on_struts = [f"strut{strut}" for strut in range(1, STRUTS + 1)]
@@ -268,8 +264,6 @@ def samples_of(
     """Return variables and gains of a run.
 
     Args:
-        motion: the run.
-        machine: nominal machine.
         reading: what a model predicts for it.
         pivot_mm: about which the table may turn with its balls, shape (3,) [mm]; None: it is not asked.
     """
@@ -395,7 +389,6 @@ WALK_STEPS = 6
 
 
 def _usual(name: str, extent: Ranges, strut: int | None) -> Form:
-    """Usual form of a curve over a variable, for one strut or for all."""
     low, high = extent.low[name], extent.high[name]
     if name == "strut-speed-sign":
         return SignForm()

@@ -59,7 +59,6 @@ class Branch:
 
     Attributes:
         sense: `lengthening` or `shortening` where the error hangs on the direction of travel; empty otherwise.
-        variable: mean of the variable.
         model_um: mean error that the source puts there in the joint model [µm].
         before_um: error that would explain the residual of the base model best; NaN where hardly seen [µm].
         after_um: the model's, plus the one that would explain the residual of the joint model best; NaN alike [µm].
@@ -80,8 +79,6 @@ class SourceCurves:
 
     Attributes:
         source: its name; empty for the unmodelled residual.
-        variable: what the curves are drawn over.
-        unit: of the variable.
         fine: the error may change from each piece of the range to the next, as a wave does.
         struts: branches of each strut, 1 to 6; empty where the source moves no strut.
         reading: branches of the bar's reading, where it moves no strut.
@@ -151,7 +148,6 @@ def _curves(diagnosis: Diagnosis, name: str) -> SourceCurves:
 
 
 def _wanted(diagnosis: Diagnosis, name: str) -> Follows:
-    """What a source follows, or the residual."""
     if not name:
         return diagnosis.unexplained.follows or Follows("")
     source = next(t.source for t in diagnosis.after.layout.terms if t.source.name == name)

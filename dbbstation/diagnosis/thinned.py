@@ -34,7 +34,6 @@ def thinned(observation: Observation, most: int = SECTORS) -> Observation:
     """Return the run averaged over sectors, with what was commanded averaged alike; as it is where it is short.
 
     Args:
-        observation: the run.
         most: samples per turn at the most.
     """
     raw = observation.raw

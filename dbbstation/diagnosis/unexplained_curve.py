@@ -65,9 +65,7 @@ def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) ->
     A dent between two widths of the catalogue is two bumps in one place: their sum is the error of that strut.
 
     Args:
-        channel: of all columns.
         settled: what the comparison came to.
-        member: of its most probable hypothesis, the effect.
     """
     unmodelled, runs, comparison = settled.unmodelled, settled.unmodelled.runs, settled.comparison
     shape = _largest(settled, member)
@@ -175,7 +173,6 @@ class _Piece:
         to_points: matrix from them to the points, shape (n, p).
         at: places of the points, shape (n,).
         direction: empty where what moves has one only.
-        words: of direction and convention.
     """
 
     amplitudes: NDArray[np.float64]
@@ -201,7 +198,6 @@ def _along(runs: Sequence[Samples], shape: Shape, found: NDArray[np.float64]) ->
 
 
 def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[NDArray[np.float64], str]:
-    """Matrix that takes what is conventional out of the amplitudes of a curve, and what that is."""
     count = shape.form.count
     if isinstance(shape.form, Walk):
         return np.eye(count), "counted from its first value"
@@ -219,7 +215,6 @@ def _over(
 
     Args:
         runs: as shapes see them.
-        shape: whose curve it is.
         line: amplitudes of the direction that moves most, shape (p,).
     """
     form = shape.form

@@ -40,7 +40,6 @@ class JointFitWithCurve:
     """A joint fit of everything that has a name and the curve that has none.
 
     Attributes:
-        source: that carries the curve.
         fit: with the curve of the struts that it was found on, and of no other.
         to_all: matrix from the parameters that were fitted to those of the source, shape (p, f).
         curve: as the diagnosis found it.
@@ -87,7 +86,6 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCur
 
     Args:
         curve: that the diagnosis found.
-        after: its joint fit of what has a name.
 
     Raises:
         ModelError: nothing is left without a name, or what is left follows nothing that a program knows.
@@ -142,7 +140,6 @@ def _to_all(each: int, strut: int | None) -> NDArray[np.float64]:
 
 
 def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) -> ErrorSource:
-    """Return a source that has the parameters of one strut, or one set for all struts, and does what the whole does."""
     first = int(np.flatnonzero(to_all.any(axis=1))[0])
 
     class TiedSource(ErrorSource):

@@ -39,7 +39,6 @@ class Unmodelled:
         runs: as shapes see them.
         follows: what each cause is a function of, by its name.
         shapes: by name of the cause and label of its form; one for each strut where each has its own.
-        causes: with their columns in the channel.
     """
 
     channel: CircleChannel
@@ -58,13 +57,7 @@ class Unmodelled:
         self._add([*shapes(ranges(self.runs)), *wander(self.runs)])
 
     def look(self, fit: Calibration, members: Sequence[Member], noise_mm: float) -> None:
-        """Look for waves, bumps, steps and pulses in what a fit leaves, beside its base and causes, and take them in.
-
-        Args:
-            fit: the base fit or a joint one.
-            members: causes that it has, or that stand beside it.
-            noise_mm: of one sample [mm].
-        """
+        """Look for waves, bumps, steps and pulses in what a fit leaves, beside its base and causes, and take them in."""
         channel = self.channel
         taken = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
         known = with_random(channel.base, np.concatenate([np.zeros(0), *(member.sd for member in members)]))
@@ -121,7 +114,6 @@ KINDS = 30
 
 
 def _label(shapes: Sequence[Shape]) -> str:
-    """Label of a form: the strut that it acts on."""
     if len(shapes) > 1:
         return EACH
     return f"strut {shapes[0].strut}" if shapes[0].strut else ALIKE

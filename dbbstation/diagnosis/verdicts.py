@@ -132,7 +132,6 @@ class _Judge:
         return self._verdict_of_absent(name)
 
     def _verdict_of_absent(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
-        """The same of a cause that is rather not there."""
         if not self._testable(name):
             return Verdict.NOT_TESTABLE, (), (), self._why_not_testable(name)
         if self._probability((name,)) > ABSENT:
@@ -140,7 +139,6 @@ class _Judge:
         return Verdict.RULED_OUT, (), (), "It would have been seen at its plausible size and was not needed."
 
     def _verdict_of_member(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
-        """The same of a cause of the most probable hypothesis."""
         equal = self._classes[name]
         shown = self._with_a_name(equal)
         shown = shown if len(shown) > 1 else ()
@@ -158,7 +156,6 @@ class _Judge:
         return Verdict.AMBIGUOUS, others, shown, _either(others)
 
     def _acts(self, name: str) -> Acts:
-        """When a cause is at work."""
         return Acts.ONCE if self._channel.happens_once(name) else Acts.ALWAYS
 
     def _gains(self, name: str) -> Gains | None:
@@ -304,7 +301,6 @@ def _why(verdict: Verdict, gains: Gains | None) -> str:
 
 
 def _either(others: Sequence[str]) -> str:
-    """Text of a cause that may be there, or one of others in its place."""
     return f"These tests cannot tell it from {', '.join(others)}."
 
 

@@ -35,12 +35,10 @@ class WorkspaceError:
     Attributes:
         shift_um: mean of that along X, Y and Z: a common shift, which a program's zero on the part takes away [µm].
         with_shift_rms_um: root mean square length of it all [µm].
-        rms_um: the same about the common shift [µm].
         greatest_um: greatest length about the common shift [µm].
         at_pose: where that is, X, Y, Z, A, B, C [mm, deg].
-        uncertainty_um: root mean square of the joint model's own standard uncertainty about a common shift [µm]; None where it is not
-            known.
-        with_shift_uncertainty_um: the same with it.
+        uncertainty_um: root mean square of the joint model's own standard uncertainty about a common shift [µm]; None where it is
+            not known.
     """
 
     shift_um: tuple[float, ...]

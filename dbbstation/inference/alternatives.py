@@ -40,9 +40,6 @@ class Alternatives:
     """Classes of equivalent causes and ambiguities of a comparison.
 
     Args:
-        comparison: of columns.
-        causes: that were compared.
-        posterior: over sets of them.
         best: the set that is taken.
         form_uncertainty: says of a member by how much its formula may be off, as a share of its effect.
         of: members of the best set whose classes are wanted.
@@ -138,8 +135,6 @@ def named_already(
     balls that no circle shows decides nothing.
 
     Args:
-        comparison: of columns.
-        nameless: forms of unmodelled effects.
         named: forms of named causes, and by how much their formula may be off, as a share of the effect.
     """
     found = np.zeros(len(nameless), dtype=bool)
@@ -177,10 +172,7 @@ def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause],
     """Return the few causes that do best in the place of a member, and not much worse than it does.
 
     Args:
-        name: of the member.
-        comparison: of columns.
         causes: to choose from; those of the hypothesis are passed over.
-        best: hypothesis that the member is of.
     """
     scan = comparison.scan(best.without(name), [cause for cause in causes if cause.name not in best.names])
     enough = max(0.5 * best.log_factor(name), 0.0)

@@ -81,7 +81,6 @@ def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
 
     Args:
         blocks: compressed runs.
-        known: priors of all columns.
         noise: standard deviation of one measurement, where a block does not state its own.
     """
     members, border = _split(blocks, known)
@@ -109,7 +108,6 @@ def triangles_without(
 
     Args:
         blocks: compressed runs.
-        known: priors of all columns.
         noise: standard deviation of one measurement, where a block does not state its own.
         parts: places of the blocks that are left out.
 
@@ -145,7 +143,6 @@ class _Border:
 
     Attributes:
         order: columns, shape (m + f,).
-        random: number of random effects among them, m.
         place: of each column in that order, shape (k,); -1 for the others.
         alone: random effects that no block touches.
     """
@@ -172,7 +169,6 @@ class _Border:
 
 
 def _split(blocks: Sequence[Block], known: Columns) -> tuple[list[tuple[list[int], NDArray[np.int64]]], _Border]:
-    """Groups, as `_groups` has them, and the columns that stay."""
     touched = np.zeros(len(known.prior), dtype=np.bool_)
     for block in blocks:
         touched[block.columns] = True
@@ -189,7 +185,6 @@ def _split(blocks: Sequence[Block], known: Columns) -> tuple[list[tuple[list[int
 
 
 def _group(blocks: Sequence[Block], columns: NDArray[np.int64], known: Columns, noise: float) -> Group:
-    """Take out the columns of some blocks, which no other block touches."""
     border = np.setdiff1d(np.concatenate([columns, *(block.columns for block in blocks)]), columns)
     size, total = len(columns), len(columns) + len(border)
     order = np.concatenate([columns, border])
@@ -215,7 +210,6 @@ def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[li
     are taken out as makes the work least; the work is counted in rows times columns squared.
 
     Args:
-        blocks: all of them.
         random: random effects that may be taken out, shape (k,).
     """
     total, count = len(random), sum(len(block.target) for block in blocks)
@@ -247,7 +241,6 @@ def _tied(
     """Blocks that share random effects, directly or through others, with these effects.
 
     Args:
-        blocks: all of them.
         which: block of each touch, shape (t,).
         touched: column of each touch, shape (t,).
         own: columns that are to be taken out, shape (k,).

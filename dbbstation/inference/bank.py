@@ -72,13 +72,7 @@ LOOKED_FOR = frozenset({Family.WAVE, Family.BUMP, Family.STEP, Family.PULSES, Fa
 class Bank:
     """Columns and causes.
 
-    Args:
-        channel: that they are of.
-
     Attributes:
-        patterns: by the name of the cause.
-        laws: by name.
-        noise: that columns are whitened for.
         whitening: that does it, over the kept rows; None where the noise is white and the same in all rows.
         spread: of the noise in each kept row, over that of all, shape (m,).
         trust: root of the weight that what is new in each kept row has, shape (m,); ones unless the noise has long tails.
@@ -173,7 +167,6 @@ class Bank:
         """Causes beside the base; some kept rows, shape (m,), may say nothing: the target must be zero there.
 
         Args:
-            but_for: these rows.
             only: columns that are then asked for, rising, shape (q,); all if None.
         """
         columns = self._columns if but_for is None else self._columns.but_for(but_for, only)
@@ -342,7 +335,6 @@ class Bank:
         return sd
 
     def _take(self, noise: Coloured, spread: NDArray[np.float64], trust: NDArray[np.float64]) -> None:
-        """Whiten all columns for a noise."""
         same = noise.partial == self.noise.partial and np.array_equal(spread, self.spread)
         same = same and np.array_equal(trust, self.trust)
         self.noise, self.spread, self.trust = noise, spread, trust
@@ -390,8 +382,6 @@ class Bank:
         """Lay out a law at values of all its parameters, with tangents and slack.
 
         Args:
-            name: of the law.
-            nonlinear: values of its nonlinear parameters.
             amplitudes: of all its columns, zero for those of other forms, shape (p,).
         """
         law = self.laws[name]
@@ -451,7 +441,6 @@ class Bank:
         return Cause(pattern.name, variants, self._odds(pattern), named=pattern.family in NAMED)
 
     def _blocks(self, own: NDArray[np.int64], size: NDArray[np.float64]) -> tuple[Variant, ...]:
-        """All blocks each with its own offset, or one of them alone."""
         half = float(np.log(0.5))
         alone = [
             Variant(own[k : k + 1], size[:1], label=self.channel.names[k], log_weight=half - float(np.log(len(own))))

@@ -49,9 +49,8 @@ def spread(blocks: Sequence[Block], columns: int, noise: float | None = None) ->
 
     Args:
         blocks: compressed runs.
-        columns: number of all columns.
-        noise: standard deviation of one measurement, where a block does not state its own: rows are divided by it, so
-            that all weigh alike; None leaves them as they are.
+        noise: standard deviation of one measurement, where a block does not state its own: rows are divided by it, so that all
+            weigh alike; None leaves them as they are.
     """
     wide = np.zeros((sum(len(block.target) for block in blocks), columns + 1))
     row = 0

@@ -24,8 +24,6 @@ class Cancelling:
 
     Attributes:
         rms: root mean square of each about its mean, by name, those that are larger than all together.
-        rms_of_sum: the same of all together.
-        unit: of both.
     """
 
     rms: Mapping[str, float]
@@ -38,7 +36,6 @@ def cancelling(effects: Mapping[str, NDArray[np.float64]], unit: str, scale: flo
 
     Args:
         effects: by name, over all rows, shape (n,).
-        unit: that they are given in.
         scale: this many of it are one of the residual's.
     """
     rms = {name: float(np.std(effect)) for name, effect in effects.items()}

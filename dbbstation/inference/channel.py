@@ -71,11 +71,10 @@ class Law:
 
     Attributes:
         name: unique in its channel.
-        columns: what one unit of each amplitude does to the residual at values of the nonlinear parameters, over all rows,
-            shape (n, p).
+        columns: what one unit of each amplitude does to the residual at values of the nonlinear parameters, over all rows, shape
+            (n, p).
         plausible: usual size of each amplitude, one standard deviation, shape (p,).
         parameters: names of the amplitudes, then of the nonlinear parameters.
-        units: of these.
         grids: values of each nonlinear parameter to begin with, rising.
         positive: which amplitudes cannot be negative, shape (p,); empty where all can.
         form_uncertainty: share of the effect by which real objects depart from the formula, one standard deviation.
@@ -83,7 +82,6 @@ class Law:
         discrepancy: columns of what the formula may be off by, shape (n, q), from its effect, shape (n,), its nonlinear
             parameters and its amplitudes, shape (p,); `form_uncertainty` is their standard deviation. By default, the effect
             times smooth functions of `follows`.
-        log_odds: log prior odds.
         at: columns like `columns`, at values of the nonlinear parameters and about amplitudes, shape (p,), whose effect they give
             exactly; None where the effect is proportional to the amplitudes.
         choices: forms of which one is there, where there are several: the columns of each, its log probability, and what tells it
@@ -130,32 +128,29 @@ class Channel:
 
     Attributes:
         residual: measured less simulated, rows of a block together and in time order, shape (n,).
-        unit: of it.
         blocks: rows of each block (run, file, day), covering all rows in order.
-        names: of the blocks.
         variables: that effects without physics may follow.
         base: what is fitted anew with every hypothesis.
         laws: physical causes.
         time: of the rows, rising within blocks, shape (n,); None where their order means nothing.
-        time_unit: of it.
         simulated: the simulated value as a variable, to ask whether it is late; None: it is not asked.
         kept: rows that are fitted, shape (n,); all if not given.
         apart: rows from one that is kept to the next one where none between them is held back.
         static: patterns that need no look, where they are known already or a client makes them itself; None: all kinds over all
             variables.
-        least_noise: standard deviation of one row that is always there, whatever the rows seem to say: what the way they were made
-            leaves of a perfect object, in the unit of the residual.
+        least_noise: standard deviation of one row that is always there, whatever the rows seem to say: what the way they were
+            made leaves of a perfect object, in the unit of the residual.
         step: that measured values are multiples of, in the unit of the residual; zero where they are of no step that is known.
         surely: probability that the noise is not more than it is taken for [interval of a variance by chi-square; JCGM 101:2008,
             sec. 6.4.9.4]; None: its estimate is taken, for which half of that is as good.
-        grows: size of what a part of the noise may be in proportion to, beside a constant part, shape (n,); None: noise is the same
-            in all rows.
-        noise_follows: by name, sizes of what a part of the noise may be in proportion to, of which it follows one at the most, each of
-            shape (n,).
-        known_noise: standard deviation of noise that a row is known to have beyond that of the others, in the unit of the residual,
-            shape (n,); None: no row is known to have more.
-        levels: number of the kind of each row, from 0, where kinds of rows, such as outputs, have each a noise of a size of its own, shape
-            (n,); None: all rows have the same.
+        grows: size of what a part of the noise may be in proportion to, beside a constant part, shape (n,); None: noise is the
+            same in all rows.
+        noise_follows: by name, sizes of what a part of the noise may be in proportion to, of which it follows one at the most,
+            each of shape (n,).
+        known_noise: standard deviation of noise that a row is known to have beyond that of the others, in the unit of the
+            residual, shape (n,); None: no row is known to have more.
+        levels: number of the kind of each row, from 0, where kinds of rows, such as outputs, have each a noise of a size of its
+            own, shape (n,); None: all rows have the same.
         clock: of all rows, where some were left out or where they show a step by and by; None: they show it at once.
         direction: of travel as the rows show it, shape (n,); None: nothing is looked for in time that turns with it.
     """

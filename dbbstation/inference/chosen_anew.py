@@ -60,10 +60,8 @@ def chosen_anew(
 
     Args:
         of_all: causes beside the base over all rows.
-        of_others: the same over all rows but those of each part.
         choose: members of the most probable set, in a search that begins with what was chosen from all rows.
         kind_of: name of a cause to what tells it from other places or periods of the same.
-        asked: whether it is asked what a cause brought.
     """
     brought, whole = [], []
     for others in of_others:

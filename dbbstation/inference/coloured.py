@@ -209,7 +209,6 @@ class Coloured:
 
         Args:
             white: shape (n,).
-            stretches: as of `whitening`.
         """
         if self.is_white:
             return white
@@ -341,7 +340,6 @@ def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) ->
     1981, sec. 4.12]. With two parameters (t = 0), or three, it cannot follow lines that are waves nobody has found yet.
 
     Args:
-        bands: spectrum.
         most: largest phi.
         oscillates: try phases t from row to row, too: those of the bands.
     """
@@ -388,10 +386,8 @@ def with_put_back(noise: Coloured, bands: NDArray[np.float64], taken: NDArray[np
     """The same with what was taken from its spectrum put back, of an order that so many rows can tell.
 
     Args:
-        noise: as it was found.
         bands: frequencies [cycles per row], rising, shape (b,).
         taken: log of the share that is left there, shape (b,).
-        rows: that it was found from.
     """
     frequency = np.linspace(0.0, 0.5, FREQUENCIES + 1)
     power = np.exp(noise.log_power(frequency) - np.interp(frequency, bands, taken))

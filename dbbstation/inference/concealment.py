@@ -26,8 +26,6 @@ class Concealment:
 
     Attributes:
         share: of the sum of squares that is taken up, 1 - |rest|²/|whole|².
-        whole_rms: of the signature, in the channel's unit.
-        rest_rms: of what is left of it.
     """
 
     share: float

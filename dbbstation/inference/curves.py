@@ -92,9 +92,7 @@ class Stretches(Form):
     """One value over each of several stretches of time, nothing elsewhere; the variable is the time in rows of a clock.
 
     Attributes:
-        first: beginning of each.
         last: its end; infinite where it does not end.
-        response: of a `Clock`.
     """
 
     first: tuple[float, ...]

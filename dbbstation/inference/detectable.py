@@ -87,7 +87,6 @@ def least_seen(
         products: information on the amplitudes beside base and others, shape (p, p).
         samples: columns, shape (m, p).
         plausible: sizes of the amplitudes, shape (p,).
-        log_odds: prior odds.
     """
     rng = np.random.default_rng(SEED)
     directions = rng.standard_normal((DRAWS, len(plausible)))

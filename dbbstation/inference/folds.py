@@ -51,13 +51,11 @@ class Fold:
     """One part that was held back.
 
     Attributes:
-        name: of the part.
-        rows: how many.
         as_simulated: root mean square error of the reference, in the unit of the residual.
         before: with the base fitted to the other parts by ordinary least squares.
-        after: with what was chosen from the other parts.
-        gains: by kind of the effects that were chosen from the other parts, sum of squares of the errors without them, less that with
-            them, in the squared unit of the residual; of a simulator, log density of the prediction with them less that without.
+        gains: by kind of the effects that were chosen from the other parts, sum of squares of the errors without them, less that
+            with them, in the squared unit of the residual; of a simulator, log density of the prediction with them less that
+            without.
     """
 
     name: str
@@ -70,11 +68,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class HeldOutError:
-    """What predictions leave of rows that took no part in choosing or fitting.
-
-    Attributes:
-        folds: each part.
-    """
+    """What predictions leave of rows that took no part in choosing or fitting."""
 
     folds: tuple[Fold, ...]
 
@@ -121,12 +115,11 @@ def held_out_error(
     Beside a stretch the rows that resemble it are held back from the choice, too: they know it. The reference may know them.
 
     Args:
-        channel: all rows.
         choose_without: the whole selection, laws, patterns, noise and looks, without rows that are held back, shape (n,).
         progress: called with what is being done, and how much of how much.
         alike: correlation time of the noise [rows].
-        reference: what predictions are held against, over all rows, shape (n,), from the rows that it may be fitted to, shape (n,);
-            the mean of these if None.
+        reference: what predictions are held against, over all rows, shape (n,), from the rows that it may be fitted to, shape
+            (n,); the mean of these if None.
     """
     found = []
     parts = parts_of(channel)
@@ -200,7 +193,6 @@ def part_numbers(lengths: Sequence[int]) -> NDArray[np.int64]:
 
 
 def _beside(k: int, count: int) -> list[int]:
-    """First of each pair of neighbours, of so many, that has this one."""
     return [first for first in (k - 1, k) if 0 <= first < count - 1]
 
 

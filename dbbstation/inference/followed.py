@@ -52,7 +52,6 @@ class WithoutPart:
 
     Attributes:
         rows: of the part, shape (n,).
-        settled: what was chosen.
     """
 
     rows: NDArray[np.bool_]
@@ -102,7 +101,6 @@ def only_begun(settled: Settled) -> frozenset[str]:
 
 
 def _follow(settled: Settled) -> Callable[[str], frozenset[str]]:
-    """What causes of a comparison follow, by name."""
     begun = only_begun(settled)
     return lambda name: frozenset({TIME}) if name in begun else followed_by(settled.bank, name)
 
@@ -157,7 +155,6 @@ class VariableClass:
     """Variables that the same members follow.
 
     Attributes:
-        each: classes, each of which is followed.
         others: variables that these rows cannot tell from them.
         members: causes of the best set that follow them.
     """
@@ -242,7 +239,6 @@ class ClassGain:
     Attributes:
         gains: log density with it less that without.
         before: root mean square error without it.
-        after: the same with it.
     """
 
     gains: DensityGains

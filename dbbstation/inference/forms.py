@@ -229,7 +229,6 @@ class StepForm(Form):
 
 
 def _across(at: float, width: float, low: float, high: float) -> NDArray[np.float64]:
-    """Points about one place, and the ends."""
     near = at + width * np.linspace(-WIDTHS, WIDTHS, int(2 * WIDTHS * POINTS_PER_WIDTH) + 1)
     return np.unique(np.concatenate([[low], near[(near > low) & (near < high)], [high]]))
 

@@ -214,7 +214,6 @@ def misfit(
 
     Args:
         residuals: one whole period per run.
-        phases_rad: of the samples [rad].
         groups: what each run shares its first harmonic with.
         freedom_used: degrees of freedom that the fit took out of the low harmonics beside those shifts.
         noise: measured elsewhere; read from the high harmonics of these residuals if None.
@@ -254,7 +253,6 @@ def noise_left_by(
 
     Args:
         residuals: what it leaves of the measurement, one whole period per run.
-        phases_rad: of the samples [rad].
         of_white: what it leaves of draws of white noise, per run, shape (n, draws).
     """
     low, high = bands(min(len(residual) for residual in residuals))

@@ -68,7 +68,6 @@ def held_out(
 
 
 def _restricted(block: Block, active: NDArray[np.int64]) -> Block:
-    """Return the block with the active columns only, numbered by their place among them."""
     place = {int(column): k for k, column in enumerate(active)}
     inside = np.array([int(column) in place for column in block.columns], dtype=bool)
     columns = np.array([place[int(c)] for c in block.columns[inside]], dtype=np.int64)

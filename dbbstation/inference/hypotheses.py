@@ -133,10 +133,8 @@ def search(
     """Posterior over sets of causes.
 
     Args:
-        comparison: of their columns.
-        causes: to choose from.
-        seeds: members of hypotheses to look at beside those that the search finds itself, such as those of an earlier one
-            about another linearisation.
+        seeds: members of hypotheses to look at beside those that the search finds itself, such as those of an earlier one about
+            another linearisation.
         most_expanded: hypotheses whose neighbours are looked at, at the most.
         most_members: causes of a hypothesis at the most; None: hypotheses may grow as they like.
         likely: log odds against the best hypothesis within which others are looked at; `CLOSE` where that one alone is wanted.
@@ -372,7 +370,6 @@ class _Search:
         return members, more
 
     def _with_slack(self, comparison: ModelComparison, members: list[Member]) -> list[Member]:
-        """Members whose slack belongs to the amplitudes that they have together."""
         if not any(len(member.variant.slack) for member in members):
             return members
         values = comparison.values(members)
@@ -388,7 +385,6 @@ class _Beside:
     """What members of one hypothesis are asked beside each other, the largest of them taken out once for all the others.
 
     Args:
-        comparison: of all causes.
         members: of the hypothesis; their forms and sizes may change.
 
     Attributes:

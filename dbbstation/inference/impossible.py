@@ -19,7 +19,6 @@ def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.floa
     """Why amplitudes of a law cannot be: one is negative beyond its uncertainty though it cannot be; empty where they can.
 
     Args:
-        law: whose they are.
         values: shape (p,).
         variances: of these, shape (p,).
     """
@@ -32,14 +31,7 @@ def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.floa
 
 
 def impossibly_negative(name: str, value: float, sigma: float, unit: str) -> str:
-    """Why a value that cannot be negative is none that can be: it is so beyond its uncertainty; empty where it is not.
-
-    Args:
-        name: of the parameter.
-        value: of it.
-        sigma: standard uncertainty of that.
-        unit: of both.
-    """
+    """Why a value that cannot be negative is none that can be: it is so beyond its uncertainty; empty where it is not."""
     if value >= -NEGATIVE_SIGMA * sigma:
         return ""
     return (

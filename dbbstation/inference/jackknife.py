@@ -29,7 +29,6 @@ def jackknife_covariance(blocks: Sequence[Block], size: int) -> NDArray[np.float
 
     Args:
         blocks: compressed runs, at least two; values that one block alone knows come out with a large variance.
-        size: number of columns k.
     """
     norm = np.maximum(np.linalg.norm(spread(blocks, size)[:, :-1], axis=0), 1e-300)
     values = []

@@ -52,9 +52,7 @@ class LeftOver:
     """Whether something is left beyond noise.
 
     Attributes:
-        is_noise: whether nothing is.
         probability: that noise alone leaves as much in any of these tests.
-        looks: the tests.
     """
 
     is_noise: bool
@@ -122,7 +120,6 @@ def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: floa
 
 
 def _by_block(left: NDArray[np.float64], blocks: Sequence[slice], sigma: float) -> ResidualTest:
-    """Means of blocks."""
     counts = np.array([rows.stop - rows.start for rows in blocks], dtype=np.float64)
     means = np.array([left[rows].mean() for rows in blocks])
     terms = counts * means**2

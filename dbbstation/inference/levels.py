@@ -59,15 +59,10 @@ class DifferenceFound:
     """Level 1.
 
     Attributes:
-        answer: whether anything differs.
         why: reason, where the answer is not a plain yes.
-        probability: that any cause is there.
         matters: size that the user cares about, in the unit of the residual.
         matters_stated: whether the user stated it; else it is what the fitted parameters leave of all rows.
-        independent_samples: effective number of independent samples of the noise.
-        detectable: over each variable, the least detectable first.
         gain: log density of held-out parts with everything that was chosen, less that of the base alone; None where not tested.
-        gain_without_best: the same without the part that gains most.
     """
 
     answer: Differs
@@ -86,7 +81,6 @@ class ScoredLaw:
     """A law, or the sum of several, in one place.
 
     Attributes:
-        name: of it.
         log_density: of held-out parts with it, over nothing in its place.
     """
 
@@ -116,17 +110,13 @@ class Followed:
     Attributes:
         variables: of which one is followed, most probable first; of several classes that the same causes follow, all of these.
         or_variables: that these rows cannot tell from them.
-        answer: what is known of it.
-        probability: that anything follows one of them.
         ways: probability that it is followed by value, by direction, late, or in time.
         rms: of the fitted sum of all that follows them, in the unit of the residual.
         members: causes that do, in the most probable set.
         before: error of held-out rows without these; None where not tested.
-        after: the same with them.
         gain: log density of held-out parts with them less that without; None where not tested.
-        gain_without_best: the same without the part that gains most.
-        parts_with_gain: share of the rows that are in parts with a gain.
-        consequence: whether what is followed results from what is simulated, as the user states: it shows the difference and is no cause.
+        consequence: whether what is followed results from what is simulated, as the user states: it shows the difference and is
+            no cause.
         form: the law; None where the class is not known to be followed, or is the time.
     """
 
@@ -180,10 +170,8 @@ def difference_of(
     """Level 1 from what the levels below it found.
 
     Args:
-        probability: that any cause is there.
         classes: level 2.
         gains: of everything in held-out parts; None: not tested.
-        doubts: why what is not found may be there all the same, first one first.
         rest: size that matters, whether it was stated, independent samples, and detectable sizes.
     """
     matters, stated, samples, detectable = rest

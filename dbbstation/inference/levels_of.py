@@ -49,7 +49,6 @@ def levels_of(
         settled: what the comparison came to.
         left: tests of the residual.
         parts: what held-out parts say; None where these were not asked for.
-        held_out: errors of these parts.
         matters: size of an effect that matters, in the unit of the residual; None: what the base leaves of the rows.
     """
     probabilities = VariableProbabilities(settled)

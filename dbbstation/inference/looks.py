@@ -68,7 +68,6 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_
 
     Args:
         left: what a fit leaves of the rows that were kept.
-        variables: over all rows.
         kept: which rows were fitted, shape (n,).
         size: of an effect, one standard deviation, in units of noise.
     """
@@ -161,7 +160,6 @@ def placed_better(pattern: Pattern, left: Left, kept: NDArray[np.bool_], size: f
         pattern: that `looked_for` made.
         left: the residual beside everything but it.
         kept: which rows were fitted, shape (n,).
-        size: as of `looked_for`.
     """
     (variable,), form = pattern.variables, pattern.form
     if form is None:
@@ -182,7 +180,6 @@ def _explained_by(left: Left, columns: NDArray[np.float64], size: float) -> floa
 
 
 def _moved(form: Form, finer: float, extent: float) -> list[Form]:
-    """A form and those about it, at steps that are so much finer than those of the list; itself first."""
     steps = (0.0, -1.0, 1.0, -2.0, 2.0)
     if isinstance(form, Bump):
         return [
@@ -206,7 +203,6 @@ def _explained(sums: Sums, forms: Sequence[Form], size: float) -> NDArray[np.flo
 
 
 def _near(form: Form) -> list[Form]:
-    """Forms between a form of the list and its neighbours."""
     if isinstance(form, Bump):
         return [
             Bump(form.centre + away * form.width, form.width * wider)

@@ -27,8 +27,6 @@ class Louder:
 
     Attributes:
         probability: that stretches picked by chance are as much louder.
-        rms: in these stretches, in the unit of the residual.
-        elsewhere: root mean square in the others.
     """
 
     probability: float
@@ -50,7 +48,6 @@ def louder(residuals: Sequence[NDArray[np.float64]], begins: Sequence[NDArray[np
     Args:
         residuals: of each run, in the order of time, shape (n,).
         begins: rows of each run in which a stretch begins, in any order.
-        length: rows of a stretch.
     """
     inside, outside = [], []
     for residual, rows in zip(residuals, begins, strict=True):

@@ -58,10 +58,8 @@ def memory_laws(
     Args:
         variables: that an effect may follow.
         time: of the rows, rising within blocks, shape (n,).
-        time_unit: of it.
         blocks: rows of each, in time order.
         size: of an effect, one standard deviation, in the unit of the residual.
-        unit: of the residual.
     """
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0 and v.is_path(blocks)]
     moving = [rows for rows in blocks if rows.stop - rows.start > 1]

@@ -64,7 +64,6 @@ class Variant:
         label: which of several things of a kind it is, or of which strut; empty where there is one only.
         law: which law it follows, where a cause has several.
         whole: columns of the form that has all amplitudes at the same point, shape (q,); empty where it is this one.
-        log_weight: log probability of this variant among those of its cause.
         slack: columns of what the formula may be off by, shape (d,).
         slack_sd: standard deviations of their coefficients at the amplitudes `slack_at`, shape (d,).
         slack_at: root mean square of the amplitudes, in plausible ones, that the slack was made for.
@@ -89,7 +88,6 @@ class Cause:
     """Something that the base model may lack.
 
     Attributes:
-        name: unique.
         variants: its forms; their weights add up to one.
         log_prior_odds: log odds of its being there before anything was measured.
         named: it is a physical cause with a name; else an unmodelled effect, or a fault of the set-up.
@@ -108,10 +106,7 @@ class Member:
     """A cause in a hypothesis, with the variant and the size that suit it best there.
 
     Attributes:
-        cause: which.
-        variant: which of its forms.
         scale: standard deviation of its amplitudes, in plausible ones.
-        slack_scale: standard deviation of its slack, in units of that of its variant.
         slack_share: how closely this machine follows the formula, in units of what is stated.
     """
 
@@ -139,7 +134,6 @@ class Scan:
     Attributes:
         log_factor: log Bayes factor of each cause that was asked for, averaged over variants and sizes, shape (c,).
         factors: log Bayes factors of all forms at all sizes, shape (m, s).
-        weighted: the same with their weights.
         first: first form of each cause among all, shape (c,).
         last: the one behind its last, shape (c,).
         slim: which forms of each cause have fewer than `FLEXIBLE` amplitudes.
@@ -187,7 +181,6 @@ class Scan:
         )
 
     def _best(self, k: int) -> tuple[int, int]:
-        """Form and size of the best of one cause."""
         return divmod(int(self.weighted[self.first[k] : self.last[k]].argmax()), len(SCALES))
 
     def _narrow(self, k: int) -> Member | None:
@@ -211,16 +204,11 @@ class _OfCause:
     """Forms of one cause, those of one number of amplitudes together.
 
     Args:
-        cause: any.
         gram: products of all columns, shape (n, n).
-        at: where columns stand there.
 
     Attributes:
-        cause: the same.
-        groups: by number of amplitudes p: numbers of forms that have it, shape (m,); places of their columns and plausible sizes, shape (m, p) each;
-            products of these columns, shape (m, p, p).
-        weights: log probability of each form.
-        slim: which forms have fewer than `FLEXIBLE` amplitudes.
+        groups: by number of amplitudes p: numbers of forms that have it, shape (m,); places of their columns and plausible sizes,
+            shape (m, p) each; products of these columns, shape (m, p, p).
     """
 
     def __init__(
@@ -243,18 +231,11 @@ class _OfCause:
 class _Forms:
     """Forms of causes, those of one number of amplitudes together.
 
-    Args:
-        each: of every cause.
-        count: of all columns, n.
-
     Attributes:
-        causes: the same.
         needed: columns of all forms, shape (q,).
-        groups: numbers of forms that have one number of amplitudes, shape (m,); places of their columns in `needed` and plausible sizes,
-            shape (m, p) each; products of these columns, shape (m, p, p).
+        groups: numbers of forms that have one number of amplitudes, shape (m,); places of their columns in `needed` and plausible
+            sizes, shape (m, p) each; products of these columns, shape (m, p, p).
         weights: log probability of each form among those of its cause.
-        ends: where the forms of each cause begin and end.
-        slim: which forms of each cause have fewer than `FLEXIBLE` amplitudes.
     """
 
     def __init__(self, each: Sequence[_OfCause], count: int) -> None:
@@ -327,7 +308,6 @@ class ModelComparison:
         return _solved(lower, products.T)
 
     def _at(self, columns: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Where columns stand here."""
         return columns if self._columns is None else np.searchsorted(self._columns, columns)
 
     def log_evidence(self, members: Sequence[Member]) -> float:
@@ -393,12 +373,7 @@ class ModelComparison:
         return found
 
     def scan(self, members: Sequence[Member], causes: Iterable[Cause]) -> Scan:
-        """Every cause beside members, each in all its variants and sizes.
-
-        Args:
-            members: of a hypothesis.
-            causes: none of theirs.
-        """
+        """Every cause beside members, each in all its variants and sizes."""
         forms = self._forms_of(tuple(causes))
         needed = forms.needed
         lower, z, _ = self._eliminated(members)
@@ -494,7 +469,6 @@ def _scanned(forms: _Forms, towards: NDArray[np.float64], left: Sequence[NDArray
     """All forms of causes at all sizes.
 
     Args:
-        forms: of the causes.
         towards: what their columns say of the target beside a hypothesis, shape (q,).
         left: products of the columns of each form beside it, for each group of forms, shape (m, p, p).
     """
@@ -521,11 +495,8 @@ class Around:
     Analysis, 2nd ed., sec. 0.7.3].
 
     Args:
-        members: of the hypothesis.
-        forms: of all causes, those of the members with them.
         lower: Cholesky factor of the members' information.
         z: what it makes of the target.
-        evidence: log evidence of all members.
         across: what it makes of the products of members and causes, shape (p, q).
         towards: products of the causes' columns with the target, shape (q,).
     """

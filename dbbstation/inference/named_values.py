@@ -64,7 +64,6 @@ def with_jackknife(found: Mapping[str, Value], without: Sequence[Mapping[str, Va
 
     Args:
         found: from all rows, by name.
-        without: the same without each part.
     """
     if not found:
         return {}

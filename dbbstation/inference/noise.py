@@ -42,7 +42,6 @@ def noise_of(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> N
 
     Args:
         residuals: one array per run, in time order.
-        freedom_used: degrees of freedom that the fit spent.
     """
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)
@@ -96,7 +95,6 @@ _LAGS = 201
 
 
 def _autocovariance(residual: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sums of products at lags 0 to 200."""
     size = next_fast_len(len(residual) + _LAGS, real=True)  # room for the lags: nothing wraps round into them
     spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
     return np.fft.irfft(spectrum, size)[:_LAGS]

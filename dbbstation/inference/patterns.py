@@ -83,7 +83,6 @@ class Pattern:
     """One effect without physics.
 
     Attributes:
-        family: its kind.
         variables: that it follows; none for blocks.
         samples: what each amplitude does, over all rows, shape (n, p), about one at the most.
         form: of its curve, over the first variable, or over the row number where it follows none; None for a product.
@@ -138,11 +137,9 @@ def patterns(
     """Patterns that need no look at the residual.
 
     Args:
-        variables: of the channel.
         blocks: rows of each, in time order.
         time: of the rows, shape (n,); None where their order is unknown: then nothing has a direction or a speed.
         simulated: what the simulation says; None where it is not asked whether it is late.
-        time_unit: of `time`.
     """
     usable = [v for v in variables if len(np.unique(v.values)) >= 2]  # noqa: PLR2004 - a constant has no effect
     found = [pattern for v in usable for pattern in _over(v)]
@@ -188,7 +185,6 @@ def covers_turns(variable: Variable) -> bool:
 
 
 def _over(variable: Variable) -> list[Pattern]:
-    """Patterns over one variable whatever the order of the rows is."""
     unit = f"/{variable.unit}" if variable.unit else f" per unit of {variable.name}"
     straight = Power(variable.low, variable.high)
     family = Family.DRIFT if variable.kind is Kind.TIME else Family.LINEAR
@@ -244,9 +240,7 @@ def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> 
     [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]
 
     Args:
-        values: where it is pushed to.
         blocks: rows of each; each begins in the middle.
-        width: of the play, in the unit of the values.
     """
     found = np.empty(len(values))
     for rows in blocks:

@@ -32,8 +32,6 @@ class Left:
     Attributes:
         rest: what it leaves, shape (n,).
         axes: orthonormal directions of what was fitted, less what priors take of them, shape (n, k).
-        noise: of one whitened row, in the unit of the residual.
-        coloured: the noise before it was whitened.
         whitening: that made it white, shape (n, n); None where it was.
         known: what `beside` is, where that is known, shape (n, k).
     """
@@ -60,7 +58,6 @@ class Left:
             target: shape (n,).
             columns: shape (n, k).
             sd: standard deviations of their amplitudes, infinite where nothing is known, shape (k,).
-            coloured: noise before it was whitened.
             whitening: that made it white.
         """
         return Fitting.of(columns, sd, coloured, whitening).left(target)
@@ -84,8 +81,6 @@ class Left:
 
         Args:
             rows: in that place, shape (b, p).
-            here: that place.
-            there: the other one, which begins where it does.
         """
         if self.whitening is None:
             return rows
@@ -114,8 +109,6 @@ class Fitting:
 
     Attributes:
         axes: orthonormal, of rows and of one more row for every amplitude with a prior, shape (n + b, k).
-        rows: of the channel, n.
-        coloured: noise before it was whitened.
         whitening: that made it white; None where it was.
     """
 
@@ -218,7 +211,6 @@ class Sums:
     Attributes:
         at: mean of the variable in each piece, shape (b,).
         place: number of each piece, counted from the least value on, shape (b,).
-        width: of a piece, in the unit of the variable.
         squares: gain times gain, shape (b,).
         rest: gain times what a fit leaves, shape (b,).
         axes: gain times what it can do, shape (b, k).
@@ -275,7 +267,6 @@ class Sums:
         By Fourier transformation of the sums, as if every piece lay in its middle.
 
         Args:
-            most: periods over the range, at the most.
             size: standard deviation of amplitudes, in units of noise.
         """
         length = 2 * (int(self.place[-1]) + 1)

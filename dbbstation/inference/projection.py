@@ -46,8 +46,6 @@ class CauseColumns:
         room: columns for which room is made at first; more need a copy of all. Room that stays empty takes no memory.
 
     Attributes:
-        base: the same.
-        count: number of columns of causes.
         numbers: of the columns that products are known of, where these are not all.
         axes: orthonormal, of all that the base can do, shape (n, k).
         on_axes: columns of the base along these, shape (k, k).
@@ -170,7 +168,6 @@ class CauseColumns:
             self._free = sorted({*self._free, *columns.tolist()})
 
     def _make_room(self, last: int) -> None:
-        """Have a buffer of one's own with room for so many columns."""
         if last <= self._buffer.shape[1] and not self._shared:
             return
         wider = np.empty(
@@ -280,11 +277,10 @@ class BesideBase:
     """Causes beside a base.
 
     Args:
-        causes: their columns, and those of the base.
         known: priors and scales of the base.
-        held: orthonormal rows of fitted directions that the base fit kept at zero, in units of the scales. They have
-            their usual size here: where they are seen at all, as the curvature of a model lets them be beside very
-            little noise, that is no sign of a cause.
+        held: orthonormal rows of fitted directions that the base fit kept at zero, in units of the scales. They have their usual
+            size here: where they are seen at all, as the curvature of a model lets them be beside very little noise, that is no
+            sign of a cause.
         noise: standard deviation of one sample.
     """
 

@@ -38,7 +38,6 @@ def within_a_step(sizes: Sequence[Value], step: float) -> str:
     What rounding does to a value that changes slowly has the same sign in many rows, and may be a half of a step either way.
 
     Args:
-        sizes: of the stretches.
         step: that measured values are multiples of; zero where there is none.
     """
     if any(abs(one.value) - step >= OUT * one.uncertainty for one in sizes):

@@ -47,10 +47,8 @@ class Span:
     """Where an effect is.
 
     Attributes:
-        variable: name.
         low: from here on [unit].
         high: up to here [unit].
-        unit: of the variable.
     """
 
     variable: str
@@ -64,16 +62,11 @@ class CauseFinding:
     """What is said of one cause.
 
     Attributes:
-        name: of it.
-        verdict: what can be said.
         family: kind of effect; None for a law.
         label: which of its forms, such as which strut; empty where it has one.
-        variables: that it follows.
-        probability: that it is there, or one of its class.
-        log_factor: log Bayes factor beside the others.
-        rms: of its effect, that the base cannot take up, root mean square over rows where it is there; in the unit of the residual.
+        rms: of its effect, that the base cannot take up, root mean square over rows where it is there; in the unit of the
+            residual.
         sigmas: norm of that effect over its standard deviation.
-        whole_rms: of its effect about its mean.
         confounded: share of that which the base parameters can take up, R².
         values: amplitudes and nonlinear parameters, by name.
         spans: of variables, where it is at least half as large as at its largest.
@@ -290,7 +283,6 @@ class _Judge:
 
     @cached_property
     def _kinds(self) -> dict[str, tuple[Family, tuple[str, ...]]]:
-        """Family and variables of each cause that has a family."""
         bank = self._settled.bank
         of_patterns = {name: (one.family, one.variables) for name, one in bank.patterns.items()}
         of_laws = {n: (one.family, one.variables) for n, one in bank.laws.items() if one.family is not None}
@@ -304,7 +296,6 @@ class _Judge:
     def _verdict(
         self, cause: Cause, member: Member | None, probability: float, sigmas: float
     ) -> tuple[Verdict, tuple[str, ...], str]:
-        """Verdict, with whom it is ambiguous, and why."""
         if member is not None and self._alternatives.probability(self._pooled(cause.name)) >= SURE:
             verdict, others, text = self._certain(cause.name, probability, sigmas)
             return verdict, others, text or self._unless_late(cause.name)
@@ -360,7 +351,6 @@ class _Judge:
 
     @cached_property
     def _in_time(self) -> list[str]:
-        """Members that are stretches of time."""
         return [name for name in self._members if name in self._kinds and self._kinds[name][0] in IN_TIME]
 
     @cached_property
@@ -385,7 +375,6 @@ class _Judge:
         return impossible(law, found.values[:width], np.diag(found.covariance)[:width])
 
     def _absent(self, cause: Cause, probability: float) -> tuple[Verdict, tuple[str, ...], str]:
-        """The same of a cause that is rather not there."""
         seen = self._seen(cause, self._best.members)
         if seen < OUT:
             if self._seen(cause, ()) >= OUT:
@@ -430,12 +419,10 @@ def _at_half(effect: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _span(values: NDArray[np.float64], name: str, unit: str) -> Span:
-    """Range of a variable where an effect is."""
     return Span(name, float(values.min()), float(values.max()), unit)
 
 
 def _stretches(effect: NDArray[np.float64]) -> tuple[tuple[int, int], ...]:
-    """First and last rows of the stretches where an effect is not zero."""
     inside = np.concatenate([[False], np.abs(effect) > 0.0, [False]])
     edges = np.flatnonzero(np.diff(inside.astype(np.int64)))
     return tuple((int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True))

@@ -43,10 +43,8 @@ class Remainder:
     """What a model leaves, by its harmonics, by its runs and by its samples.
 
     Attributes:
-        harmonic: the one that stands out most over all runs.
         run: the one that stands out most over all low harmonics.
         pulse: run with the stretch that stands out most, one of `PULSES` of a turn.
-        pulse_phase_rad: where that is.
     """
 
     harmonic: Largest
@@ -74,7 +72,6 @@ def remainder(
 
     Args:
         residuals: what the model leaves of whole periods, one per run.
-        phases_rad: of the samples [rad].
         groups: what each run shares its first harmonic with; a common shift there counts as nothing.
         noise: measured elsewhere.
     """

@@ -48,9 +48,7 @@ def selection_frequency(
         groups: which blocks are kept or left out together, such as those of one test.
         known: priors and scales of the base columns.
         held: directions of the base that are kept at zero.
-        causes: to choose from.
         noise: standard deviation of one measurement.
-        rng: of the draws.
     """
     base = len(known.prior)
     columns = (

@@ -64,7 +64,6 @@ def settle(
     beginning leaves, until neither changes. The most probable outcome is returned, noise included, with the others in it.
 
     Args:
-        channel: what is to be explained.
         look: look for waves, bumps, steps, and pulses in time that nobody named.
         static: compare with the patterns that need no look, too.
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
@@ -72,8 +71,8 @@ def settle(
         in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
         thorough: begin from several places, and look once more beside what a search ends at; False: begin with nothing and search
             once, where a selection is repeated many times and may be somewhat worse.
-        beginnings: of the noise.
-        rivals: let noise of any colour compete; False: it is of first order, measured beside everything, and nothing competes with it.
+        rivals: let noise of any colour compete; False: it is of first order, measured beside everything, and nothing competes
+            with it.
         progress: called with what is being done.
     """
     options = _Options(
@@ -186,9 +185,7 @@ def _settled(
 
     Args:
         bank: of columns; they become more.
-        options: of `settle`.
         progress: called with what is being done.
-        best: members to begin with.
         impossible: laws that cannot be what they would have to be, and why.
         known: what other beginnings came to; where one is met, it is returned.
     """
@@ -271,12 +268,7 @@ def _looked(
     """Scan the residual, take in what is worth it, and look again beside that, until nothing more stands out.
 
     Args:
-        bank: of columns; they become more.
-        members: to begin with.
-        refused: laws that cannot be what they would have to be.
         progress: called with what is being done.
-        most_looks: looks at the most.
-        in_time: look for steps and pulses in time, too.
     """
     before = log_probability(bank, members)
     for number in range(most_looks):
@@ -337,8 +329,6 @@ def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[
     What the others make up for in the end is left out again.
 
     Args:
-        comparison: of their columns.
-        causes: to choose from.
         start: members to begin with; those of causes that are no longer there are left out.
     """
     there = {cause.name: cause for cause in causes}
@@ -368,7 +358,6 @@ def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[
 
 
 def _grown_in(bank: Bank) -> tuple[Member, ...]:
-    """Members that are worth it of what is in a bank."""
     return grown(bank.beside().comparison(bank.target), bank.causes)
 
 
@@ -383,7 +372,6 @@ def _laws_of(settled: Settled) -> list[Member]:
 
 
 def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, rough: Sequence[Member]) -> None:
-    """Lay out laws at their best values in the best hypothesis, or beside it in the place of what they compete with."""
     for member in rough:
         _lay_out_one(bank, beside, best, member)
 
@@ -448,8 +436,6 @@ def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.
     """Nonlinear parameters of a law, moved along their tangents by the values of a member, within their grids.
 
     Args:
-        law: of the member.
-        member: laid out with tangents, or on its grid.
         values: of its columns, shape (p,).
         per: what a step of one along a tangent counts: `growth` where tangents were made for another form or hypothesis.
     """

@@ -43,11 +43,8 @@ class Settled:
     """What the comparison came to.
 
     Attributes:
-        channel: that was explained.
         bank: columns and causes.
         noise: of one row, from what everything together leaves.
-        causes: that were compared.
-        comparison: that the posterior came from.
         posterior: over sets of causes.
         refused: laws that would have to be what they cannot be, and why.
         beginning: what the noise was measured beside at first.
@@ -72,11 +69,7 @@ class Settled:
         return self.posterior.best
 
     def effect(self, names: Sequence[str] | None = None) -> NDArray[np.float64]:
-        """What members of the best hypothesis do, over all rows, in the unit of the residual, shape (n,).
-
-        Args:
-            names: of the members; all if None.
-        """
+        """What members of the best hypothesis do, over all rows, in the unit of the residual, shape (n,)."""
         total = np.zeros(len(self.channel.residual))
         values = self.comparison.estimates(self.best.members).values if self.best.members else np.zeros(0)
         for member in self.best.members:
@@ -98,7 +91,6 @@ class Settled:
         """Probability of causes over all beginnings of the noise.
 
         Args:
-            probability: of at least one of them, from this beginning.
             names: of them; of effects that were looked for, others of the same family over the same variables count as the same.
         """
         if not self.others:

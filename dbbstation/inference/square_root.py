@@ -102,7 +102,6 @@ class Solution:
 
     Attributes:
         x: all columns, shape (k,).
-        spreads: how uncertain they are.
         directions: what the measurement sees of the fitted columns, the random ones averaged over.
         held: orthonormal rows of directions, in units of the scales, that were held at zero, shape (h, f).
         chi2: weighted sum of squares that remains, priors included.
@@ -204,7 +203,6 @@ def chi2_without(
 
     Args:
         blocks: compressed runs.
-        known: priors and scales.
         noise: standard deviation of one measurement, where a block does not state its own.
         held: orthonormal rows of fitted directions, in units of the scales, to keep at zero, shape (h, f).
         parts: places of the blocks that are left out.
@@ -236,7 +234,6 @@ def unseen_combinations(
 
     Args:
         blocks: compressed runs, linearised at the solution.
-        known: priors and scales.
         noise: standard deviation of one measurement, where a block does not state its own.
         held: orthonormal rows of fitted directions that were kept at zero, in units of the scales, shape (h, f).
     """

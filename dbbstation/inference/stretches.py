@@ -101,13 +101,7 @@ def refined(
     """The first stretches of a pattern with their ends where they explain most beside everything else, one after the other.
 
     Args:
-        pattern: that `stretches` made.
-        count: of its stretches.
         lefts: the residual beside everything but one of them, given its number and the columns of all, shape (n, count).
-        blocks: as of `stretches`.
-        kept: as of `stretches`.
-        size: as of `stretches`.
-        clock: as of `stretches`.
         direction: of travel, shape (n,), where the pattern turns with it.
     """
     clock = Clock.plain(len(kept)) if clock is None else clock
@@ -137,7 +131,6 @@ def refined(
 
 
 def _shares_an_edge(found: Sequence[tuple[float, float]], k: int) -> bool:
-    """Whether a stretch begins or ends where a longer one does."""
     own = np.array(found[k])
     return any(
         np.ptp(own) < np.ptp(other) and np.abs(own[:, None] - np.array(other)).min() <= 1.0
@@ -257,7 +250,6 @@ class _Look:
         return _Window(first, last, float(self._worth_between(first, slice(last, last + 1))[0]))
 
     def _within(self, first: int, last: int) -> tuple[int, int]:
-        """Rows that a stretch may have: those of its block, or of all where it goes on into another one."""
         for low, high in self._blocks:
             if low <= first and last <= high:
                 return low, high
@@ -332,7 +324,6 @@ class _Look:
         return float(begins[k]), float(ends[k])
 
     def _within_times(self, first: float, last: float) -> slice:
-        """Rows from one time to another."""
         begin, end = np.searchsorted(self._at, [first, last + 1.0]).tolist()
         return slice(begin, end)
 
@@ -345,11 +336,7 @@ class _Look:
 
 
 class _Growing:
-    """Columns, shape (n, k), that become more, one after the other, without a copy of all each time.
-
-    Attributes:
-        columns: that there are.
-    """
+    """Columns, shape (n, k), that become more, one after the other, without a copy of all each time."""
 
     def __init__(self, columns: NDArray[np.float64]) -> None:
         self.columns, self._room = columns, columns

@@ -117,7 +117,6 @@ def log_student(new: NDArray[np.float64], tails: float) -> NDArray[np.float64]:
 
     Args:
         new: in units of the scale, shape (m,).
-        tails: degrees of freedom.
     """
     height = gammaln(0.5 * (tails + 1.0)) - gammaln(0.5 * tails) - 0.5 * np.log(0.5 * tails)
     return np.asarray(height - 0.5 * (tails + 1.0) * np.log1p(new**2 / tails))

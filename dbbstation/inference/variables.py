@@ -48,7 +48,6 @@ class Variable:
     Attributes:
         name: unique in its channel.
         unit: of its values; empty where none is known.
-        kind: what it is.
         values: in row order, shape (n,).
         period: of an angle, one turn, in its unit; None for all others.
         driven: whether it results from what is simulated, so that the difference may cause it and not the other way round.

@@ -145,9 +145,7 @@ def claim(probability: float, sigmas: float, acts: Acts, gains: Gains | None, *,
     """Verdict of a cause that the most probable hypothesis has.
 
     Args:
-        probability: that it is there, or one of its class.
         sigmas: norm of its effect over its standard deviation.
-        acts: when it is at work.
         gains: in held-out parts; None: these were not asked for.
         worse: whether everything together predicts worse than the reference [`is_worse`]; then nothing is identified.
     """

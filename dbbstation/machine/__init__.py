@@ -1,1 +1,1 @@
-"""The hexapod itself: geometry, inverse and forward kinematics, Jacobians, travel, statics. Pure mathematics."""
+"""The hexapod: geometry, kinematics, Jacobians, travel, statics."""

@@ -1,4 +1,4 @@
-"""How numerical kernels are compiled and spread over the processor's cores."""
+"""Compile numerical kernels and spread them over cores."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ forget the sign of zero. It may not assume that there is no NaN and no infinity,
 
 
 class NotKeptWarning(UserWarning):
-    """Compiled code could not be kept for the next process."""
+    """Compiled code could not be kept."""
 
 
 NOT_KEPT = (
@@ -40,28 +40,21 @@ NOT_KEPT = (
 
 
 def compiled(kernel: Kernel) -> Kernel:
-    """Compile a loop to machine code at its first call and keep the code on disk for the next process.
+    """Compile a loop at its first call and keep the code on disk.
 
-    Where there is no place for it, neither beside the package nor in the user's cache folder, nothing is kept:
-    `NotKeptWarning`, once, in the process that nobody else started.
-
-    The kernel runs without Python's global lock, so that `in_blocks` can run it on all cores. Numba's own
-    parallel loops are not used: their default thread layer aborts the process when two threads enter it.
+    Without a writable place, beside the package or in the cache folder, `NotKeptWarning` is issued once. Kernels run
+    without Python's global lock for `in_blocks`; Numba's parallel loops abort when two threads enter them.
     """
     return cast("Kernel", _Kernel(kernel, cache=True, nogil=True))
 
 
 def inlined(part: Kernel) -> Kernel:
-    """Make a part of kernels that is compiled into each of them.
-
-    Seen from inside the kernel its work arrays have constant shapes and do not overlap: only so does the compiler
-    turn loops into vector instructions (twice the speed of calls).
-    """
+    """Compile a part into each kernel, where constant shapes allow vector instructions (twice as fast)."""
     return cast("Kernel", _Kernel(part, forceinline=True))
 
 
 class _Kernel:
-    """A loop that reaches the compiler when it is called: importing that takes longer than most commands in all."""
+    """A loop compiled on call, since importing the compiler takes long."""
 
     def __init__(self, function: Callable[..., Any], **options: bool) -> None:
         self._function = function
@@ -72,7 +65,7 @@ class _Kernel:
         return (self._dispatcher or self.dispatcher())(*arguments)
 
     def dispatcher(self) -> Callable[..., Any]:
-        """Return what the compiler makes of the loop, and of the parts that it calls."""
+        """Return the compiled loop with its parts."""
         with _COMPILING:
             if self._dispatcher is None:
                 import numba  # noqa: PLC0415 - takes a third of a second
@@ -106,7 +99,7 @@ _COMPILING = threading.RLock()
 
 
 def in_blocks(kernel: Callable[[int, int], None], count: int) -> None:
-    """Call `kernel(start, stop)` for blocks that cover `range(count)`, on all cores where that pays."""
+    """Call `kernel(start, stop)` for blocks of `range(count)`, on all cores if worthwhile."""
     workers = count // SMALLEST_BLOCK
     if workers > 1:
         workers = 1 if _is_worker() else min(os.cpu_count() or 1, workers)
@@ -120,9 +113,9 @@ def in_blocks(kernel: Callable[[int, int], None], count: int) -> None:
 
 
 def in_parallel(work: Callable[[Item], Result], items: Iterable[Item], poses: int) -> list[Result]:
-    """Call `work` on every item, on all cores where so many `poses` per item make it pay; results in order.
+    """Call `work` on every item, on all cores if `poses` per item justify it; results in order.
 
-    What an item's work does in blocks stays on its own core. An exception is that of the first item that fails.
+    The first failing item's exception is raised.
     """
     if poses < SMALLEST_BLOCK or _is_worker():
         return [work(item) for item in items]
@@ -135,7 +128,7 @@ def _pool() -> ThreadPoolExecutor:
 
 
 def _is_worker() -> bool:
-    """Whether this is one of the pool's threads: waiting for others of them, all could wait for each other."""
+    """Return whether this is a pool thread, which must not wait for others."""
     return threading.current_thread().name.startswith(_WORKER)
 
 

@@ -1,4 +1,4 @@
-"""Where two machine files differ, in the words of the file; whether a model is of the machine that was measured."""
+"""Differences of two machine files, in their words."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ ROUNDED_MM = 1e-6
 
 @dataclass(frozen=True)
 class Difference:
-    """One value that two machine files do not share.
+    """One differing value.
 
     Attributes:
-        key: as the machine file has it, such as `masses.platform_kg`; with the strut where it has a value for each.
-        one: value in the first file, as text with every digit; `not given` where it has none.
+        key: such as `masses.platform_kg`, with the strut if per strut.
+        one: in the first file, with every digit, or `not given`.
     """
 
     key: str
@@ -55,24 +55,23 @@ class Difference:
 
 
 def differences(one: Machine, other: Machine) -> tuple[Difference, ...]:
-    """Return every value that differs between two machines, joints and lengths beyond a nanometre, their names aside."""
+    """Return every difference beyond a nanometre, names aside."""
     return tuple(found for found in _between("", one, other) if found.key not in DESCRIPTION)
 
 
 def in_words(found: Sequence[Difference], most: int = 4) -> str:
-    """Name differences with both values; of many the first few, and how many more there are."""
+    """Return the first differences in words, with the count of others."""
     more = f" and {len(found) - most} more" if len(found) > most else ""
     return "; ".join(difference.text for difference in found[:most]) + more
 
 
 def check_model_is_of(machine: Machine, calibrated: Machine) -> None:
-    """Refuse a model that was calibrated on another machine than it is used for.
+    """Refuse a model of another machine.
 
-    Travel, tolerances and the name may differ, and so may what only one of the two files states: a model does not use
-    what was added to the machine file later.
+    Travel, tolerances, name and data of only one file may differ.
 
     Raises:
-        ModelError: names what differs, with both values.
+        ModelError: names differences with both values.
     """
     found = [
         difference

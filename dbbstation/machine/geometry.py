@@ -1,4 +1,4 @@
-"""What a hexapod is: its joints, its travel, its screws and masses."""
+"""Joints, travel, screws and masses of a hexapod."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ gravity, at the lower end of machine tools. Pieces that keep their feed with it 
 
 @dataclass(frozen=True, eq=False)
 class Hexapod:
-    """Joints of a Stewart platform [CAL Fig 1], either as designed or as a particular machine has them.
+    """Joints of a Stewart platform [CAL Fig 1], designed or actual.
 
     Attributes:
-        base_joints_mm: Q, machine frame, shape (6, 3), or (n, 6, 3) where they move from sample to sample [mm].
-        platform_joints_mm: P, platform frame with its origin at the tool tip, shape (6, 3) or (n, 6, 3) [mm].
-        rotation: convention of the tilt angles.
+        base_joints_mm: Q, machine frame, shape (6, 3), or (n, 6, 3) if they move.
+        platform_joints_mm: P, platform frame with origin at the tool tip, shape (6, 3) or (n, 6, 3).
+        rotation: convention of tilt angles.
     """
 
     base_joints_mm: NDArray[np.float64]
@@ -41,7 +41,7 @@ class Hexapod:
     rotation: Rotation = Rotation.XYZ
 
     def moved(self, base_mm: NDArray[np.float64], platform_mm: NDArray[np.float64]) -> Hexapod:
-        """Return the same hexapod with joints shifted by these amounts, shapes (6, 3) or (n, 6, 3) [mm]."""
+        """Return the hexapod with shifted joints, shapes (6, 3) or (n, 6, 3) [mm]."""
         return replace(
             self,
             base_joints_mm=self.base_joints_mm + base_mm,
@@ -51,7 +51,7 @@ class Hexapod:
 
 @dataclass(frozen=True)
 class Travel:
-    """Limits of the machine, each a pair (least, greatest)."""
+    """Limits as pairs (least, greatest)."""
 
     xy_radius_mm: float
     x_mm: tuple[float, float]
@@ -65,10 +65,10 @@ class Travel:
 
 @dataclass(frozen=True)
 class Masses:
-    """What gravity acts on; a part that is not known is None.
+    """Masses under gravity; None if unknown.
 
     Attributes:
-        centre_of_gravity_above_tip_mm: on the platform's axis, from the tool tip [mm].
+        centre_of_gravity_above_tip_mm: on the platform's axis.
     """
 
     platform_kg: float
@@ -77,12 +77,11 @@ class Masses:
 
 @dataclass(frozen=True)
 class Compliance:
-    """How much a strut stretches under an axial force, by design [GRAV eq 7].
+    """A strut's stretch under axial force, by design [GRAV eq 7].
 
     Attributes:
-        at_1000mm_mm_per_n: elongation per force of a strut of 1000 mm between its joints [mm/N].
-        growing_share: part of that which grows with the strut's length, as a rod does; the rest (screw, nut,
-            bearings, joints) is the same at every length [1].
+        at_1000mm_mm_per_n: for 1000 mm between joints.
+        growing_share: proportional to length, as of a rod; the rest is constant [1].
     """
 
     at_1000mm_mm_per_n: float
@@ -91,14 +90,14 @@ class Compliance:
 
 @dataclass(frozen=True)
 class StrutMasses:
-    """What each of the six struts weighs, on a line through its two joints [GRAV Fig 2].
+    """Masses of each strut on the line through its joints [GRAV Fig 2].
 
     Attributes:
-        strut_kg: what lies evenly between base joint and platform joint, whatever the length [kg].
-        motor_kg: what sits behind the base joint, turning with the strut [kg].
-        motor_length_mm: of that part; its centre is half of it behind the joint [mm].
-        screw_kg: screw that ends at the platform joint and slides through the base joint [kg].
-        screw_length_mm: of that screw; its rear end sticks out behind the joint [mm].
+        strut_kg: spread evenly between the joints.
+        motor_kg: behind the base joint, turning with the strut.
+        motor_length_mm: its centre is half of it behind the joint.
+        screw_kg: ends at the platform joint and slides through the base joint.
+        screw_length_mm: its rear end sticks out behind the joint.
     """
 
     strut_kg: float
@@ -110,9 +109,9 @@ class StrutMasses:
 
 @dataclass(frozen=True, eq=False)
 class JointAxes:
-    """Directions of the axes of universal joints that are fixed in base and platform, of any length.
+    """Directions of universal joints' axes in base and platform, of any length.
 
-    A universal joint turns about two axes: the first is fixed in base or platform, the second in the strut, across it.
+    The first axis is fixed there, the second in the strut, across it.
 
     Attributes:
         base: machine frame, shape (6, 3) [1].
@@ -128,17 +127,16 @@ class Machine:
     """The nominal machine: what its controller believes.
 
     Attributes:
-        reference_length_error_mm: already corrected by the controller, which drives strut i to F_i(T) minus this, shape (6,)
-            [mm].
-        screw_lead_mm: travel of a strut per turn of its screw [mm]; None where not known.
-        masses: what gravity acts on; None where not known.
-        joint_tolerance_mm: standard deviation of a base-joint coordinate after assembly [mm]; None where not known.
-        compliance: of the struts as designed; None where not known.
-        strut_masses: of the struts as designed; None where not known.
-        joint_axes: of universal joints; None where not known, or where the joints are balls.
-        greatest_feed_mm_min: of the tool tip [mm/min]; None where not known.
-        greatest_turn_deg_min: of the tilt angles where the tool tip stands still [deg/min]; None where not known.
-        acceleration_mm_s2: of the tool tip, that the control plans with [mm/s²]; None where not known.
+        reference_length_error_mm: corrected by the controller, which drives strut i to F_i(T) minus this, shape (6,).
+        screw_lead_mm: travel per turn; None if unknown.
+        masses: None if unknown.
+        joint_tolerance_mm: standard deviation of a base-joint coordinate after assembly; None if unknown.
+        compliance: by design; None if unknown.
+        strut_masses: by design; None if unknown.
+        joint_axes: None if unknown, or for ball joints.
+        greatest_feed_mm_min: None if unknown.
+        greatest_turn_deg_min: at a resting tool tip; None if unknown.
+        acceleration_mm_s2: planned by the control; None if unknown.
     """
 
     name: str
@@ -157,15 +155,15 @@ class Machine:
 
     @property
     def feed_limit_mm_min(self) -> float:
-        """Greatest F of a move of the tool tip that is written [mm/min]."""
+        """Return the greatest F written for the tool tip [mm/min]."""
         return GREATEST_FEED_MM_MIN if self.greatest_feed_mm_min is None else self.greatest_feed_mm_min
 
     @property
     def planned_acceleration_mm_s2(self) -> float:
-        """Acceleration by which pieces of moves are chosen [mm/s²]."""
+        """Return the acceleration for choosing pieces [mm/s²]."""
         return ACCELERATION_MM_S2 if self.acceleration_mm_s2 is None else self.acceleration_mm_s2
 
     @property
     def turn_limit_deg_min(self) -> float:
-        """Greatest F of a move that only turns [deg/min]."""
+        """Return the greatest F of a pure turn [deg/min]."""
         return GREATEST_TURN_DEG_MIN if self.greatest_turn_deg_min is None else self.greatest_turn_deg_min

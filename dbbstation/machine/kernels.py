@@ -1,18 +1,11 @@
 """Compiled loops over poses: forward kinematics and bar sensitivities.
 
-Only arrays go in and out; `kinematics.py` is what the rest of the program calls. Every kernel works on the poses
-`start` to `stop`. Joints have the shape (m, 6, 3), balls (m, 3), with m = 1 (the same for every pose) or m = n (one
-set per pose).
+Arrays only; `kinematics.py` is the interface. Kernels work on poses `start` to `stop`. Joints have shape (m, 6, 3), balls
+(m, 3), m = 1 or n. Poses are processed in groups of `LANES`, the last axis of work arrays and innermost loop. Lanes do
+not branch, so results do not depend on grouping; a last group repeats its last pose.
 
-Many poses are worked on side by side, so that one machine instruction serves several of them: in groups of `LANES`, the
-pose within the group being the last axis of every work array and the innermost loop of all arithmetic. No lane decides
-anything for itself: there is no pivot search and no branch, lanes that are done stand still. So a lane's result does
-not depend on its neighbours, nor on where the group begins. A last group that is not full repeats the last pose.
-
-Names of work arrays: t and r are positions (3, LANES) and rotations (3, 3, LANES) of the platform, q and p the joints
-on base and platform (6, 3, LANES); a Jacobian (6, 6, LANES) has the row [u, (R P) x u] for each strut.
-
-All of it stands in this one file because the compiler's cache on disk looks at a kernel's own file only.
+t (3, LANES) and r (3, 3, LANES) are platform positions and rotations, q and p joints of base and platform (6, 3, LANES);
+a Jacobian (6, 6, LANES) has rows [u, (R P) x u]. All stands in one file because the compiler's cache looks at one file.
 """
 
 from __future__ import annotations
@@ -48,7 +41,7 @@ def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> 
 
 @inlined
 def _gather(first: int, stop: int, rows: NDArray[np.float64], lanes: NDArray[np.float64]) -> None:
-    """Bring the rows `first` and on, shape (n, k), to lanes, shape (k, LANES); a single row goes to all lanes."""
+    """Gather rows from `first`, shape (n, k), into lanes, shape (k, LANES); a single row goes to all."""
     for lane in range(LANES):
         n = min(first + lane, stop - 1, rows.shape[0] - 1)
         for k in range(rows.shape[1]):
@@ -57,7 +50,7 @@ def _gather(first: int, stop: int, rows: NDArray[np.float64], lanes: NDArray[np.
 
 @inlined
 def _gather_matrices(first: int, stop: int, rows: NDArray[np.float64], lanes: NDArray[np.float64]) -> None:
-    """Do the same for rows of shape (n, i, k) to lanes of shape (i, k, LANES)."""
+    """Gather rows of shape (n, i, k) into lanes of shape (i, k, LANES)."""
     for lane in range(LANES):
         n = min(first + lane, stop - 1, rows.shape[0] - 1)
         for i in range(rows.shape[1]):
@@ -79,7 +72,7 @@ def _gather_machine(
     q: NDArray[np.float64],
     p: NDArray[np.float64],
 ) -> None:
-    """Bring poses and joints of a group to lanes; joints that stay the same only once, for the group at `start`."""
+    """Gather poses and joints of a group; constant joints only at `start`."""
     _gather(first, stop, position, t)
     _gather_matrices(first, stop, rotation, r)
     if first == start or base.shape[0] > 1:
@@ -97,7 +90,7 @@ def _arm_and_span(
     q: NDArray[np.float64],
     p: NDArray[np.float64],
 ) -> tuple[float, float, float, float, float, float]:
-    """Arm R P and vector R P + t - Q of strut i [CAL eq 1]."""
+    """Return arm R P and vector R P + t - Q of strut i [CAL eq 1]."""
     px, py, pz = p[i, 0, lane], p[i, 1, lane], p[i, 2, lane]
     ax = r[0, 0, lane] * px + r[0, 1, lane] * py + r[0, 2, lane] * pz
     ay = r[1, 0, lane] * px + r[1, 1, lane] * py + r[1, 2, lane] * pz
@@ -145,12 +138,12 @@ def _struts(
 
 @inlined
 def _orthogonalise(matrix: NDArray[np.float64], triangle: NDArray[np.float64], sound: NDArray[np.float64]) -> None:
-    """Make the columns of a matrix, shape (6, 6, LANES), orthogonal in place, by modified Gram-Schmidt.
+    """Orthogonalise columns of a matrix, shape (6, 6, LANES), in place by modified Gram-Schmidt.
 
-    Column by column what lies along it is taken out of the columns behind it. With the right-hand side treated as one
-    more column, as `_substitute` does, this is as stable as elimination with row exchanges, yet exchanges nothing: it
-    is Householder's method in disguise. [Björck, BIT 7 (1967) 1-21; Björck and Paige, SIAM J. Matrix Anal. Appl. 13
-    (1992) 176-190]
+    With the right-hand side as a further column (`_substitute`) this is as stable as pivoted elimination without
+    exchanges: Householder's method in disguise. [Björck, BIT 7 (1967) 1-21; Björck and Paige, SIAM J. Matrix Anal. Appl.
+    13 (1992) 176-190] Args: `triangle` gets parts along each column and, on its diagonal, 1/|c|², shape (6, 6, LANES);
+    `sound` is 1.0 for full rank, else 0.0, shape (LANES,).
 
     Args:
         triangle: gets what was along each column c and, on its diagonal, 1/|c|², shape (6, 6, LANES).
@@ -181,7 +174,7 @@ def _substitute(
     right: NDArray[np.float64],
     solution: NDArray[np.float64],
 ) -> None:
-    """Solve with what `_orthogonalise` left; the right-hand side, shape (6, LANES), is overwritten."""
+    """Solve after `_orthogonalise`; the right-hand side, shape (6, LANES), is overwritten."""
     for k in range(6):
         for lane in range(LANES):
             along = 0.0
@@ -206,7 +199,7 @@ def _compare(
     square: NDArray[np.float64],
     state: NDArray[np.int64],
 ) -> int:
-    """Set the residual to wanted less present lengths, (6, LANES); return how many lanes are still searching."""
+    """Set the residual to wanted less present lengths, (6, LANES); return the number of searching lanes."""
     for lane in range(LANES):
         square[lane] = 0.0
     for i in range(6):
@@ -242,11 +235,9 @@ def _newton(
 
 @inlined
 def _move(t: NDArray[np.float64], r: NDArray[np.float64], step: NDArray[np.float64], state: NDArray[np.int64]) -> None:
-    """Move the platforms that are still searching by (dt, w), shape (6, LANES) [mm, rad].
+    """Move searching platforms by (dt, w), shape (6, LANES) [mm, rad].
 
-    The platform turns about w in machine axes by Cayley's matrix 1 + (w^ + w^w^/2) / (1 + |w|²/4), w^ the matrix of
-    w x. It is an exact rotation for any w and needs neither sine nor cosine; its angle is |w| less |w|³/12, which
-    Newton's method does not mind.
+    Cayley's matrix 1 + (w^ + w^w^/2) / (1 + |w|²/4) is an exact rotation without sine; its angle is |w| less |w|³/12.
     """
     for lane in range(LANES):
         goes = state[lane] == TOO_MANY_STEPS
@@ -282,12 +273,10 @@ def forward(
     rotation: NDArray[np.float64],
     outcome: NDArray[np.int64],
 ) -> None:
-    """Newton-Raphson on the strut lengths [CAL eq 2], from near poses to those with the lengths `target` (n, 6).
+    """Newton-Raphson on strut lengths [CAL eq 2], from near poses to lengths `target` (n, 6).
 
-    Each step solves J (dt, w) = target - L with the exact Jacobian and turns the platform by an exact rotation, so
-    convergence is quadratic. Only the third step takes the Jacobian of the second: poses that are off by tenths of a
-    millimetre are at rounding after it, for the price of a residual. `outcome` (n,) says how each pose ended: converged where the root of the sum of the six
-    squared residuals is within `tolerance` [mm], which no NaN can be.
+    J (dt, w) = target - L with exact Jacobian and rotation converges quadratically; only the third step reuses a
+    Jacobian. `outcome` (n,): converged if the root of summed squared residuals is within `tolerance` [mm].
     """
     t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
     length, arm, wanted = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, LANES))
@@ -328,7 +317,7 @@ def adjoint(
     gain: NDArray[np.float64],
     outcome: NDArray[np.int64],
 ) -> None:
-    """Solve J^T g = [direction, moment] for each pose: g (n, 6) is what one unit of strut error does.
+    """Solve J^T g = [direction, moment] per pose: g (n, 6) is the effect of one unit of strut error.
 
     Shapes: units and arms (n, 6, 3), direction and moment (n, 3).
     """
@@ -370,7 +359,7 @@ def _bar_system(
     matrix: NDArray[np.float64],
     right: NDArray[np.float64],
 ) -> None:
-    """Length of the bar, shape (LANES,), and the system J^T g = [n, (R o) x n] with n its direction, o the tool ball."""
+    """Return the bar's length, shape (LANES,), and the system J^T g = [n, (R o) x n], n its direction, o the tool ball."""
     for i in range(6):
         for k in range(6):
             for lane in range(LANES):
@@ -405,13 +394,11 @@ def bar(
     gain: NDArray[np.float64],
     outcome: NDArray[np.int64],
 ) -> None:
-    """Length of a bar and how it answers to struts and base joints, by the adjoint: one solution per pose.
+    """Return a bar's length and sensitivities by the adjoint: one solution per pose.
 
-    With n the bar's direction from fixed to tool ball and o the tool ball in the platform frame, the six numbers g of
-    J^T g = [n, (R o) x n] are the answer to the strut lengths, and g_i u_i that to base joint i.
-
-    Shapes: fixed_ball in the machine frame, tool_ball in the platform frame, lengths (n,), directions (n, 3), gain
-    (n, 24): six strut lengths, then the base joints' coordinates x, y, z one joint after the other.
+    With n from fixed to tool ball and o the tool ball in the platform frame, J^T g = [n, (R o) x n] gives the sensitivity
+    to strut lengths; g_i u_i is that to base joint i. Shapes: fixed_ball in the machine frame, tool_ball in the platform
+    frame, lengths (n,), directions (n, 3), gain (n, 24): six struts, then base joints' x, y, z.
     """
     t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
     length, arm, jacobian = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, 6, LANES))

@@ -1,4 +1,4 @@
-"""Inverse and forward kinematics of the hexapod, and how a bar reading answers to every strut."""
+"""Inverse and forward kinematics, and sensitivities of a bar reading."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class Struts:
     """Struts at given poses.
 
     Attributes:
-        length_mm: distances between the joints, shape (n, 6) [mm].
-        unit: vectors from base joint to platform joint, machine frame, shape (n, 6, 3) [1].
-        arm_mm: R P, from tool tip to platform joint in machine axes, shape (n, 6, 3) [mm].
+        length_mm: shape (n, 6).
+        unit: from base to platform joint, machine frame, shape (n, 6, 3) [1].
+        arm_mm: R P, tool tip to platform joint in machine axes, shape (n, 6, 3).
     """
 
     length_mm: NDArray[np.float64]
@@ -42,10 +42,10 @@ class Struts:
 
 
 def inverse(hexapod: Hexapod, frames: Frames) -> Struts:
-    """Strut lengths and directions at the poses `frames` [CAL eq 1].
+    """Return strut lengths and directions at `frames` [CAL eq 1].
 
     Raises:
-        ValueError: joints that move do not fit the number of poses.
+        ValueError: moving joints do not match the poses.
     """
     span, arm = _spans(hexapod, frames)
     length = _lengths(span)
@@ -53,26 +53,26 @@ def inverse(hexapod: Hexapod, frames: Frames) -> Struts:
 
 
 def strut_lengths(hexapod: Hexapod, frames: Frames) -> NDArray[np.float64]:
-    """Strut lengths alone at the poses `frames`, shape (n, 6) [mm] [CAL eq 1].
+    """Return strut lengths at `frames`, shape (n, 6) [mm] [CAL eq 1].
 
     Raises:
-        ValueError: joints that move do not fit the number of poses.
+        ValueError: moving joints do not match the poses.
     """
     return _lengths(_spans(hexapod, frames)[0])
 
 
 def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> Frames:
-    """Poses at which the struts have these lengths [CAL eq 2].
+    """Return the poses of these strut lengths [CAL eq 2].
 
     Args:
-        length_mm: strut lengths, shape (n, 6) [mm].
-        near: where Newton-Raphson starts, usually the commanded poses.
+        length_mm: shape (n, 6).
+        near: start of Newton-Raphson, usually commanded.
 
     Returns:
         Frames that reproduce `length_mm` within 1e-11 mm.
 
     Raises:
-        KinematicsError: no pose found; names the first such pose.
+        KinematicsError: no pose; names the first.
     """
     count = len(near)
     found = Frames(np.empty((count, 3)), np.empty((count, 3, 3)))
@@ -107,18 +107,17 @@ def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> F
 
 
 def strut_jacobian(struts: Struts) -> NDArray[np.float64]:
-    """J = dL / d(t, w) = [u, (R P) x u], shape (n, 6, 6): columns [mm/mm] three times, [mm/rad] three times."""
+    """Return J = dL / d(t, w) = [u, (R P) x u], shape (n, 6, 6): three columns [mm/mm], three [mm/rad]."""
     return np.concatenate([struts.unit, np.cross(struts.arm_mm, struts.unit)], axis=2)
 
 
 @dataclass(frozen=True)
 class Response:
-    """How one measured or predicted quantity answers to the machine's errors, at given poses.
+    """Sensitivity of one quantity to the machine's errors at given poses.
 
     Attributes:
-        per_parameter: per strut length, then per coordinate x, y, z of each base joint in machine axes, shape
-            (n, 24) [unit/mm].
-        direction: how the quantity answers to a shift of the tool ball, machine axes, shape (n, 3) [unit/mm].
+        per_parameter: struts, then x, y, z of base joints in machine axes, shape (n, 24) [unit/mm].
+        direction: to the tool ball's shift, machine axes, shape (n, 3) [unit/mm].
         rotation: of the platform, shape (n, 3, 3).
     """
 
@@ -138,12 +137,12 @@ class Response:
 
     @property
     def per_platform_joint(self) -> NDArray[np.float64]:
-        """Per platform joint, platform axes, shape (n, 6, 3) [unit/mm]: a shift dP acts as -R dP on the base."""
+        """Return the sensitivity to platform joints, platform axes, shape (n, 6, 3) [unit/mm]: dP acts as -R dP on the base."""
         return -self.per_base_joint @ self.rotation
 
     @property
     def per_tool_ball(self) -> NDArray[np.float64]:
-        """Per shift of tool tip and ball against the platform, platform axes, shape (n, 3) [unit/mm]."""
+        """Return the sensitivity to tool tip and ball, platform axes, shape (n, 3) [unit/mm]."""
         turned: NDArray[np.float64] = np.einsum("nji,nj->ni", self.rotation, self.direction)
         return turned
 
@@ -153,10 +152,9 @@ class BarSensitivity:
     """A bar's length and its derivatives at given poses.
 
     Attributes:
-        length_mm: distance between the ball centres, shape (n,) [mm].
-        direction: unit vector from the fixed to the moving ball, shape (n, 3) [1]; the length falls by it where
-            the fixed ball moves.
-        response: of the length to the machine's errors [mm/mm].
+        length_mm: between ball centres, shape (n,).
+        direction: from fixed to moving ball, shape (n, 3) [1]; minus the derivative by the fixed ball.
+        response: of the length [mm/mm].
     """
 
     length_mm: NDArray[np.float64]
@@ -170,19 +168,19 @@ def bar_sensitivity(
     fixed_ball_mm: NDArray[np.float64],
     tool_ball_mm: NDArray[np.float64] | None = None,
 ) -> BarSensitivity:
-    """Length of the bar and its analytic derivatives by the adjoint: one 6x6 solve per pose.
+    """Return a bar's length and analytic derivatives by the adjoint: one 6x6 solve per pose.
 
-    [CAL II-D] says that the sensitivity matrix "can be computed only numerically"; by the implicit function
-    theorem it is analytic: a strut error dL moves the pose by J^-1 dL, so with n the bar's direction and
-    J^T g = [n, (R o) x n] the bar feels g dL, and joint shifts enter as strut errors u dQ and -u R dP.
+    [CAL II-D] says "can be computed only numerically"; by the implicit function theorem a strut error dL moves the pose
+    by J^-1 dL. With bar direction n and J^T g = [n, (R o) x n] the bar feels g dL; joints enter as strut errors u dQ and
+    -u R dP.
 
     Args:
-        hexapod: the actual joints.
-        fixed_ball_mm: centre of the ball on the table, machine frame, shape (3,) or (n, 3) [mm].
-        tool_ball_mm: centre of the moving ball in the platform frame, shape (3,) or (n, 3) [mm]; the tool tip by default.
+        hexapod: actual.
+        fixed_ball_mm: machine frame, shape (3,) or (n, 3).
+        tool_ball_mm: platform frame, shape (3,) or (n, 3); default: the tool tip.
 
     Raises:
-        KinematicsError: a pose where the platform can move with its struts locked.
+        KinematicsError: the platform can move with locked struts.
     """
     count = len(frames)
     tool = np.zeros(3) if tool_ball_mm is None else tool_ball_mm
@@ -216,7 +214,7 @@ def bar_sensitivity(
 
 
 def position_responses(hexapod: Hexapod, frames: Frames) -> tuple[Response, Response, Response]:
-    """How X, Y and Z of the tool tip answer to the machine's errors, at the poses `frames`."""
+    """Return sensitivities of the tool tip's X, Y and Z at `frames`."""
     struts = inverse(hexapod, frames)
     pose_per_strut = np.asarray(np.linalg.inv(strut_jacobian(struts)), dtype=np.float64)
     count = len(frames)
@@ -231,9 +229,9 @@ def position_responses(hexapod: Hexapod, frames: Frames) -> tuple[Response, Resp
 
 
 def _spans(hexapod: Hexapod, frames: Frames) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """T + R P - Q and R P, both (n, 6, 3) [mm]: from base joint and from tool tip to platform joint.
+    """Return T + R P - Q and R P, both (n, 6, 3) [mm].
 
-    NumPy does here: compiled, it would be three times as fast, and half a second later for what starts the compiler.
+    NumPy avoids half a second of compiler start.
     """
     base, platform = _joints(hexapod, len(frames))
     arm = platform @ np.swapaxes(frames.rotation, 1, 2)
@@ -245,7 +243,7 @@ def _lengths(span: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _joints(hexapod: Hexapod, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Joints as the kernels take them: shape (1, 6, 3) or (n, 6, 3), contiguous."""
+    """Return joints for kernels: shape (1, 6, 3) or (n, 6, 3), contiguous."""
     base, platform = (
         np.ascontiguousarray(joints if joints.ndim > 2 else joints[None], dtype=np.float64)  # noqa: PLR2004
         for joints in (hexapod.base_joints_mm, hexapod.platform_joints_mm)
@@ -257,7 +255,7 @@ def _joints(hexapod: Hexapod, count: int) -> tuple[NDArray[np.float64], NDArray[
 
 
 def _balls(centre_mm: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Ball centres as the kernels take them: shape (1, 3) or (n, 3), contiguous."""
+    """Return ball centres for kernels: shape (1, 3) or (n, 3), contiguous."""
     balls = np.ascontiguousarray(np.atleast_2d(centre_mm), dtype=np.float64)
     if balls.shape not in {(1, 3), (count, 3)}:
         raise ValueError(f"ball centres of shape {balls.shape} do not fit {count} poses")

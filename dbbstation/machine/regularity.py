@@ -1,4 +1,4 @@
-"""Whether the joints of a nominal machine fit together: hexapods are designed with every second joint turned by 120 degrees."""
+"""Check that joints fit together: every second joint is turned by 120 degrees."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ OFF_MM = 1.0
 
 
 def check_joints(machine: Machine) -> None:
-    """Refuse a nominal machine of which three joints are exactly regular and the other three are not: a slip of the pen.
+    """Refuse a machine with three exactly regular joints and three that are not.
 
-    Machines that are regular in neither or both, such as those whose control has measured joints, pass.
+    Machines regular in both or neither pass.
 
     Raises:
-        ModelError: names the joint, or the three among which it is, and how far it is off.
+        ModelError: names the joint, or its three, and the deviation.
     """
     for key in ("base_joints_mm", "platform_joints_mm"):
         joints = np.asarray(getattr(machine.hexapod, key))
@@ -43,7 +43,7 @@ def check_joints(machine: Machine) -> None:
 
 
 def _which(joints: NDArray[np.float64], regular: tuple[int, ...], other: tuple[int, ...]) -> str:
-    """The joint that does not fit the other two of its three, in words; all three where none is alone."""
+    """Return the joint that does not fit its three, else all three."""
     centre = joints[list(regular)].mean(axis=0)
     first, second = joints[regular[1]] - joints[regular[0]], joints[regular[2]] - joints[regular[0]]
     axis = np.cross(first, second)
@@ -66,7 +66,7 @@ def _sides_mm(triangle: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _turned(vector: NDArray[np.float64], axis: NDArray[np.float64], turn: float) -> NDArray[np.float64]:
-    """Turned by a third of a full turn about an axis. [Rodrigues]."""
+    """Return a vector turned by a third about an axis [Rodrigues]."""
     angle = turn * 2.0 * np.pi / 3.0
     turned: NDArray[np.float64] = (
         vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * (axis @ vector) * (1.0 - np.cos(angle))

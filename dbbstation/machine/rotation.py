@@ -1,4 +1,4 @@
-"""Orientation of the platform: the two conventions for the tilt angles A, B, C, and frames made of them."""
+"""Two conventions of the tilt angles A, B, C, and frames."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Rotation(StrEnum):
-    """How A, B and C make the rotation matrix R that turns platform vectors into machine vectors."""
+    """How A, B and C make R, from platform to machine vectors."""
 
     XYZ = "Rx(A) Ry(B) Rz(C)"
     ZYX = "Rz(C) Ry(B) Rx(A)"
@@ -22,10 +22,10 @@ class Rotation(StrEnum):
 
 @dataclass(frozen=True)
 class Frames:
-    """Poses as position and rotation matrix, the form that kinematics works in.
+    """Poses as position and rotation matrix.
 
     Attributes:
-        position_mm: tool tip in the machine frame, shape (n, 3) [mm].
+        position_mm: tool tip, machine frame, shape (n, 3).
         rotation: platform axes in the machine frame, shape (n, 3, 3) [1].
     """
 
@@ -37,16 +37,16 @@ class Frames:
 
     @classmethod
     def from_poses(cls, poses: NDArray[np.float64], convention: Rotation) -> Frames:
-        """Frames of poses `[X, Y, Z, A, B, C]`, shape (n, 6) [mm, deg]."""
+        """Return frames of poses `[X, Y, Z, A, B, C]`, shape (n, 6) [mm, deg]."""
         return cls(np.ascontiguousarray(poses[:, :3]), rotation_matrices(poses[:, 3:], convention))
 
     def to_poses(self, convention: Rotation) -> NDArray[np.float64]:
-        """Poses `[X, Y, Z, A, B, C]`, shape (n, 6) [mm, deg]; A and C within ±180, B within ±90 degrees."""
+        """Return poses `[X, Y, Z, A, B, C]`, shape (n, 6) [mm, deg]; A and C within ±180, B within ±90 degrees."""
         return np.hstack([self.position_mm, tilt_angles(self.rotation, convention)])
 
 
 def rotation_matrices(tilt_deg: NDArray[np.float64], convention: Rotation) -> NDArray[np.float64]:
-    """Rotation matrices, shape (n, 3, 3), of the angles A, B, C, shape (n, 3) [deg]."""
+    """Return rotation matrices, shape (n, 3, 3), of A, B, C, shape (n, 3) [deg]."""
     # Rz(C) Ry(B) Rx(A) is the transpose of Rx(-A) Ry(-B) Rz(-C), so one product serves both conventions.
     sign = 1.0 if convention is Rotation.XYZ else -1.0
     tilt = np.radians(tilt_deg)
@@ -67,7 +67,7 @@ def rotation_matrices(tilt_deg: NDArray[np.float64], convention: Rotation) -> ND
 
 
 def tilt_angles(rotation: NDArray[np.float64], convention: Rotation) -> NDArray[np.float64]:
-    """Angles A, B, C, shape (n, 3) [deg], of rotation matrices, shape (n, 3, 3)."""
+    """Return A, B, C, shape (n, 3) [deg], of rotation matrices, shape (n, 3, 3)."""
     # Rx Ry Rz is the transpose of Rz(-C) Ry(-B) Rx(-A), so one extraction serves both conventions.
     sign = -1.0 if convention is Rotation.XYZ else 1.0
     r = np.swapaxes(rotation, 1, 2) if convention is Rotation.XYZ else rotation

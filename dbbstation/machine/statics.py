@@ -1,9 +1,8 @@
-"""Statics of the hexapod: what gravity pulls at, and the force that every strut carries for it.
+"""Statics: gravity and the force of every strut.
 
-Conventions: forces [N] and moments about the tool tip [N mm] in machine axes, Z up; a strut's unit vector points from
-base to platform, and a tension is positive. With it strut i pulls the platform by -T_i u_i, so that equilibrium of the
-platform under a load (F, M) reads sum T_i u_i = F and sum T_i (R P_i) x u_i = M, that is J^T T = [F, M] with the
-Jacobian J = [u, (R P) x u] of the strut lengths.
+Forces [N] and moments about the tool tip [N mm] in machine axes, Z up; a strut's unit vector points from base to
+platform, tension is positive. Strut i pulls the platform by -T_i u_i; equilibrium under (F, M) is sum T_i u_i = F and sum
+T_i (R P_i) x u_i = M, or J^T T = [F, M] with J = [u, (R P) x u].
 """
 
 from __future__ import annotations
@@ -34,11 +33,11 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 @dataclass(frozen=True)
 class Load:
-    """What acts on the platform beside its struts' axial forces.
+    """Load on the platform beside axial strut forces.
 
     Attributes:
-        force_n: machine axes, shape (n, 3) [N].
-        moment_n_mm: about the tool tip, machine axes, shape (n, 3) [N mm].
+        force_n: machine axes, shape (n, 3).
+        moment_n_mm: about the tool tip, machine axes, shape (n, 3).
     """
 
     force_n: NDArray[np.float64]
@@ -49,10 +48,9 @@ class Load:
 
 
 def platform_weight(frames: Frames, masses: Masses) -> Load:
-    """Weight of the platform, acting at its centre of gravity: [W, r_G x W], W = m g.
+    """Return the platform's weight at its centre of gravity: [W, r_G x W], W = m g.
 
-    The mass is the platform's own. [GRAV eq 1] takes that of the entire system, which would let the platform carry
-    the struts and motors that the base joints carry.
+    The mass is the platform's own; [GRAV eq 1] takes the entire system's, part of which base joints carry.
     """
     weight = masses.platform_kg * GRAVITY_M_S2 * DOWN
     lever = frames.rotation[:, :, 2] * masses.centre_of_gravity_above_tip_mm
@@ -60,12 +58,10 @@ def platform_weight(frames: Frames, masses: Masses) -> Load:
 
 
 def transverse_pull(struts: Struts, masses: StrutMasses) -> NDArray[np.float64]:
-    """Force by which each strut's own weight pulls the platform across the strut, shape (n, 6, 3) [N].
+    """Return each strut's transverse pull by its weight, shape (n, 6, 3) [N].
 
-    A strut is a rod that turns about its base joint. Moments about that joint: masses m_k at the distances s_k along
-    u weigh sum m_k s_k (u x g), and the platform joint at L answers with a force across the strut. The reaction on
-    the platform is f = sum m_k s_k / L * g_across with g_across = g - u (u g). [GRAV eq 2] prints the platform's
-    force on the strut instead, of the opposite sign.
+    A rod about its base joint with masses m_k at s_k along u weighs sum m_k s_k (u x g). The reaction on the platform is
+    f = sum m_k s_k / L * g_across, g_across = g - u (u g). [GRAV eq 2] prints the opposite sign.
     """
     across = GRAVITY_M_S2 * (DOWN - struts.unit * (struts.unit @ DOWN)[:, :, None])
     pull: NDArray[np.float64] = (_first_moment_kg_mm(struts, masses) / struts.length_mm)[:, :, None] * across
@@ -73,11 +69,7 @@ def transverse_pull(struts: Struts, masses: StrutMasses) -> NDArray[np.float64]:
 
 
 def _first_moment_kg_mm(struts: Struts, masses: StrutMasses) -> NDArray[np.float64]:
-    """First moment of a strut's masses about its base joint, along the strut, shape (n, 6) [kg mm].
-
-    The even rod has its centre at L/2, the motor at half its length behind the joint, the screw half its length
-    before its end at the platform joint.
-    """
+    """Return the first moment of a strut's masses about its base joint, shape (n, 6) [kg mm]."""
     length = struts.length_mm
     return (
         masses.strut_kg * length / 2.0
@@ -87,23 +79,23 @@ def _first_moment_kg_mm(struts: Struts, masses: StrutMasses) -> NDArray[np.float
 
 
 def transverse_load(struts: Struts, pull_n: NDArray[np.float64]) -> Load:
-    """Forces that the struts put on the platform across their axes: [sum f, sum (R P) x f].
+    """Return the struts' transverse load: [sum f, sum (R P) x f].
 
-    [GRAV eq 3 and 6] have the moment; [GRAV eq 1] leaves the force out, which belongs there as well.
+    [GRAV eq 3 and 6] have the moment; [GRAV eq 1] omits the force.
 
     Args:
-        pull_n: forces on the platform at its joints, shape (n, 6, 3) [N].
+        pull_n: on the platform's joints, shape (n, 6, 3).
     """
     return Load(pull_n.sum(axis=1), np.cross(struts.arm_mm, pull_n).sum(axis=1))
 
 
 def strut_tensions(struts: Struts, load: Load) -> NDArray[np.float64]:
-    """Axial forces of the struts at their platform joints, tension positive, shape (n, 6) [N].
+    """Return axial forces at platform joints, tension positive, shape (n, 6) [N].
 
-    Solves J^T T = [F, M] for each pose: [GRAV eq 1 and 6] with the force signed, where eq 7 prints its magnitude.
+    Solves J^T T = [F, M]: [GRAV eq 1 and 6], signed, where eq 7 prints the magnitude.
 
     Args:
-        load: on the platform, one row per pose.
+        load: one row per pose.
 
     Raises:
         KinematicsError: a pose where the struts cannot hold the platform.
@@ -129,10 +121,10 @@ def strut_tensions(struts: Struts, load: Load) -> NDArray[np.float64]:
 def compliance_mm_per_n(
     length_mm: NDArray[np.float64], compliance: Compliance
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Elongation per force of struts: the part that does not grow with length, and the part that does.
+    """Return a strut's compliance: constant part and growing part.
 
-    [GRAV eq 7] K (alpha L + C_B), written by the compliance c at 1000 mm and the share s of it that grows:
-    c (1 - s) and c s L / 1000 mm. (The alpha printed there, S/E, is meant as 1/(S E): a compliance per length.)
+    [GRAV eq 7] K (alpha L + C_B) as c at 1000 mm with growing share s: c (1 - s) and c s L / 1000 mm. (alpha, printed
+    S/E, means 1/(S E).) Both have shape (n, 6) [mm/N] for lengths between joints, shape (n, 6) [mm].
 
     Args:
         length_mm: between the joints, shape (n, 6) [mm].
@@ -148,16 +140,15 @@ def compliance_mm_per_n(
 def stretch_mm(
     struts: Struts, compliance: Compliance, tension_n: NDArray[np.float64], masses: StrutMasses | None = None
 ) -> NDArray[np.float64]:
-    """Elastic elongation of the struts, shape (n, 6) [mm] [GRAV eq 7].
+    """Return elastic elongation, shape (n, 6) [mm] [GRAV eq 7].
 
-    With masses the strut's own weight along its axis is in it, which [GRAV eq 7] leaves out: what hangs on the strut
-    below a section stretches that section. The fixed part of the compliance is the drive's, which holds what
-    `motor_loads` has; along the growing part an even rod counts half, and a screw of length l, of which L hangs below
-    the joint, L / (2 l) of its weight. The motor behind the joint stretches nothing.
+    The strut's own axial weight, omitted in [GRAV eq 7], stretches sections above it. The constant part sees
+    `motor_loads`; along the growing part an even rod counts half, and a screw of length l, L of it below the joint, L /
+    (2 l) of its weight. The motor stretches nothing.
 
     Args:
-        tension_n: at the platform joints, shape (n, 6) [N].
-        masses: of every strut; None for struts without weight.
+        tension_n: at platform joints, shape (n, 6).
+        masses: None for weightless struts.
     """
     fixed, growing = compliance_mm_per_n(struts.length_mm, compliance)
     stretch = (fixed + growing) * tension_n
@@ -171,14 +162,13 @@ def stretch_mm(
 def motor_loads(
     struts: Struts, tension_n: NDArray[np.float64], masses: StrutMasses | None = None
 ) -> NDArray[np.float64]:
-    """Axial forces that the motors hold, positive where the platform pulls, shape (n, 6) [N].
+    """Return the motors' axial forces, positive if the platform pulls, shape (n, 6) [N].
 
-    The tension at the platform joint and the weight along the axis of what the motor moves. By virtual work this is
-    what all potential energy gains when one motor shortens its strut.
+    Tension plus the axial weight of the moving part, by virtual work.
 
     Args:
-        tension_n: at the platform joints, shape (n, 6) [N].
-        masses: of every strut; None for struts without weight.
+        tension_n: at platform joints, shape (n, 6).
+        masses: None for weightless struts.
     """
     if masses is None:
         return tension_n
@@ -186,20 +176,18 @@ def motor_loads(
 
 
 def _moving_kg(masses: StrutMasses) -> float:
-    """Mass that a motor moves along its strut: the screw, and half of a telescope that stays even at every length."""
+    """Return the mass moved along a strut: the screw, and half of an even telescope."""
     return masses.screw_kg + masses.strut_kg / 2.0
 
 
 def base_loads(
     struts: Struts, tension_n: NDArray[np.float64], masses: StrutMasses | None = None
 ) -> NDArray[np.float64]:
-    """Forces of the struts on the base at its joints, machine axes, shape (n, 6, 3) [N].
-
-    A strut at rest hands on to the base what the platform does to it, T u - f, and its own weight.
+    """Return strut forces on the base joints, machine axes, shape (n, 6, 3) [N]: T u - f and own weight.
 
     Args:
-        tension_n: at the platform joints, shape (n, 6) [N].
-        masses: of every strut; None for struts without weight.
+        tension_n: at platform joints, shape (n, 6).
+        masses: None for weightless struts.
     """
     load = tension_n[:, :, None] * struts.unit
     if masses is None:

@@ -1,4 +1,4 @@
-"""Whether the machine can reach a pose: limits of axes, tilt angles and struts."""
+"""Limits of axes, tilt angles and struts."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ upper rim, where the determinant passes through zero."""
 
 
 def check_travel(machine: Machine, poses: NDArray[np.float64], *, where: str) -> None:
-    """Refuse poses, shape (n, 6) [mm, deg], that leave the travel of the nominal machine.
+    """Refuse poses, shape (n, 6) [mm, deg], outside the nominal travel.
 
     Raises:
-        TravelError: names `where`, the first pose outside, the limit that it breaks most and by how much.
+        TravelError: names `where`, the first pose outside, and its worst limit.
     """
     quantities = _limited_quantities(machine, poses)
     excess = np.stack([np.maximum(low - value, value - high) for _, _, value, low, high in quantities])
@@ -51,7 +51,7 @@ def check_travel(machine: Machine, poses: NDArray[np.float64], *, where: str) ->
 
 
 def middle(machine: Machine) -> Frames:
-    """Frame of the middle of the travel: on the Z axis, half-way down, without tilt, one pose."""
+    """Return the middle of the travel: on the Z axis, half-way, untilted, one pose."""
     height = sum(machine.travel.z_mm) / 2.0
     return Frames.from_poses(np.array([[0.0, 0.0, height, 0.0, 0.0, 0.0]]), machine.hexapod.rotation)
 
@@ -78,7 +78,7 @@ def _limited_quantities(
 
 
 def _hold(machine: Machine, struts: Struts) -> NDArray[np.float64]:
-    """Jacobian determinant over that in the middle of the travel, shape (n,); zero where the platform is loose."""
+    """Return the Jacobian determinant over that of the middle, shape (n,); zero for a loose platform."""
     there = inverse(machine.hexapod, middle(machine))
     with np.errstate(invalid="ignore"):  # a pose that is no number has no hold, and is refused for it
         return np.asarray(np.linalg.det(strut_jacobian(struts)) / np.linalg.det(strut_jacobian(there)))

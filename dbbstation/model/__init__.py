@@ -1,1 +1,1 @@
-"""A machine model: nominal geometry plus error sources. Predicts poses and bar readings, and can be inverted."""
+"""Machine models: nominal geometry plus error sources, predicted and inverted."""

@@ -1,7 +1,6 @@
-"""Inversion of a machine model: what to command so that the tool goes where it should.
+"""Inversion of a machine model: commands for wanted motion.
 
-A path is inverted from its beginning on, stretch by stretch. What play, friction and lag remember goes from each stretch to the
-next, so that a program of any length is inverted in the memory that one stretch takes.
+Stretches are inverted in order, with the memory of play, friction and lag, in bounded computer memory.
 """
 
 from __future__ import annotations
@@ -50,12 +49,11 @@ change with the command."""
 
 @dataclass(frozen=True, eq=False)
 class Passed:
-    """What a model remembers of a path so far, between two stretches.
+    """A model's memory of a path between stretches.
 
     Attributes:
-        states: of the sources with a history, those first whose errors build up, else in the model's order.
-        held_back_mm: what the history added to the driven lengths in the last row, shape (6,) [mm]: where the search begins in
-            the next.
+        states: of sources with history, accumulating ones first, else in the model's order.
+        held_back_mm: the history's addition in the last row, start of the next search, shape (6,).
     """
 
     model: MachineModel
@@ -64,32 +62,31 @@ class Passed:
 
 
 def compensated(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
-    """Poses to command so that the actual machine goes to the wanted ones, in six degrees of freedom.
+    """Return commands for wanted poses in six degrees of freedom, shape (n, 6) [mm, deg], for all rows.
 
     Args:
-        model: calibrated model; only what belongs to the machine is inverted.
-        wanted: poses that the tool tip should take, all rows. Between the poses commanded the machine goes straight: who
-            predicts where it goes makes their motion `straight`.
+        model: only the machine's sources are inverted.
+        wanted: motion between commanded poses is straight: predict it as `straight`.
 
     Returns:
         Poses, shape (n, 6) [mm, deg], for all rows of `wanted`.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
-        ModelError: a source needs what the motion does not give, or looks ahead; or no command leads to a wanted pose.
+        ModelError: a source needs missing data or looks ahead; or no command leads to a pose.
     """
     return compensated_on(begun(model, wanted), wanted)[0]
 
 
 def begun(model: MachineModel, wanted: Motion) -> Passed:
-    """What is remembered before a path.
+    """Return the memory before a path.
 
     Args:
-        model: calibrated model; only what belongs to the machine is inverted.
-        wanted: the path, or its beginning: it shows which way the struts set out.
+        model: only the machine's sources are inverted.
+        wanted: the path or its begin, which shows directions.
 
     Raises:
-        ModelError: a source needs what the motion does not give, or looks ahead.
+        ModelError: a source needs missing data, or looks ahead.
     """
     own = model.of_the_machine()
     motion = replace(wanted, straight=True)
@@ -106,27 +103,23 @@ def begun(model: MachineModel, wanted: Motion) -> Passed:
 
 
 def compensated_on(passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64], Passed]:
-    """Poses to command along one stretch of a path.
+    """Return commands along one stretch, and the memory behind it.
 
-    The controller drives the struts to F(T; nominal). The actual machine needs F(T wanted; actual) less what the
-    error sources add, so the command is the pose at which the nominal machine has those lengths. Weights pull where
-    the machine will be, at the wanted poses; all other sources act on what is commanded. Those without a history settle in
-    three or four rounds over all rows, and so do those whose errors build up, which say what leads to the wanted lengths; jumps that
-    the others ask for are not asked of these, for no command makes a late drive jump. What the others do in a row hangs on the commands before, which are known by
-    then: rows are tried together from what the history did in the row before; those that are met are kept, and the first that
-    is not is looked for alone, strut by strut between bounds [a bisection, as at a reversal, where play makes the command jump].
+    The command is the pose at which nominal lengths equal F(T wanted; actual) less the sources' errors. Weights act at
+    wanted poses, other sources on commands. Sources without history settle in a few rounds; accumulating ones state what
+    reaches the wanted lengths, without the jumps of others. Other histories are tried for rows together; the first missed
+    row is bisected strut by strut [as at a reversal, where play makes the command jump].
 
     Args:
-        passed: of `begun`, or what came back from the stretch before; it stays as it is, so that a stretch can be tried again
-            with other rows.
-        wanted: poses that the tool tip should take, in time order.
+        passed: from `begun` or the previous stretch; not modified.
+        wanted: in time order.
 
     Returns:
         Poses, shape (n, 6) [mm, deg], and what is remembered behind the last row.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
-        ModelError: a source needs what the motion does not give; or no command leads to a wanted pose.
+        ModelError: a source needs missing data; or no command leads to a pose.
     """
     if len(wanted) == 0:
         return wanted.poses, passed
@@ -135,10 +128,9 @@ def compensated_on(passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64],
 
 
 def shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
-    """Poses shifted by minus the predicted position error, tilt left alone [GRAV 4.1], shape (n, 6) [mm, deg].
+    """Return poses shifted by minus the predicted error, tilt unchanged [GRAV 4.1], shape (n, 6) [mm, deg].
 
-    Kept for comparison with the published compensation: it is first order in the error and leaves the
-    orientation wrong.
+    Kept for comparison: first order, and the orientation stays wrong.
     """
     error = model.of_the_machine().actual_poses(replace(wanted, kept=slice(None))) - wanted.poses
     poses = wanted.poses.copy()
@@ -152,13 +144,13 @@ def _with_history(own: MachineModel, motion: Motion) -> tuple[Fitted, ...]:
 
 
 class _Slope:
-    """How what is lacking answers to the command, each strut in each row for itself: a secant through two rounds."""
+    """Each strut's secant of what is lacking over its command."""
 
     def __init__(self) -> None:
         self._before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     def step(self, driven: NDArray[np.float64], lacking: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What to add to a command, shape (k, 6) [mm]."""
+        """Return the addition to a command, shape (k, 6) [mm]."""
         slope = np.full(driven.shape, -1.0)
         if self._before is not None:
             moved = driven - self._before[0]
@@ -188,15 +180,15 @@ class _Stretch:
         self._smooth, self._known = self._without_search()
 
     def commanded(self, driven: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Poses at which the nominal machine has these lengths, shape (n, 6) [mm, deg]."""
+        """Return poses of nominal lengths, shape (n, 6) [mm, deg]."""
         return forward(self._nominal, driven, self._target).to_poses(self._convention)
 
     def passed(self) -> Passed:
-        """What is remembered behind the last row."""
+        """Return the memory behind the last row."""
         return Passed(self._own, (*self._built_up, *self._states), self._held_back)
 
     def _without_search(self) -> tuple[NDArray[np.float64], Effect]:
-        """Take into account what needs no search.
+        """Apply what needs no search.
 
         Returns:
             Lengths to drive to, shape (n, 6) [mm], and the part of the effect that does not change with a jump of the command.
@@ -232,7 +224,7 @@ class _Stretch:
         return driven, bent + Effect(strut_mm=sum(built_up, np.zeros_like(driven)))
 
     def with_history(self) -> NDArray[np.float64]:
-        """Lengths to drive to, shape (n, 6) [mm], row after row with what is remembered by then."""
+        """Return driven lengths, shape (n, 6) [mm], row by row with memory."""
         if not self._searched:
             return self._smooth
         count, row, together = len(self._wanted), 0, MOST_TOGETHER
@@ -286,13 +278,13 @@ class _Stretch:
         return driven, met, states
 
     def _alone(self, row: int) -> tuple[NDArray[np.float64], tuple[State, ...]]:
-        """Look for one row.
+        """Search one row.
 
         Returns:
             Lengths to drive to, shape (1, 6) [mm], and the states behind the row.
 
         Raises:
-            ModelError: there is none.
+            ModelError: there is no solution.
         """
         rows = slice(row, row + 1)
         search = RootSearch((self._smooth[row] + self._held_back), MET_MM)
@@ -309,7 +301,7 @@ class _Stretch:
         return search.at[None], self._lacking(rows, search.at[None])[1]
 
     def _lacking(self, rows: slice, driven: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[State, ...]]:
-        """What driven lengths lack of those that lead to the wanted poses, shape (k, 6) [mm], and the states behind the rows."""
+        """Return what driven lengths lack for wanted poses, shape (k, 6) [mm], and the states."""
         target = Frames(self._target.position_mm[rows], self._target.rotation[rows])
         motion = self._driven_to(driven, rows, target)
         effect, states = self._known.rows(rows) + self._own.together(self._others, motion), []
@@ -329,7 +321,7 @@ class _Stretch:
         return replace(target, position_mm=target.position_mm - np.einsum("nij,nj->ni", target.rotation, tip))
 
     def _needed(self, effect: Effect, platform: Frames) -> NDArray[np.float64]:
-        """Lengths to drive to for the platform to be there, shape (n, 6) [mm]."""
+        """Return driven lengths for a platform pose, shape (n, 6) [mm]."""
         strut = 0.0 if effect.strut_mm is None else effect.strut_mm
         needed = strut_lengths(actual_hexapod(self._nominal, effect), platform)
         lengths: NDArray[np.float64] = needed - strut + self._own.machine.reference_length_error_mm

@@ -1,4 +1,4 @@
-"""Where a circle should lie, before it is fitted: centre and mean reading with their uncertainty."""
+"""Expected centre and mean reading of a circle before its fit."""
 
 from __future__ import annotations
 
@@ -31,15 +31,14 @@ SECTORS = 72
 def expected_circle(
     observation: Observation, known_by: MachineModel | IdentifiedModel, causes: Iterable[ErrorSource]
 ) -> Expected:
-    """Return where the circle of a run should lie.
+    """Return a run's expected circle.
 
-    Of a model that was not identified nothing is known but what machines have: every cause that acts at a pose has its usual
-    size, or the one that machine file or session state. Of an identified one its covariance is taken, and what it left of
-    the recordings that it comes from.
+    Without identification every pose-dependent cause has its usual or stated size. An identified model contributes its
+    covariance and residual.
 
     Args:
-        observation: the run; of its readings nothing is used but the angles at which they were taken.
-        causes: all that are known; those of the machine are left out where the model was identified.
+        observation: only the angles of readings are used.
+        causes: all known; the machine's are omitted if identified.
 
     Raises:
         KinematicsError: the machine cannot take the circle.
@@ -98,11 +97,10 @@ class _Acting:
     """One cause along a run.
 
     Attributes:
-        key: its name, and the set of values that it shares with other runs.
-        columns_mm: what one standard deviation of each of its parameters does to the reading, shape (n, p) [mm].
-        at_a_pose: whether it acts wherever the machine stands, whatever the way there and the time.
-        scatters: variances of it that the difference of two runs of one circle has: two where each mounting has its own, one of
-            what grows with time.
+        key: name and sharing set.
+        columns_mm: reading by one standard deviation of each parameter, shape (n, p).
+        at_a_pose: independent of way and time.
+        scatters: variances in the difference of two runs: two per mounting, one if growing with time.
     """
 
     key: tuple[str, str]
@@ -121,7 +119,7 @@ def _acting(
     shapes: NDArray[np.float64],
     test: str,
 ) -> Iterator[_Acting]:
-    """Causes along a run of a test; `shapes` are the undulations that no shift and no length makes, shape (n, 4)."""
+    """Return causes along a run; `shapes` are undulations beyond shift and length, shape (n, 4)."""
     if identified is not None:
         yield from _of_model(reading, motion, model, identified)
         left_mm = 1e-3 * float(identified.report.get("residual_rms_um", 0.0))
@@ -154,7 +152,7 @@ def _acting(
 
 
 def _as_circle(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """What a shift along X, one along Y and a longer bar do to a reading, shape (n,) each."""
+    """Return the readings of shifts along X and Y and of a longer bar, shape (n,) each."""
     assert motion.setup is not None  # noqa: S101 - observations have one
     off = motion.poses[motion.kept, :3] - motion.setup.fixed_ball_mm
     towards = off / np.linalg.norm(off, axis=1)[:, None]
@@ -183,7 +181,7 @@ def _of_model(
 
 
 def _reversals_deg(observation: Observation, model: MachineModel) -> tuple[float, ...]:
-    """Angles of the circle at which a strut turns round [deg]."""
+    """Return angles at which a strut reverses [deg]."""
     theta_deg = np.arange(0.0, 360.0, 0.5)
     frames = Frames.from_poses(observation.raw.circle.poses(theta_deg), model.machine.hexapod.rotation)
     length = model.driven_mm(frames)

@@ -1,4 +1,4 @@
-"""An identified model: a machine model with the uncertainty and the provenance of its numbers."""
+"""A machine model with uncertainty and provenance of its numbers."""
 
 from __future__ import annotations
 
@@ -23,17 +23,14 @@ class IdentifiedModel:
     """What a calibration or diagnosis found.
 
     Attributes:
-        model: nominal machine, its own sources and, separate by their owner, the measurement's.
-        covariance_rows: name of every row of the covariance as (source, set, parameter).
-        covariance: of those parameters, in the products of their units, shape (k, k), what formulas may be off by among it. A
-            direction that was held at nominal has zero variance here.
-        directions_lost: what the recordings could not determine, in words.
-        report: numbers of the fit as printed, by name.
-        sessions: SHA-256 of each session file that it comes from, by folder name.
-        null_space: combinations of the rows that the recordings could not determine, each at its plausible size in the
-            parameters' units, shape (h, k); None where the file of an older program does not say.
-        formula_variance: part of each row's variance that is what the formula of its source may be off by, the same in every
-            session of a machine, shape (k,); None for none.
+        model: nominal machine, its own sources, and the measurement's by owner.
+        covariance_rows: (source, set, parameter) of every row.
+        covariance: in products of units, shape (k, k), formula errors included; zero along held directions.
+        directions_lost: undetermined by the recordings, in words.
+        report: printed numbers by name.
+        sessions: SHA-256 of its session files, by folder.
+        null_space: undetermined combinations of rows at plausible sizes, shape (h, k); None in old files.
+        formula_variance: each row's variance by its formula, equal in all sessions, shape (k,); None for none.
     """
 
     model: MachineModel
@@ -47,16 +44,16 @@ class IdentifiedModel:
 
     @property
     def unseen(self) -> NDArray[np.float64] | None:
-        """The null space, shape (h, k), without a row where nothing was lost; None where it is not known."""
+        """Return the null space, shape (h, k); None if unknown."""
         if self.null_space is None and not self.directions_lost:
             return np.zeros((0, len(self.covariance_rows)))
         return self.null_space
 
     @property
     def uncertainties(self) -> dict[Row, float | None]:
-        """Standard uncertainty of each parameter of the covariance; None where it is not known.
+        """Return each parameter's standard uncertainty; None if unknown.
 
-        Where parameters were prescribed in place of what was lost, they define coordinates: all are known in these.
+        Prescribed parameters define coordinates, in which all are known.
         """
         variance = np.maximum(np.diag(self.covariance), 0.0)
         along = np.where(variance > 0.0, 0.0, np.inf if self.directions_lost else 0.0)
@@ -69,16 +66,16 @@ class IdentifiedModel:
 
     @property
     def uncertainties_between_sessions(self) -> dict[Row, float]:
-        """Standard uncertainty of each parameter for its change from one session of a machine to another.
+        """Return each parameter's standard uncertainty of change between sessions.
 
-        What a formula may be off by is the same in both, and so is what was held at nominal.
+        Formula errors and held values are common to both.
         """
         variance = np.diag(self.covariance) - (0.0 if self.formula_variance is None else self.formula_variance)
         return dict(zip(self.covariance_rows, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
 
     @property
     def why_unknown(self) -> str:
-        """Why the uncertainty of a value is not known, where it is not."""
+        """Return why a value's uncertainty is unknown."""
         if not self.directions_lost:
             return "the model states no uncertainty of its parameters"
         lost = "; ".join(self.directions_lost)
@@ -88,11 +85,10 @@ class IdentifiedModel:
 
 
 def known_u(variance: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard uncertainties; NaN where they would rest on a guess for their greater part.
+    """Return standard uncertainties; NaN if mostly guessed.
 
     Args:
-        along: variance along what the recordings cannot determine, each combination at its plausible size. The smaller part is
-            part of the uncertainty; the greater part is no measurement.
+        along: variance along undetermined combinations at plausible size; included only if it is the smaller part.
     """
     return np.sqrt(np.where(along > variance, np.nan, variance + along))
 

@@ -1,4 +1,4 @@
-"""The machine as it is: from what is commanded to where the tool goes and what a ball bar reads."""
+"""From commands to the tool's actual place and a bar's reading."""
 
 from __future__ import annotations
 
@@ -40,36 +40,35 @@ class MachineModel:
     """Nominal geometry plus error sources.
 
     Attributes:
-        machine: what the controller believes.
-        sources: what is different, with its size; sources of every owner may stand here, and each acts on
-            the motions that share its set.
+        machine: as the controller believes.
+        sources: of every owner; each acts on motions of its set.
     """
 
     machine: Machine
     sources: tuple[Fitted, ...] = ()
 
     def of_the_machine(self) -> MachineModel:
-        """Return the model with the machine's own sources only: what holds for any program."""
+        """Return the model with the machine's own sources."""
         return replace(self, sources=tuple(f for f in self.sources if f.source.belongs_to is Owner.MACHINE))
 
     def anywhere(self) -> MachineModel:
-        """Return the model with what holds at any pose, whatever the way there, the time and the temperature."""
+        """Return the model with sources that depend only on the pose."""
         own = self.of_the_machine()
         return replace(own, sources=tuple(f for f in own.sources if f.source.needs <= {Need.POSE}))
 
     def effect(self, motion: Motion, there: Actual | None = None) -> Effect:
-        """All sources together, but for those of motor currents, which change nothing else.
+        """Return the effect of all sources but motor currents'.
 
         Args:
-            there: where weights pull at the machine; None: at the commanded poses of the nominal machine.
+            there: where weights act; None: commanded poses of the nominal machine.
 
         Raises:
-            ModelError: a source needs what the motion does not give.
+            ModelError: a source needs missing data.
         """
         return self.together(self.acting(motion), motion, there)
 
     def together(self, several: Iterable[Fitted], motion: Motion, there: Actual | None = None) -> Effect:
-        """Some of the model's sources together, as `effect` is all of them."""
+        """Return the effect of some sources, as `effect`."""
         total = Effect()
         for fitted in several:
             fitted.source.require(motion)
@@ -80,35 +79,34 @@ class MachineModel:
         return total
 
     def acting(self, motion: Motion) -> tuple[Fitted, ...]:
-        """Sources that move the machine or the reading along a motion."""
+        """Return sources that move machine or reading."""
         return tuple(f for f in self.sources if f.shared == f.source.shared_by(motion) and not f.source.of_currents)
 
     @cached_property
     def as_found(self) -> Machine:
-        """The machine file with the compliance that a source found in place of its own: struts have one compliance."""
+        """Return the machine file with the identified compliance."""
         found = [f.source.found_compliance(self.machine, f.values) for f in self.sources]
         return next((replace(self.machine, compliance=one) for one in found if one is not None), self.machine)
 
     @property
     def shortest_period_mm(self) -> float:
-        """Shortest way over which an effect of the machine's own sources goes up and down once; infinite without [mm]."""
+        """Return the shortest wave of the machine's sources [mm]; infinite without any."""
         own = (f for f in self.sources if f.source.belongs_to is Owner.MACHINE and f.values.any())
         return min((f.source.shortest_period_mm(self.machine, f.values) for f in own), default=math.inf)
 
     def driven_mm(self, frames: Frames) -> NDArray[np.float64]:
-        """Strut lengths that the controller drives to for commanded poses, shape (n, 6) [mm]."""
+        """Return the controller's strut lengths for commanded poses, shape (n, 6) [mm]."""
         return strut_lengths(self.machine.hexapod, frames) - self.machine.reference_length_error_mm
 
     def actual(self, motion: Motion) -> Actual:
-        """Where the platform really goes: F^-1(driven + strut errors; actual joints) [CAL eq 2].
+        """Return the platform's actual place: F^-1(driven + strut errors; actual joints) [CAL eq 2].
 
-        Weights bend the machine where it really is, and so have a say in where that is. Their effect is taken at the
-        commanded pose of the nominal machine first and then anew where that leads, until a picometre agrees: each round
-        leaves a thousandth of the change before it, a hundredth where the struts hardly hold the platform.
+        Weights bend the machine at its actual place. Their effect is iterated from the commanded pose to a picometre;
+        each round leaves a thousandth of the change, near loose poses a hundredth.
 
         Raises:
-            KinematicsError: names the first pose that the actual machine cannot take, or that its weights let it leave.
-            ModelError: a source needs what the motion does not give.
+            KinematicsError: names the first impossible pose, also by weights.
+            ModelError: a source needs missing data.
         """
         commanded = motion.frames(self.machine)
         driven = self.driven_mm(commanded)
@@ -137,14 +135,14 @@ class MachineModel:
         )
 
     def actual_poses(self, motion: Motion) -> NDArray[np.float64]:
-        """Poses of the real tool tip, shape (n, 6) [mm, deg], for the rows that count."""
+        """Return actual tool tip poses of kept rows, shape (n, 6) [mm, deg]."""
         return self.actual(motion).tool_frames().to_poses(self.machine.hexapod.rotation)[motion.kept]
 
     def bar(self, motion: Motion) -> BarReading:
-        """What a bar about the motion's fixed ball reads, and how that answers to every error, kept rows only.
+        """Return a bar's reading about the motion's fixed ball and its sensitivities, kept rows.
 
-        A ball that was put up under the spindle stands where the tool tip really was then. What a micrometer read of
-        both balls is taken into account, and what the bar reads too long by its calibration.
+        A ball under the spindle stands at the actual tip of then. Micrometer readings and the bar's calibration are
+        included.
         """
         setup = motion.setup
         if setup is None:
@@ -175,11 +173,11 @@ class MachineModel:
 
 @dataclass(frozen=True, eq=False)
 class Actual:
-    """The real machine along a motion.
+    """The actual machine along a motion.
 
     Attributes:
         model: whose sources are at work.
-        effect: of all sources together.
+        effect: of all sources.
     """
 
     model: MachineModel
@@ -190,31 +188,30 @@ class Actual:
 
     @cached_property
     def placed(self) -> Motion:
-        """The motion at the poses that the platform really takes."""
+        """Return the motion at actual platform poses."""
         return replace(self.motion, poses=self.frames.to_poses(self.hexapod.rotation))
 
     @cached_property
     def machine(self) -> Machine:
-        """The machine with the joints, and the compliance, that it really has."""
+        """Return the machine with actual joints and compliance."""
         return replace(self.model.as_found, hexapod=self.hexapod)
 
     def seen_by(self, source: ErrorSource, machine: Machine) -> tuple[Motion, Machine]:
-        """Motion and machine that a source acts on: weights pull where a machine really is, all others as commanded."""
+        """Return motion and machine of a source: weights at actual poses, others as commanded."""
         return (self.placed, replace(machine, hexapod=self.hexapod)) if source.weighs else (self.motion, machine)
 
     def by(self, fitted: Fitted) -> Effect:
-        """Effect of one of the model's sources."""
+        """Return one source's effect."""
         return fitted.source.effect(*self.seen_by(fitted.source, self.model.as_found), fitted.values)
 
     def derivative(self, fitted: Fitted) -> Effect:
-        """Derivative of the effect by the parameters of one of the model's sources, shape (..., p).
+        """Return the effect's derivative by one source's parameters, shape (..., p).
 
-        Where that is the struts' compliance, the stretch that other sources count with it is in proportion to it.
-        That the machine then moves, and its weights with it, is left out: a thousandth of the derivative, a hundredth
-        where the struts hardly hold the platform. A fit takes more rounds for it and ends at the same values.
+        Stretch of other sources is proportional to a fitted compliance. Resulting motion of weights is omitted: a
+        thousandth, near loose poses a hundredth, which costs a fit only rounds.
 
         Raises:
-            ModelError: the source needs what the motion does not give.
+            ModelError: the source needs missing data.
         """
         source, values, found = fitted.source, fitted.values, self.model.as_found
         own = source.derivative(*self.seen_by(source, found), values)
@@ -227,7 +224,7 @@ class Actual:
         return own if stretch.strut_mm is None else own + Effect(strut_mm=stretch.strut_mm[:, :, None] / values)
 
     def tool_frames(self) -> Frames:
-        """Frames of the real tool tip: the platform's, shifted by what sits between platform and tip."""
+        """Return actual tool tip frames."""
         tip = self.effect.tool_tip_mm
         if tip is None:
             return self.frames
@@ -240,12 +237,10 @@ class BarReading:
     """Predicted readings of one run.
 
     Attributes:
-        actual: the real machine along the run.
-        length_mm: predicted reading at the rows that count, shape (n,) [mm].
-        sensitivity: at all rows of the motion.
-        standing: the real machine while a ball was put up under the spindle; None for a ball of known place.
-        ball_response: how X, Y and Z of a ball that was put up under the spindle answer to the machine's errors, while
-            it was put up.
+        length_mm: kept rows, shape (n,).
+        sensitivity: all rows.
+        standing: machine while a ball was set under the spindle; else None.
+        ball_response: sensitivity of that ball's X, Y and Z.
     """
 
     actual: Actual
@@ -255,14 +250,14 @@ class BarReading:
     ball_response: tuple[Response, ...] = ()
 
     def by_source(self, source: ErrorSource, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivative of the reading by a source's parameters about their values, shape (p,): shape (n, p).
+        """Return the reading's derivative by a source's parameters at values of shape (p,): shape (n, p).
 
-        The source need not be one of the model's; a weight pulls where the model has the machine.
+        The source need not be in the model.
         """
         return self._by(lambda actual: source.derivative(*actual.seen_by(source, machine), values))
 
     def by_fitted(self, fitted: Fitted) -> NDArray[np.float64]:
-        """Derivative by the parameters of one of the model's sources, with what it changes through others, (n, p)."""
+        """Return the derivative by a model source's parameters, with its effect through others, (n, p)."""
         return self._by(lambda actual: actual.derivative(fitted))
 
     def _by(self, derivative: Callable[[Actual], Effect]) -> NDArray[np.float64]:
@@ -275,7 +270,7 @@ class BarReading:
         return total - self.sensitivity.direction[self.actual.motion.kept] @ np.vstack(moved)
 
     def by_parameters(self, derivative: Effect) -> NDArray[np.float64]:
-        """Derivative of the reading by p parameters, shape (n, p), from that of an effect; kept rows only."""
+        """Return the reading's derivative, shape (n, p), from an effect's; kept rows."""
         kept = self.actual.motion.kept
         total = by_parameters(derivative, self.sensitivity.response, kept)
         if derivative.fixed_ball_mm is not None:
@@ -287,7 +282,7 @@ class BarReading:
 
 
 def by_parameters(derivative: Effect, response: Response, kept: slice) -> NDArray[np.float64] | float:
-    """Derivative of any quantity by p parameters through struts, joints and tool, shape (n, p); 0.0 where none."""
+    """Return any quantity's derivative through struts, joints and tool, shape (n, p); 0.0 if none."""
     total: NDArray[np.float64] | float = 0.0
     if derivative.strut_mm is not None:
         total = total + _contract(response.per_strut[kept], _rows(derivative.strut_mm, 1, kept), 1)
@@ -301,12 +296,12 @@ def by_parameters(derivative: Effect, response: Response, kept: slice) -> NDArra
 
 
 def _rows(array: NDArray[np.float64], axes: int, kept: slice) -> NDArray[np.float64]:
-    """Rows that count of a derivative that has one entry per sample; all of one that holds for every sample."""
+    """Return kept rows of a derivative with sample axis; others whole."""
     return array if array.ndim == axes + 1 else array[kept]
 
 
 def _contract(gain: NDArray[np.float64], array: NDArray[np.float64], axes: int) -> NDArray[np.float64]:
-    """Sum gain times array over struts and coordinates; the array is constant or has one entry per sample."""
+    """Sum gain times array over struts and coordinates; constant or per sample."""
     count, parameters = len(gain), array.shape[-1]
     flat = gain.reshape(count, -1)
     if array.ndim == axes + 1:
@@ -319,7 +314,7 @@ def _contract(gain: NDArray[np.float64], array: NDArray[np.float64], axes: int) 
 
 
 def actual_hexapod(nominal: Hexapod, effect: Effect) -> Hexapod:
-    """Joints with the effect's joint errors on them."""
+    """Return actual joints."""
     none = np.zeros((STRUTS, 3))
     return nominal.moved(
         none if effect.base_joint_mm is None else effect.base_joint_mm,
@@ -332,7 +327,7 @@ def _strut_errors(effect: Effect) -> NDArray[np.float64]:
 
 
 def _change_mm(bent: Effect, last: Effect) -> NDArray[np.float64]:
-    """Greatest change of a strut or a base joint from one effect of weights to another, shape (n,) [mm]."""
+    """Return the greatest change of a strut or joint between two weight effects, shape (n,) [mm]."""
     pairs = ((bent.strut_mm, last.strut_mm), (bent.base_joint_mm, last.base_joint_mm))
     changes = [np.abs(new - old) for new, old in pairs if new is not None and old is not None]
     greatest: NDArray[np.float64] = np.max([np.max(c.reshape(len(c), -1), axis=1) for c in changes], axis=0)

@@ -1,4 +1,4 @@
-"""What the motors of the struts hold along a motion, and which currents they draw for it."""
+"""Motor forces and currents along a motion."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class MotorCurrents:
     """Predicted currents of one run.
 
     Attributes:
-        driven: the run as commanded, with the loads of the motors.
-        there: where the machine really is.
-        current_a: at the rows that count, shape (n, 6) [A].
+        driven: commanded, with motor loads.
+        there: actual machine.
+        current_a: kept rows, shape (n, 6).
     """
 
     model: MachineModel
@@ -33,10 +33,10 @@ class MotorCurrents:
     current_a: NDArray[np.float64]
 
     def by_parameters(self, fitted: Fitted) -> NDArray[np.float64] | None:
-        """Derivative of the currents by the parameters of one of the model's sources, shape (n, 6, p); kept rows only.
+        """Return currents' derivative by a source's parameters, shape (n, 6, p), kept rows.
 
-        None for a source that neither loads the struts nor speaks of currents. That errors of the joints move the
-        platform, and so change the loads by parts in a thousand, is in the prediction and not in its derivative.
+        None for sources without load or current. Load changes by moved joints, parts in a thousand, are only in the
+        prediction.
         """
         kept = self.driven.kept
         if fitted.source.of_currents:
@@ -55,13 +55,13 @@ class MotorCurrents:
 
 
 def motor_currents(model: MachineModel, motion: Motion) -> MotorCurrents:
-    """Predict the currents of a run from the loads at the poses where the machine really is.
+    """Predict a run's currents from loads at actual poses.
 
-    Strut masses of the machine file do not count where a source has the struts' weights as its parameters.
+    Strut masses are ignored if a source fits them.
 
     Raises:
-        KinematicsError: a pose that the actual machine cannot take, or where its struts cannot hold the platform.
-        ModelError: a source needs what the motion does not give; the machine file has no masses.
+        KinematicsError: a pose is impossible or loose.
+        ModelError: a source needs missing data; the machine file has no masses.
     """
     there = model.actual(motion)
     weighing = any(f.source.weighs_struts for f in model.sources)

@@ -1,4 +1,4 @@
-"""What was commanded and what was measured, side by side: one run as calibration and diagnosis take it."""
+"""One run with command and measurement, for calibration and diagnosis."""
 
 from __future__ import annotations
 
@@ -29,13 +29,9 @@ class Observation:
     """One accepted run.
 
     Attributes:
-        test: name of the test in its plan.
-        repeat: counts the runs of one test and direction in a session.
-        raw: the full turn as measured.
-        setup: ball, mounting, bar and how well they are known.
-        started_s: start of the run after the start of its session [s]; None where the session does not say.
-        commanded: poses that were commanded where they were not the plan's circle, at the raw circle's samples
-            after those of the lead-in; None for the plan's circle.
+        raw: full turn.
+        started_s: after the session's start; None if unknown.
+        commanded: poses at lead-in and raw samples; None for the plan's circle.
     """
 
     test: str
@@ -47,18 +43,18 @@ class Observation:
 
     @property
     def label(self) -> str:
-        """Name of the run in texts and tables."""
+        """Return the name for texts and tables."""
         return f"{self.test} {self.raw.circle.direction} {self.repeat}"
 
     @property
     def lead_in_deg(self) -> NDArray[np.float64]:
-        """Progress of the lead-in poses, ending one step before the turn [deg]."""
+        """Return the lead-in's progress, ending one step before the turn [deg]."""
         return np.arange(-self.raw.circle.overshoot_deg, 0.0, LEAD_IN_STEP_DEG)
 
     def motion(self) -> Motion:
-        """The run as error sources see it: the overshoot arc that leads to the turn, then the turn's samples.
+        """Return the run for error sources: lead-in arc, then the turn's samples.
 
-        A ball that was put up under the spindle is taken to have been put up just before the run.
+        A ball under the spindle is taken as set up just before.
         """
         raw, circle = self.raw, self.raw.circle
         name = f"{self.setup.session}: {self.label}"
@@ -85,7 +81,7 @@ class Observation:
         )
 
     def _standing(self, until_s: float | None) -> Motion:
-        """The machine standing still where the ball is put up, three samples a second apart."""
+        """Return the machine standing at the set-up: three samples, a second apart."""
         raw = self.raw
         pose = np.array([*self.setup.fixed_ball_mm, *raw.circle.tilt_deg])
         return Motion(
@@ -100,7 +96,7 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """Motions of runs, each made when it is asked for: its poses are six numbers a sample."""
+    """Motions of runs, made on demand to save memory."""
 
     observations: Sequence[Observation]
 
@@ -109,5 +105,4 @@ class Motions:
 
 
 def _held_back(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Values with the first one repeated before them: nobody logged the lead-in."""
     return np.concatenate([np.repeat(values[:1], count, axis=0), values])

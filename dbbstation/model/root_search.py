@@ -1,4 +1,4 @@
-"""Where several functions of one variable each are zero, between bounds."""
+"""Roots of several one-variable functions between bounds."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ ANEW = 3
 
 
 class RootSearch:
-    """Looks for x_i with f_i(x) = 0, where f_i hangs on x_i and hardly on the others, and falls with it in the large.
+    """Finds x_i with f_i(x) = 0, f_i decreasing in x_i and nearly independent of others.
 
-    Bounds to either side of each zero are found first, by steps that double, and then narrowed. Where the others move f_i, bounds that have become wrong are looked for anew. Where f_i
-    jumps over zero the side with the smaller value is taken.
+    Doubling steps find bounds, which are narrowed, and found anew if others move them. At a jump the side with the
+    smaller value counts.
 
     Args:
-        guess: where to begin, shape (k,).
+        guess: start, shape (k,).
         met: |f| that counts as zero.
 
     Attributes:
-        at: where f is wanted next; where `done`, the answer, shape (k,).
-        lost: number, from 1, of the first function that has no zero near the guess; 0 where all have.
+        at: next argument; the answer when `done`, shape (k,).
+        lost: first function, from 1, without zero near the guess; 0 for none.
     """
 
     def __init__(self, guess: NDArray[np.float64], met: float) -> None:
@@ -43,7 +43,7 @@ class RootSearch:
         self._low, self._low_value, self._high, self._high_value, self._step = (nothing.copy() for _ in range(5))
 
     def tell(self, value: NDArray[np.float64]) -> None:
-        """Take f at `at`, shape (k,), and say where it is wanted next."""
+        """Take f at `at`, shape (k,), and set the next argument."""
         open_ = np.abs(value) > self._met
         if not open_.any():
             self.done = True
@@ -77,9 +77,9 @@ class RootSearch:
             self.done, self.lost = True, 1 + int(np.argmax(away if away.any() else open_))
 
     def _between(self, width: NDArray[np.float64]) -> NDArray[np.float64]:
-        """By turns the middle, as far from either bound as f is there, and false position.
+        """Return by turns the middle, limited by |f|, and false position.
 
-        The second is right at once where f falls as its argument rises, as behind a play.
+        False position is exact at slope -1, as behind a play.
         """
         middle = self._low + 0.5 * width
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,4 +1,4 @@
-"""What a model predicts that a bar would record: whole turns without noise, and the set-up that a plan foresees."""
+"""Predicted recordings: whole turns without noise, by the planned set-up."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class SimulatedCircle:
     """One turn, shapes (n,).
 
     Attributes:
-        t_s: time since the first sample [s].
-        theta_deg: angle from +X towards +Y [deg].
-        commanded: poses of the lead-in and the turn, shape (m + n, 6) [mm, deg].
+        t_s: since the first sample.
+        theta_deg: from +X towards +Y.
+        commanded: lead-in and turn, shape (m + n, 6) [mm, deg].
     """
 
     t_s: NDArray[np.float64]
@@ -45,18 +45,17 @@ def simulate_circle(
     started_s: float | None = None,
     command: Callable[[Motion], NDArray[np.float64]] | None = None,
 ) -> SimulatedCircle:
-    """Predict the reading along one turn, with the overshoot arc before it as history.
+    """Predict the reading along one turn with lead-in.
 
     Args:
-        model: machine and measurement effects.
-        setup: ball and bar.
-        samples: equally spaced over the turn.
-        started_s: start of the turn after that of the session [s]; None where the model needs no time.
-        command: from the wanted motion to the poses that are commanded instead, shape (n, 6); the same by default.
+        model: of machine and measurement.
+        samples: equally spaced.
+        started_s: after the session's start; None if not needed.
+        command: from wanted motion to commands, shape (n, 6); None: the same.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
-        ModelError: a source needs temperatures or currents, which a simulation does not have.
+        ModelError: a source needs temperatures or currents.
     """
     lead_in = np.arange(-circle.overshoot_deg, 0.0, LEAD_IN_STEP_DEG)
     turn = np.linspace(0.0, FULL_TURN_DEG, samples, endpoint=False, dtype=np.float64)
@@ -75,7 +74,7 @@ def simulate_circle(
 
 
 def setup_of(test: PlannedTest) -> Setup:
-    """Return the set-up that a planned test will have when it is mounted once."""
+    """Return a planned test's set-up with one mounting."""
     ball = test.ball
     return Setup(
         session="",

@@ -1,4 +1,4 @@
-"""How well a model knows where the tool goes, anywhere in the workspace."""
+"""A model's uncertainty of the tool's place in the workspace."""
 
 from __future__ import annotations
 
@@ -26,18 +26,17 @@ if TYPE_CHECKING:
 def position_uncertainty_mm(
     identified: IdentifiedModel, motion: Motion, *, about_mean: bool = False
 ) -> NDArray[np.float64]:
-    """Standard uncertainty of the predicted X, Y and Z at the rows that count, shape (n, 3) [mm]; NaN where not known.
+    """Return standard uncertainties of predicted X, Y and Z, kept rows, shape (n, 3) [mm]; NaN if unknown.
 
-    First-order propagation of the identified covariance. It is not known where the model states nothing of a source that acts,
-    and where what the recordings could not determine would be the greater part of it (`known_u`).
+    First-order propagation. Unknown if an acting source has no uncertainty or undetermined combinations dominate
+    (`known_u`).
 
     Args:
-        motion: commanded poses.
-        about_mean: of positions less their mean over the motion, which a common shift does not change.
+        about_mean: of positions less their mean.
 
     Raises:
-        KinematicsError: names the first pose that the actual machine cannot take.
-        ModelError: a source needs what the motion does not give.
+        KinematicsError: names the first impossible pose.
+        ModelError: a source needs missing data.
     """
     sensitivity, silent = _sensitivity(identified, motion)
     unseen = identified.unseen
@@ -54,17 +53,14 @@ def position_uncertainty_mm(
 
 @with_one_thread
 def range_uncertainty_mm(identified: IdentifiedModel, motion: Motion, axis: int) -> float | None:
-    """Standard uncertainty of the greatest less the least deviation along one axis over a motion [mm]; None where not known.
-
-    To first order that of the two poses where these are.
+    """Return the standard uncertainty of the range along one axis [mm], to first order by its two poses; None if unknown.
 
     Args:
-        motion: commanded poses.
         axis: 0, 1 or 2 for X, Y or Z.
 
     Raises:
-        KinematicsError: names the first pose that the actual machine cannot take.
-        ModelError: a source needs what the motion does not give.
+        KinematicsError: names the first impossible pose.
+        ModelError: a source needs missing data.
     """
     actual = identified.model.of_the_machine().actual_poses(motion)
     off = actual[:, axis] - motion.poses[motion.kept][:, axis]
@@ -79,7 +75,7 @@ ROUNDING_MM = 1e-9
 
 
 def _sensitivity(identified: IdentifiedModel, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How X, Y and Z answer to the rows of the covariance, shape (3, n, k), and to parameters of sources that have none."""
+    """Return sensitivities of X, Y and Z to covariance rows, shape (3, n, k), and to unknown sources."""
     model = identified.model.of_the_machine()
     actual = model.actual(motion)
     row_of = {row: k for k, row in enumerate(identified.covariance_rows)}
@@ -112,17 +108,16 @@ def predicted_poses(
     poses: ArrayLike,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the actual poses for commanded ones, each by itself, and how well their positions are known.
+    """Return actual poses for independent commanded ones, with uncertainties.
 
     Args:
-        poses: commanded, shape (n, 6) [mm, deg], numbers of any type.
-        progress: told how many of how many are done.
+        poses: shape (n, 6) [mm, deg], any numeric type.
 
     Returns:
         Actual poses, shape (n, 6) [mm, deg], and standard uncertainties of X, Y and Z, shape (n, 3) [mm], NaN where not known.
 
     Raises:
-        KinematicsError: names a pose that the actual machine cannot take.
+        KinematicsError: names an impossible pose.
         ModelError: a source needs more than poses.
     """
     commanded = np.array(poses, dtype=np.float64)
@@ -147,11 +142,11 @@ class PoseErrors:
     """Position errors of predicted poses, and how well they are known.
 
     Attributes:
-        greatest_error_um: largest distance from the commanded position [µm].
-        error_rms_um: root mean square of the distances [µm].
-        common_shift_um: mean error, X, Y, Z [µm].
-        error_about_mean_rms_um: root mean square without the common shift [µm].
-        greatest_uncertainty_um: largest standard uncertainty of a position, its length over the axes; None where not known [µm].
+        greatest_error_um: from the commanded position.
+        error_rms_um: of distances.
+        common_shift_um: mean error, X, Y, Z.
+        error_about_mean_rms_um: without common shift.
+        greatest_uncertainty_um: standard, over all axes; None if unknown.
     """
 
     greatest_error_um: float
@@ -165,14 +160,14 @@ class PoseErrors:
 def pose_errors(
     commanded: NDArray[np.float64], actual: NDArray[np.float64], uncertainty_mm: NDArray[np.float64]
 ) -> PoseErrors:
-    """Return position errors of predicted poses, and how well they are known.
+    """Return position errors of predicted poses.
 
-    A common shift is part of an error, and a program whose zero is set on the part does not feel it: both are given.
+    A part-set zero removes the common shift, so both are given.
 
     Args:
         commanded: shape (n, 6) [mm, deg].
-        actual: as predicted, shape (n, 6) [mm, deg].
-        uncertainty_mm: standard uncertainties of X, Y and Z, shape (n, 3) [mm]; NaN where not known.
+        actual: shape (n, 6) [mm, deg].
+        uncertainty_mm: of X, Y and Z, shape (n, 3); NaN if unknown.
     """
     off_um = 1e3 * (actual[:, :3] - commanded[:, :3])
     shift_um = off_um.mean(axis=0)
@@ -191,5 +186,5 @@ def pose_errors(
 
 
 def rms_length(vectors: NDArray[np.float64]) -> float:
-    """Root mean square length of vectors, shape (n, 3), in their unit."""
+    """Return the rms length of vectors, shape (n, 3), in their unit."""
     return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))

@@ -1,4 +1,4 @@
-"""The ball bar that measures a plan: its length on its calibrator, and what it reads too long."""
+"""The ball bar: calibrated length and excess reading."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ USUAL_READINGS = 200
 
 @dataclass(frozen=True)
 class Bar:
-    """The bar: recorded readings stay as they are; what is made of them is corrected by what it reads too long.
+    """The bar; recorded readings are never changed.
 
     Attributes:
-        calibrated_length_mm: distance between the ball centres that its calibration found [mm].
-        expansion_um_m_k: thermal expansion [µm/(m K)]; None where not noted.
-        stroke_mm: travel of its gauge from that length, either way [mm]; None where not noted.
-        reading_mm: what it read on its calibrator [mm]; None where not noted.
-        temp_uncertainty_k: standard uncertainty of a temperature of the bar [K]; None where not noted.
+        calibrated_length_mm: between ball centres.
+        expansion_um_m_k: [µm/(m K)]; None if not noted.
+        stroke_mm: of its gauge, either way; None if not noted.
+        reading_mm: on its calibrator; None if not noted.
+        temp_uncertainty_k: standard, of a bar temperature; None if not noted.
     """
 
     serial_number: str
@@ -51,15 +51,13 @@ class Bar:
     calibrator_serial_number: str | None = None
 
     def reads_long_mm(self, temp_c: float | None) -> tuple[float, float]:
-        """Return what the bar is expected to read less the true distance, and the standard uncertainty of that [mm].
+        """Return the expected reading less true distance, with standard uncertainty [mm].
 
-        On its calibrator it read so much more than the calibrator's length. A bar that has grown since reads so much less, as
-        its gauge has to travel less: - a L (T - T_calibration). A known systematic effect is corrected, whatever its
-        uncertainty [GUM 3.2.4]: where nobody stated that of the temperatures it is the usual one. That of a difference is
-        sqrt(2) times that of each.
+        Calibrator excess less growth a L (T - T_calibration). Known effects are corrected [GUM 3.2.4]; an unstated
+        temperature uncertainty is the usual one. A difference has sqrt(2) times each one's.
 
         Args:
-            temp_c: of the bar while it measures [degC]; None where not known.
+            temp_c: while measuring; None if unknown.
         """
         long_mm = 0.0 if self.reading_mm is None else self.reading_mm - self.calibrated_length_mm
         if temp_c is None or self.temp_c is None or self.expansion_um_m_k is None:
@@ -68,10 +66,10 @@ class Bar:
         return long_mm - grown_mm, math.hypot(self.calibrator_uncertainty_mm, self.grown_uncertainty_mm(temp_c) or 0.0)
 
     def grown_uncertainty_mm(self, temp_c: float | None) -> float | None:
-        """Return the standard uncertainty of what the bar has grown by since its calibration; None where not known [mm].
+        """Return the standard uncertainty of growth since calibration [mm]; None if unknown.
 
         Args:
-            temp_c: of the bar while it measures [degC]; None where not known.
+            temp_c: while measuring; None if unknown.
         """
         if self.expansion_um_m_k == 0.0:
             return 0.0
@@ -83,10 +81,10 @@ class Bar:
         return mm_per_k * math.hypot(math.sqrt(2.0) * usual, of_coefficient)
 
     def lacks(self, temp_c: float | None) -> tuple[str, ...]:
-        """Return what has to be known, and is not, before a length that it measured is absolute.
+        """Return unknown facts that an absolute length needs.
 
         Args:
-            temp_c: of the bar while it measures [degC]; None where not known.
+            temp_c: while measuring; None if unknown.
         """
         if self.expansion_um_m_k == 0.0:
             return ()

@@ -1,4 +1,4 @@
-"""One ball-bar circle as commanded: where it lies, how it is travelled, which pose belongs to which angle."""
+"""One commanded circle: place, travel, poses."""
 
 from __future__ import annotations
 
@@ -19,33 +19,32 @@ and 144 mm radius, so it is no less than 6; bars of 100 and 150 mm are distingui
 
 
 class Direction(StrEnum):
-    """Sense of travel, seen from +Z."""
+    """Sense of travel from +Z."""
 
     CCW = "ccw"
     CW = "cw"
 
     @property
     def sign(self) -> float:
-        """Return +1 where the angle grows with time, -1 where it falls."""
+        """Return +1 for rising angles, -1 for falling."""
         return 1.0 if self is Direction.CCW else -1.0
 
 
 @dataclass(frozen=True)
 class Circle:
-    """A horizontal circle of the tool tip about a fixed ball, with the bar level or raised.
+    """A horizontal circle of the tool tip about a fixed ball, bar level or raised.
 
-    With elevation e the circle has the radius R cos e and lies R sin e above the ball.
+    Elevation e gives the radius R cos e, R sin e above the ball.
 
     Attributes:
-        ball_mm: centre of the fixed ball as the plan knows it, machine frame (x, y, z) [mm].
-        centre_mm: centre of the circle as programmed, machine frame (x, y, z) [mm].
-        bar_mm: nominal distance R between the balls [mm].
-        tilt_deg: tool orientation (A, B, C), constant over the circle [deg].
-        feed_mm_min: speed of the tool tip along its path [mm/min].
-        start_deg: angle where the full turn starts, from +X towards +Y [deg].
-        overshoot_deg: arc travelled before and after the full turn [deg].
-        feed_in_mm: how far outside the circle the feed-in starts, along the bar [mm].
-        direction: sense of travel.
+        ball_mm: fixed ball by plan, machine frame (x, y, z).
+        centre_mm: as programmed, machine frame (x, y, z).
+        bar_mm: nominal ball distance R.
+        tilt_deg: constant (A, B, C).
+        feed_mm_min: along the path.
+        start_deg: of the full turn, from +X towards +Y.
+        overshoot_deg: before and after the turn.
+        feed_in_mm: begin outside the circle, along the bar.
     """
 
     ball_mm: tuple[float, float, float]
@@ -61,7 +60,7 @@ class Circle:
 
     @property
     def radius_mm(self) -> float:
-        """Radius of the tool tip's path, R cos e [mm]."""
+        """Return the path's radius, R cos e [mm]."""
         return self.bar_mm * float(np.cos(np.radians(self.elevation_deg)))
 
     @property
@@ -71,23 +70,23 @@ class Circle:
 
     @property
     def swept_deg(self) -> float:
-        """Whole arc between feed-in and feed-out [deg]."""
+        """Return the arc between feed-in and feed-out [deg]."""
         return FULL_TURN_DEG + 2.0 * self.overshoot_deg
 
     def theta_deg(self, phi_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angle from +X towards +Y at the progress `phi_deg` along the turn (0 at its start) [deg]."""
+        """Return the angle from +X towards +Y at progress `phi_deg`, 0 at the start [deg]."""
         return self.start_deg + self.direction.sign * phi_deg
 
     def phi_deg(self, theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Progress along the turn at an angle, from 0 up to 360 [deg]; the inverse of `theta_deg`."""
+        """Return progress at an angle, 0 to 360 [deg], the inverse of `theta_deg`."""
         return np.mod(self.direction.sign * (theta_deg - self.start_deg), FULL_TURN_DEG)
 
     def poses(self, theta_deg: NDArray[np.float64], outside_mm: float = 0.0) -> NDArray[np.float64]:
         """Commanded poses at angles, shape (n, 6) [mm, deg].
 
         Args:
-            theta_deg: angles from +X towards +Y, shape (n,) [deg].
-            outside_mm: how far the tool tip stands outside the circle, along the bar [mm].
+            theta_deg: from +X towards +Y, shape (n,).
+            outside_mm: along the bar.
         """
         theta, elevation = np.radians(theta_deg), np.radians(self.elevation_deg)
         radius = self.radius_mm + outside_mm * np.cos(elevation)
@@ -97,7 +96,7 @@ class Circle:
         return np.column_stack([x + radius * np.cos(theta), y + radius * np.sin(theta), height, tilt])
 
     def envelope(self, step_deg: float = 1.0) -> NDArray[np.float64]:
-        """Poses that cover the whole path, feed-in and feed-out included, shape (n, 6) [mm, deg]."""
+        """Return poses of the whole path, feed-in and feed-out included, shape (n, 6) [mm, deg]."""
         count = int(np.ceil(self.swept_deg / step_deg)) + 1
         arc = self.poses(self.theta_deg(np.linspace(-self.overshoot_deg, FULL_TURN_DEG + self.overshoot_deg, count)))
         ends = self.theta_deg(np.array([-self.overshoot_deg, FULL_TURN_DEG + self.overshoot_deg]))

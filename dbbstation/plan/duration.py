@@ -1,4 +1,4 @@
-"""How long circles take at their planned feeds."""
+"""Durations of circles at planned feeds."""
 
 from __future__ import annotations
 
@@ -13,14 +13,11 @@ _S_PER_MIN = 60.0
 
 
 def circle_s(circle: Circle) -> float:
-    """Time that the machine moves for a circle: feed-in, turn with both overshoots, feed-out, all at its feed [s].
-
-    Dwells and what the control takes to speed up and slow down are not in it.
-    """
+    """Return the time of feed-in, turn, overshoots and feed-out, without dwells and ramps [s]."""
     feeding_mm = 2.0 * circle.feed_in_mm
     return circle.swept_deg / circle.turning_deg_s + feeding_mm / (circle.feed_mm_min / _S_PER_MIN)
 
 
 def circles_s(circles: Iterable[Circle]) -> float:
-    """Time that the machine moves for several circles [s]; putting up balls and driving from one to the next is not in it."""
+    """Return the time of several circles, without set-ups [s]."""
     return sum(circle_s(circle) for circle in circles)

@@ -1,4 +1,4 @@
-"""In which order the tests of a plan are run: with few changes of holder, or so that a drift does not look like an effect of height."""
+"""Orders of tests: few changes of holder, or drift separated from height."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _TINY = 1e-9
 
 
 def by_holder(plan: Plan) -> tuple[str, ...]:
-    """Return the tests by holder and then by ball, both as the plan names them first: each is put up once."""
+    """Return tests by holder, then ball, as first named: each is put up once."""
     balls = {test.ball.name: test.ball.holder for test in plan.tests.values()}
     holders, names = list(dict.fromkeys(balls.values())), list(balls)
     tests = sorted(plan.tests.values(), key=lambda test: (holders.index(test.ball.holder), names.index(test.ball.name)))
@@ -38,11 +38,10 @@ def by_holder(plan: Plan) -> tuple[str, ...]:
 
 
 def against_drift(plan: Plan) -> tuple[str, ...]:
-    """Return the tests in an order in which the height of their circles follows no drift.
+    """Return tests in an order whose heights follow no drift.
 
-    What counts, in this order: no more than `LARGEST_LEAK` of correlation with a steady drift; the same with one that bends, such as
-    a warm-up; few balls to be put up; few changes of holder. Every test counts as one step of time: putting up a ball takes longer
-    than its circles. The best order is searched by exchanging and moving tests, from several orders.
+    Priorities: correlation with a steady drift at most `LARGEST_LEAK`; the same with a bent one; few balls put up; few
+    holder changes. Tests count as equal time steps. Exchanges and moves are searched from several starts.
     """
     names = list(plan.tests)
     tests = [plan.tests[name] for name in names]
@@ -60,11 +59,11 @@ def against_drift(plan: Plan) -> tuple[str, ...]:
 
 
 def height_and_drift(heights_mm: Sequence[float], degree: int = 2) -> float:
-    """Return the multiple correlation coefficient of heights, in the order they are measured, with a drift in equal steps of time.
+    """Return the multiple correlation of heights with a drift in equal time steps.
 
     Args:
-        heights_mm: of the circles of successive tests, shape (n,) [mm].
-        degree: 1: a steady drift; 2: also one that bends.
+        heights_mm: in order, shape (n,).
+        degree: 1: steady; 2: also bent.
 
     Returns:
         0: a drift cannot be taken for an effect of height; 1: nothing tells them apart. 0 where all heights are the same.
@@ -73,7 +72,7 @@ def height_and_drift(heights_mm: Sequence[float], degree: int = 2) -> float:
 
 
 def mountings(plan: Plan, names: Sequence[str]) -> int:
-    """Return how often a ball is put up where tests are measured in an order."""
+    """Return the number of set-ups in an order."""
     balls = [plan.tests[name].ball.name for name in names]
     return sum(k == 0 or balls[k] != balls[k - 1] for k in range(len(balls)))
 
@@ -81,7 +80,7 @@ def mountings(plan: Plan, names: Sequence[str]) -> int:
 def _improved(
     order: NDArray[np.intp], heights: NDArray[np.float64], balls: NDArray[np.intp], holders: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """The order that no exchange of two tests, and no move of one, makes better."""
+    """Return the order that no exchange or move improves."""
     at = _costs(order[None, :], heights, balls, holders)[0]
     while True:
         near = _neighbours(order)
@@ -93,7 +92,7 @@ def _improved(
 
 
 def _neighbours(order: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The order itself, and every order by one exchange or one move from it, shape (m, n)."""
+    """Return the order and all its exchanges and moves, shape (m, n)."""
     n = len(order)
     near = [order]
     for i in range(n):
@@ -109,7 +108,7 @@ def _neighbours(order: NDArray[np.intp]) -> NDArray[np.intp]:
 def _costs(
     orders: NDArray[np.intp], heights: NDArray[np.float64], balls: NDArray[np.intp], holders: NDArray[np.intp]
 ) -> NDArray[np.float64]:
-    """What is to be small, the first column first, shape (m, 4)."""
+    """Return costs by priority, shape (m, 4)."""
     in_order = heights[orders]
     leaks = [np.maximum(_correlations(in_order, degree) - LARGEST_LEAK, 0.0) for degree in (1, 2)]
     changes = [np.count_nonzero(np.diff(each[orders], axis=1), axis=1) for each in (balls, holders)]
@@ -121,7 +120,7 @@ def _least(costs: NDArray[np.float64]) -> int:
 
 
 def _correlations(heights: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
-    """Multiple correlation coefficients of rows of heights, shape (m, n), with polynomials of their place, shape (m,)."""
+    """Return multiple correlations of rows of heights, shape (m, n), with polynomials of place, shape (m,)."""
     n = heights.shape[1]
     off = heights - heights.mean(axis=1, keepdims=True)
     size = np.linalg.norm(off, axis=1)

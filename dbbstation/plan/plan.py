@@ -1,4 +1,4 @@
-"""A test plan: which balls stand where, which circles are run about them, how well their places are known."""
+"""A test plan: balls, circles and known places."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Plate:
     """The jig plate that balls stand on.
 
     Attributes:
-        origin_mm: where the origin of its frame stands, machine frame (x, y, z) [mm].
-        expansion_um_m_k: thermal expansion [µm/(m K)]; None where not noted.
+        origin_mm: of its frame, machine frame (x, y, z).
+        expansion_um_m_k: [µm/(m K)]; None if not noted.
     """
 
     origin_mm: tuple[float, float, float]
@@ -38,16 +38,15 @@ class Plate:
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball on the table, as the coordinate measuring machine (CMM) knows it, or put up under the spindle.
+    """A ball, known by CMM or put up under the spindle.
 
     Attributes:
-        name: its key in the plan.
-        bore: bore of the jig plate it stands in; None where it stands in no bore.
-        centre_mm: centre in the machine frame (x, y, z) [mm].
-        repeatability_mm: of putting the holder up, one standard deviation per axis [mm].
-        place_known: False for a ball that is put up under the spindle, as the standard circular test does [CAL III-A];
-            `centre_mm` is then where the machine is told to stand.
-        plate: that its bore is in; None where it stands in no bore.
+        name: key in the plan.
+        bore: None for none.
+        centre_mm: machine frame (x, y, z).
+        repeatability_mm: of the holder, one standard deviation per axis.
+        place_known: False under the spindle [CAL III-A], where `centre_mm` is the commanded place.
+        plate: None without bore.
     """
 
     name: str
@@ -65,8 +64,8 @@ class PlannedTest:
     """One test: a ball and the circle about it, run in one or both directions.
 
     Attributes:
-        name: unique in the plan.
-        directions: senses of travel, in the order they are run.
+        name: unique.
+        directions: in order.
     """
 
     name: str
@@ -81,11 +80,11 @@ class PlannedTest:
 
 @dataclass(frozen=True)
 class Plan:
-    """Tests by name, in the order they are run.
+    """Tests by name, in order.
 
     Attributes:
-        repeat_at_end: tests measured a second time after all others, so that drift and height do not mix.
-        largest_loss_percent: share of a run's samples that may be lost [%].
+        repeat_at_end: tests measured again, to separate drift and height.
+        largest_loss_percent: of a run's samples.
     """
 
     name: str
@@ -94,7 +93,7 @@ class Plan:
     largest_loss_percent: float = LARGEST_LOSS_PERCENT
 
     def check(self, machine: Machine) -> None:
-        """Dry-run every circle, feed-in and feed-out included, against the machine's travel.
+        """Check every circle with feed-in and feed-out against the travel.
 
         Raises:
             TravelError: names test, direction, pose and limit.

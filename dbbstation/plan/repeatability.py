@@ -1,8 +1,7 @@
-"""How well a holder puts its ball back: scatter of the ball's place over repeated mountings, with its uncertainty [CAL III-B].
+"""A holder's repeatability: scatter over mountings, with uncertainty [CAL III-B].
 
-The ball is taken out and put up again n times in each bore, and a CMM measures its centre each time. Within each place the deviations
-from the place's own mean count; sums of squares and degrees of freedom add over places. With f degrees of freedom, f s² / sigma² has
-a chi-square distribution, which gives the interval of sigma [GUM E.4.3].
+n mountings per bore are measured by a CMM. Deviations from each place's mean add squares and freedom f; f s² / sigma² is
+chi-square [GUM E.4.3].
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ FEWEST = 2
 
 @dataclass(frozen=True)
 class Scatter:
-    """A standard deviation from so many degrees of freedom."""
+    """A standard deviation with its freedom."""
 
     s_um: float
     low_um: float
@@ -41,7 +40,7 @@ class Scatter:
 
     @property
     def u_um(self) -> float:
-        """Standard uncertainty of the estimate, s / sqrt(2 f) [GUM E.4.3] [µm]."""
+        """Return the estimate's standard uncertainty, s / sqrt(2 f) [GUM E.4.3] [µm]."""
         return self.s_um / math.sqrt(2.0 * self.freedom)
 
 
@@ -50,12 +49,12 @@ class Repeatability:
     """Scatter of a holder.
 
     Attributes:
-        axes: of x, y and, where it was measured, z.
-        together: of all coordinates, what a holder file states: one standard deviation per axis.
-        rms_distance_um: root mean square of the distance from the mean place, what sigma sqrt(number of axes) estimates [µm].
-        mean_distance_um: mean of that distance, corrected for the mean place that the mountings themselves give [µm].
-        axes_differ: probability of a ratio as great as that of the largest and the smallest variance, if all axes scatter alike.
-        of_cmm_um: standard deviation of the CMM's readings that was taken off [µm].
+        axes: x, y and, if measured, z.
+        together: of all coordinates, for a holder file: one standard deviation per axis.
+        rms_distance_um: from the mean place; estimates sigma sqrt(number of axes).
+        mean_distance_um: corrected for the estimated mean place.
+        axes_differ: probability of so large a variance ratio for equal axes.
+        of_cmm_um: subtracted standard deviation of the CMM.
     """
 
     axes: tuple[Scatter, ...]
@@ -69,12 +68,12 @@ class Repeatability:
 
 
 def repeatability(places_um: Sequence[NDArray[np.float64]], cmm_um: float = 0.0, level: float = LEVEL) -> Repeatability:
-    """Return how well a ball comes back to its place.
+    """Return a holder's repeatability.
 
     Args:
-        places_um: centres over the mountings of one place, shape (n, 2) or (n, 3) each [µm].
-        cmm_um: standard deviation of what the CMM reads of a ball that was not touched [µm]; its variance is taken off.
-        level: probability of the intervals.
+        places_um: centres over one place's mountings, shape (n, 2) or (n, 3) each.
+        cmm_um: standard deviation for an untouched ball, subtracted in variance.
+        level: of the intervals.
 
     Raises:
         ValueError: no place has two mountings.
@@ -102,11 +101,11 @@ def repeatability(places_um: Sequence[NDArray[np.float64]], cmm_um: float = 0.0,
 
 
 def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float = LEVEL) -> Scatter:
-    """Return the standard deviation that a sum of squares shows, and its chi-square interval.
+    """Return the standard deviation of a sum of squares, with chi-square interval.
 
     Args:
-        freedom: degrees of freedom f.
-        cmm_um: standard deviation whose square is taken off the variance and both ends of its interval [µm].
+        freedom: f.
+        cmm_um: subtracted in variance, also from the interval.
     """
     tail = (1.0 - level) / 2.0
     variances = (
@@ -119,7 +118,7 @@ def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float 
 
 
 def _axes_differ(squares: NDArray[np.float64], freedom: int) -> float:
-    """Probability of the greatest ratio of two variances, times the number of pairs [Bonferroni]."""
+    """Return the probability of the greatest variance ratio, times the number of pairs [Bonferroni]."""
     if squares.min() <= 0.0:
         return 1.0 if squares.max() <= 0.0 else 0.0
     pairs = len(squares) * (len(squares) - 1) / 2

@@ -1,4 +1,4 @@
-"""What an instrument that takes so many readings a second sees of a circle at its feed."""
+"""What an instrument's rate shows of a circle."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Sampling:
     """Readings on one turn.
 
     Attributes:
-        points_per_turn: readings while the machine goes once round.
-        highest_undulation: per revolution; what has more looks like something slower, and is not told apart from it.
+        points_per_turn: readings per turn.
+        highest_undulation: per revolution; higher ones alias.
     """
 
     points_per_turn: float
@@ -35,12 +35,12 @@ class Sampling:
 
     @property
     def enough(self) -> bool:
-        """Whether the figures of a circle are seen as far as they go."""
+        """Return whether all figures are resolved."""
         return self.highest_undulation >= UNDULATIONS
 
     @property
     def is_circle(self) -> bool:
-        """Whether there are points enough to take the recording for a circle at all."""
+        """Return whether the points make a circle."""
         return self.points_per_turn >= SMALLEST_POINTS
 
 
@@ -51,9 +51,5 @@ def sampling(circle: Circle, rate_hz: float) -> Sampling:
 
 
 def enough_feed_mm_min(circle: Circle, rate_hz: float) -> float:
-    """Return the greatest feed at which the figures are seen as far as they go [mm/min].
-
-    Args:
-        circle: its radius counts.
-    """
+    """Return the greatest feed with resolved figures [mm/min]."""
     return circle.feed_mm_min * sampling(circle, rate_hz).points_per_turn / (UNDULATIONS * POINTS_PER_UNDULATION)

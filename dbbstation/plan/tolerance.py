@@ -1,4 +1,4 @@
-"""What a circle may have: the shop's limits for the figures of a circle."""
+"""The shop's limits for figures of circles."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ class Tolerance:
 
     Attributes:
         largest_um: greatest size that is within tolerance [µm].
-        tests: names of the tests it holds for; empty for all.
-        directions: senses of travel it holds for; empty for both.
-        upr: cut-off of the filter in undulations per revolution; 0 for none. It acts on the figures in `FILTERED` only.
+        tests: empty for all.
+        directions: empty for both.
+        upr: filter cut-off in undulations per revolution, for figures in `FILTERED`; 0 for none.
     """
 
     figure: CircleFigure
@@ -75,16 +75,16 @@ class Tolerance:
     upr: int = USUAL_UPR
 
     def holds_for(self, test: str, direction: str) -> bool:
-        """Whether a circle of this test and direction has this limit."""
+        """Return whether the limit applies to a test and direction."""
         return (not self.tests or test in self.tests) and (not self.directions or direction in self.directions)
 
 
 @dataclass(frozen=True)
 class Worst:
-    """The circle that comes nearest to a tolerance, or exceeds it most.
+    """The circle nearest to or farthest beyond a tolerance.
 
     Attributes:
-        run: name of the run, such as a-ccw-1.
+        run: such as a-ccw-1.
     """
 
     tolerance: Tolerance
@@ -93,12 +93,12 @@ class Worst:
 
     @property
     def within(self) -> bool:
-        """Whether it is no larger than the limit."""
+        """Return whether it is within the limit."""
         return self.size_um <= self.tolerance.largest_um
 
 
 def worst(tolerance: Tolerance, runs: Iterable[tuple[str, str, int, Mapping[CircleFigure, float]]]) -> Worst | None:
-    """Return the run with the largest figure that a tolerance holds for; None where it holds for none of them.
+    """Return the run with the largest applicable figure, or None.
 
     Args:
         runs: test, direction, repeat and figures [µm] of each.

@@ -1,4 +1,4 @@
-"""Findings about where a circle lies and what it looks like: radius, bore and form, against what was expected."""
+"""Radius, bore and form of a circle against expectation."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ BY_OTHERS = " by the other tests"
 
 
 def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
-    """Mean reading against the expected one.
+    """Judge the mean reading.
 
     Args:
-        expected: what is known of its mean reading; None where nothing is.
-        by_others: whether other tests of the session say so.
+        expected: of its mean reading; None if unknown.
+        by_others: whether the expectation is by other tests.
     """
     if expected is None:
         return undecided(Name.RADIUS, "no expected radius is known", "µm")
@@ -43,7 +43,7 @@ def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = 
 
 
 def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
-    """Centre against the expected one; arguments as of `radius`."""
+    """Judge the centre; arguments as of `radius`."""
     if expected is None:
         return undecided(Name.BORE, "no expected centre is known", "µm")
     if not expected.place_known:
@@ -68,14 +68,13 @@ def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = Fa
 
 
 def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Finding:
-    """Mean, centre, ellipse and triangle together against the expected ones.
+    """Judge mean, centre, ellipse and triangle together.
 
-    A tilt, a plane or a radius that is wrong in both directions alike changes all of them a little, each by less than its limit: the causes that
-    move one of these numbers move the others with it.
+    A wrong tilt, plane or radius in both directions changes all a little, each within its limit.
 
     Args:
-        expected: what is known of its form; None where nothing is.
-        by_others: whether other tests of the session say so.
+        expected: of its form; None if unknown.
+        by_others: whether the expectation is by other tests.
     """
     if expected is None:
         return undecided(Name.FORM, "no expected form is known", "µm")

@@ -1,7 +1,6 @@
-"""Readings that come more than once: a gauge that is asked more often than it has new ones, or rows that are written twice.
+"""Repeated readings: a gauge asked too often, or rows written twice.
 
-Such readings change no figure. Each says as much as one reading, and its time is wrong by up to the time it was kept for: U of what
-many readings determine comes out too small.
+They change no figure, but their times are stale and U comes out too small.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ HARMLESS = 0.19
 
 
 def repeated(raw: RawCircle) -> Finding:
-    """Return how many readings of the turn are the same as the one before, of those that do not stand still for long."""
+    """Judge how many readings repeat the last, apart from long standstills."""
     ends = np.flatnonzero(np.diff(raw.length_mm) != 0.0)
     if not len(ends):
         return undecided(

@@ -1,4 +1,4 @@
-"""Finding about the gauge's scale: what it reads along the feed-in and the feed-out, against the way that was commanded."""
+"""The gauge's scale along feed-in and feed-out."""
 
 from __future__ import annotations
 
@@ -17,16 +17,14 @@ if TYPE_CHECKING:
 
 
 def scale(one: Seen, others: Others) -> Finding:
-    """Return by how much the gauge counts too much along feed-in and feed-out.
+    """Judge the gauge's excess along feed-in and feed-out.
 
-    What a cause does to the way is worked out from what it does to the circle. A cause that acts at a pose, or with time, changes over a
-    way w by w / R of itself, since the machine's errors change over lengths of a bar and more. One that acts along a path acts at the
-    corner, where the machine moves, and not outside, where it stands. Lag and play have the other sign in the other direction: where that was
-    measured, both together are held against a limit in which they cancel. A run that is sound by itself is not
-    spoilt by the other direction, so the lesser of both counts.
+    Effects on the way follow from those on the circle: a cause by pose or time changes over a way w by w / R of itself; a
+    cause along a path acts only in motion, at the corner. Lag and play change sign with direction, so both directions
+    together have a limit in which these cancel. The lesser of both results counts.
 
     Args:
-        others: which run is its other direction.
+        others: names the other direction.
     """
     expected, feed_in_um = one.run.expected, 1e3 * one.run.circle.feed_in_mm
     if one.ways is None:
@@ -58,13 +56,13 @@ def scale(one: Seen, others: Others) -> Finding:
 
 
 def _excess_um(one: Seen) -> float:
-    """By how much feed-in and feed-out, in the mean, read longer than commanded [µm]."""
+    """Return the mean excess of feed-in and feed-out [µm]."""
     assert one.ways is not None  # noqa: S101 - asked before
     return float(np.mean([way.way_um for way in one.ways])) - 1e3 * one.run.circle.feed_in_mm
 
 
 def _u_um(runs: list[tuple[Seen, Expected]]) -> float:
-    """Standard uncertainty of the mean of these by noise and by all causes at their usual or stated size [µm]."""
+    """Return the standard uncertainty of their mean, by noise and all causes at usual or stated size [µm]."""
     noise, effects = 0.0, dict[tuple[str, str], "NDArray[np.float64]"]()
     for one, expected in runs:
         assert one.ways is not None  # noqa: S101 - asked before

@@ -1,4 +1,4 @@
-"""Findings that a run shows by itself, its limits widened by what other runs of its session show."""
+"""Findings of a run by itself, with limits widened by other runs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def lost_samples(one: Seen) -> Finding:
-    """Share of the turn's samples that were lost, against what the plan allows."""
+    """Judge the share of lost samples against the plan."""
     lost, kept = one.lost
     percent = 100.0 * lost / max(lost + kept, 1)
     stated = share_lost(lost, kept, one.unusable) if lost else "no sample is missing on the turn"
@@ -33,7 +33,7 @@ def lost_samples(one: Seen) -> Finding:
 
 
 def noise(one: CircleAnalysis, others: Others) -> Finding:
-    """Noise against that of the other runs."""
+    """Judge noise against other runs."""
     value = max(one.noise.reading_um, LEAST_UM)
     if not one.noise.known:
         return undecided(Name.NOISE, "too few samples to separate noise from form", "µm")
@@ -68,7 +68,7 @@ LARGEST_LOG = float(np.log(1e4))
 
 
 def closure(one: CircleAnalysis, others: Others, expected: Expected | None = None) -> Finding:
-    """End of the turn less its beginning, against noise and what the other runs do."""
+    """Judge end of the turn less its beginning against noise and other runs."""
     if one.closure is None or not one.noise.known:
         return undecided(Name.CLOSURE, "too few samples, at the ends of the turn or to separate noise from form", "µm")
     u = one.closure.u_um
@@ -86,7 +86,7 @@ def closure(one: CircleAnalysis, others: Others, expected: Expected | None = Non
 
 
 def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None) -> Finding:
-    """Second pass of the overlap less the first, against noise, feed and what the other runs do."""
+    """Judge the overlap's second pass less the first against noise, feed and other runs."""
     if one.passes is None:
         return undecided(Name.DRIFT, "the recording was cut to its turn: no place is passed twice", "µm")
     if not one.noise.known:
@@ -107,16 +107,15 @@ def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None)
 
 
 def _left_open_um(expected: Expected | None) -> float:
-    """Drift over a turn that moves the circle's centre by no more than the plan leaves open of the ball's place [µm].
+    """Return the drift that moves the centre no more than the ball's stated uncertainty [µm].
 
-    A drift D, even over the turn, is a sawtooth, whose first harmonic has the amplitude D / pi. Holder and CMM move the same
-    centre by their standard deviation: a smaller drift is no reason to measure again.
+    A steady drift D is a sawtooth, whose first harmonic is D / pi.
     """
     return 0.0 if expected is None else np.pi * expected.place_um
 
 
 def _by_feed_um(one: CircleAnalysis) -> float:
-    """What the second pass comes out different by because it is taken at a slightly wrong feed [µm]."""
+    """Return the second pass's difference by a slightly wrong feed [µm]."""
     if one.feed_mm_min is None:
         return 0.0
     shown, u = one.feed_mm_min
@@ -129,10 +128,10 @@ def _by_feed_um(one: CircleAnalysis) -> float:
 
 
 def _beyond(u: float, freedom: float, others: Sequence[tuple[float, float]]) -> float:
-    """Limit of a value about zero, from its own uncertainty and from what others scatter beyond theirs.
+    """Return the limit of a value about zero, by its uncertainty and the excess scatter of others.
 
     Args:
-        others: value and standard uncertainty of each other run; of few of them nobody knows which is spoilt.
+        others: value and standard uncertainty each; too few are ignored.
     """
     parts = [(u, freedom)]
     if len(others) >= FEWEST_OTHERS:
@@ -151,10 +150,10 @@ scatter is hardly known, would let pass whatever comes."""
 
 
 def feed(one: Seen, others: Others) -> Finding:
-    """Feed that the overlap shows against the programmed one, by the limits that cutting has.
+    """Judge the feed of the overlap by the limits of cutting.
 
-    An overlap that is too round to show it leaves the duration: a control that stops at corners takes longer, by what other runs
-    took, or by `LONGEST_STOP_S` at most. What took longer than that was slower somewhere on its way.
+    If the overlap is too round, the duration counts: stops at corners take as long as in other runs, or at most
+    `LONGEST_STOP_S`.
     """
     if one.feed_mm_min is None:
         return _feed_by_duration(one, others)
@@ -211,14 +210,14 @@ AFTER_OTHER_FEED = (
 
 
 def no_circle(one: Seen) -> tuple[Finding, ...]:
-    """Findings of a recording that shows no circle."""
+    """Return the findings of a recording without circle."""
     whole = Finding(Name.CIRCLE, None, None, "", FindingVerdict.WRONG, one.problem)
     shown = feed(one, Others())
     return (whole, lost_samples(one), *((shown,) if shown.wrong else ()))
 
 
 def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
-    """Everything that needs no knowledge of place or counterpart."""
+    """Return all findings that need no knowledge of place or counterpart."""
     if one.analysis is None:
         return no_circle(one)
     expected = one.run.expected

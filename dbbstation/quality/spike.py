@@ -1,4 +1,4 @@
-"""Single readings that leave the path of their neighbours: a bad contact, a cable, a knock shorter than any bump."""
+"""Single readings off their neighbours: bad contact, cable, short knock."""
 
 from __future__ import annotations
 
@@ -39,16 +39,14 @@ UNEVEN = 1.5
 
 
 def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
-    """Return the reading that leaves its neighbours most, against what chance does to the largest of all.
+    """Judge the reading farthest from its neighbours against chance.
 
-    Each reading is held against the median of the two before and the two behind it. The scatter of these differences is read off
-    their sizes, of the whole turn or of the stretch about the reading, whichever is larger: single spikes do not make it larger.
-    The step in which an instrument reads is added to the limit. Beside reversals of struts, where a machine has spikes of its
-    own, the limit is what the other reversals of the turn show, as for a bump. A sound run of normal readings has a finding with
-    the probability `limits.SHARE`.
+    Each reading is compared with the median of two before and two behind. Their scatter is the larger of the whole turn's
+    and the local one; single spikes do not raise it. The reading step is added to the limit. Near reversals the limit
+    follows from the turn's other reversals. A sound normal run has a finding with probability `limits.SHARE`.
 
     Args:
-        reversals_deg: angles at which struts turn round; none where they are not known [deg].
+        reversals_deg: angles at which struts reverse; may be empty.
     """
     apart, sound = _apart(one.residual_um, one.raw.phi_deg)
     if int(sound.sum()) < LARGEST_BLOCK:
@@ -90,7 +88,7 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
 def _apart(
     values_um: NDArray[np.float64], phi_deg: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Difference of each reading from the median of its neighbours, and whether these lie evenly about it, shape (n,) each."""
+    """Return each reading's distance from its neighbours' median, and whether these lie evenly, shape (n,) each."""
     count = len(values_um)
     apart, sound = np.zeros(count), np.zeros(count, dtype=np.bool_)
     if count <= 2 * BESIDE:
@@ -106,10 +104,10 @@ def _apart(
 
 
 def _scales(apart: NDArray[np.float64], among: NDArray[np.bool_]) -> tuple[NDArray[np.float64], float]:
-    """Standard deviation of the differences about each reading, shape (n,) [µm], and its degrees of freedom.
+    """Return the standard deviation about each reading, shape (n,) [µm], and its freedom.
 
     Args:
-        apart: differences, shape (n,) [µm].
+        apart: shape (n,) [µm].
     """
     count = len(apart)
     whole, _ = scale_of(list(apart[among]))

@@ -1,7 +1,6 @@
-"""What two runs may differ by: what plan, machine file and session state, or what machines usually have.
+"""Allowed difference of two runs by plan, machine file and session, or usual errors.
 
-Runs share causes: the same machine, the same putting-up of a ball, the same bar. What they share cancels in their difference as far
-as it acts alike on both; what each has of its own does not. The covariance of the difference follows [GUM 5.2.2].
+Shared causes cancel as far as they act alike; the covariance of the difference follows [GUM 5.2.2].
 """
 
 from __future__ import annotations
@@ -24,15 +23,15 @@ if TYPE_CHECKING:
 
 
 def apart_by_causes(one: Expected, other: Expected) -> NDArray[np.float64]:
-    """Return the covariance of the difference of two forms by all causes that are known, shape (7, 7) [µm²]."""
+    """Return the covariance of two forms' difference by all known causes, shape (7, 7) [µm²]."""
     return apart_by(one.effects_um, other.effects_um, len(one.form_um))
 
 
 def apart_by(one_um: Effects, other_um: Effects, count: int) -> NDArray[np.float64]:
-    """Return the covariance of the difference of two forms by causes, shape (n, n) [µm²].
+    """Return the covariance of two forms' difference by causes, shape (n, n) [µm²].
 
     Args:
-        one_um: effects of each cause on the one form, shape (n, p) each [µm].
+        one_um: effects of each cause, shape (n, p) each.
     """
     covariance = np.zeros((count, count))
     for key in dict.fromkeys([*one_um, *other_um]):
@@ -47,9 +46,9 @@ def apart_by(one_um: Effects, other_um: Effects, count: int) -> NDArray[np.float
 
 
 def covariance_apart(one: Seen, other: Seen) -> NDArray[np.float64] | None:
-    """Return the covariance of the difference of two runs of one circle, noise included, shape (7, 7) [µm²].
+    """Return the covariance of the difference of two runs of one circle with noise, shape (7, 7) [µm²].
 
-    The place of a ball is known no better than its plan states: what moves the form by less does not count against a run.
+    Smaller moves than the ball's stated uncertainty do not count.
 
     Returns:
         None where nothing is known of one of them.
@@ -63,7 +62,7 @@ def covariance_apart(one: Seen, other: Seen) -> NDArray[np.float64] | None:
 
 
 def sigmas_apart(one: Seen, other: Seen) -> float | None:
-    """Return how far two runs of one circle differ, in standard deviations of what is stated; None where nothing is."""
+    """Return the difference of two runs in stated standard deviations, or None."""
     covariance = covariance_apart(one, other)
     if covariance is None:
         return None
@@ -72,7 +71,7 @@ def sigmas_apart(one: Seen, other: Seen) -> float | None:
 
 
 def drifted_um(one: Seen, other: Seen) -> float:
-    """Standard deviation of what the mean reading grew by from one run to the other, if it went on as on their turns [µm]."""
+    """Return the drift of the mean reading between two runs, extrapolated from their turns, one standard deviation [µm]."""
     if one.run.started_s is None or other.run.started_s is None:
         return 0.0
     rate = float(np.sqrt(0.5 * (one.drift_um_s**2 + other.drift_um_s**2)))
@@ -80,7 +79,7 @@ def drifted_um(one: Seen, other: Seen) -> float:
 
 
 def unseen_um2(one: Seen, other: Seen) -> float:
-    """Variance of each coefficient of the difference by noise and by what the plan leaves open of the ball's place [µm²]."""
+    """Return each coefficient's variance by noise and the ball's stated uncertainty [µm²]."""
     expected = one.run.expected
     place_um = 0.0 if expected is None else expected.place_um
     # A shift d moves two coefficients, by d / sqrt 2 each.
@@ -88,10 +87,10 @@ def unseen_um2(one: Seen, other: Seen) -> float:
 
 
 def limit_along(covariance: NDArray[np.float64], off: NDArray[np.float64]) -> float:
-    """Return how long a sound vector may be in the direction of `off`: the ellipsoid that it leaves with probability SHARE.
+    """Return the limit of a sound vector in the direction of `off`: its ellipsoid with probability SHARE.
 
     Args:
-        covariance: of a sound vector, shape (n, n).
+        covariance: shape (n, n).
         off: shape (n,).
     """
     size = float(np.linalg.norm(off))
@@ -100,12 +99,12 @@ def limit_along(covariance: NDArray[np.float64], off: NDArray[np.float64]) -> fl
 
 
 def limit_of_length(covariance: NDArray[np.float64]) -> float:
-    """Return how long a sound vector may be in whatever direction [Box, Ann. Math. Stat. 25 (1954) 290].
+    """Return the limit of a sound vector's length [Box, Ann. Math. Stat. 25 (1954) 290].
 
-    The square of its length is taken as a scaled chi-square variable of the same mean and variance.
+    Its square is taken as a scaled chi-square variable of equal mean and variance.
 
     Args:
-        covariance: of a sound vector, shape (n, n).
+        covariance: shape (n, n).
     """
     trace, squares = float(np.trace(covariance)), float(np.sum(covariance**2))
     return scaled_length_quantile(trace**2 / squares) * float(np.sqrt(squares / trace)) if trace > 0.0 else 0.0

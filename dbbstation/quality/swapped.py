@@ -1,10 +1,8 @@
-"""Whether a run shows the circle of its own test, or that of another: wrong bore, height, tilt, start or direction of the program.
+"""Whether a run shows another test's circle: wrong bore, height, tilt, start or direction.
 
-A bar reads a length and no place: the circle of another test looks as sound as its own. Two explanations of the same readings
-are compared by their likelihoods, which are normal: the run is its own circle, whose form is uncertain by all that is uncertain of
-machine and set-up; or it is the circle of another test, which a run of that test or a model shows. The chance that a sound run
-favours another explanation by a factor of f or more is 1 / f at the most [Markov's inequality], whatever the number of dimensions;
-it is less by far, so that the bound may be the probability of any finding.
+A bar reads no place. Likelihoods compare two normal explanations: the own circle with all uncertainties, or another
+test's, by its run or a model. A sound run favours another by f with a chance of at most 1 / f [Markov's inequality], in
+any dimension and usually far less.
 """
 
 from __future__ import annotations
@@ -42,7 +40,7 @@ class _Explained:
 
 
 def of_its_test(one: Seen, both: Together | None) -> Finding:
-    """Return whether another circle of the plan explains the readings better than the circle of the run's own test."""
+    """Judge whether another circle of the plan explains the readings better."""
     every = [*_measured(one, both), *_predicted(one)]
     if not every:
         return undecided(
@@ -69,7 +67,7 @@ def of_its_test(one: Seen, both: Together | None) -> Finding:
 
 
 def _measured(one: Seen, both: Together | None) -> Iterator[_Explained]:
-    """Circles of other tests that were measured; what they show of the machine says what the run's own circle should look like."""
+    """Judge by measured circles of other tests."""
     if both is None:
         return
     as_own, without = both.log_likelihoods()
@@ -112,7 +110,7 @@ def _predicted(one: Seen) -> Iterator[_Explained]:
 def _density(
     off: NDArray[np.float64], covariance: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the logarithm of normal densities, without the constant that all have, and squares of distances.
+    """Return log normal densities without the common constant, and squared distances.
 
     Args:
         off: shape (..., 7).
@@ -127,7 +125,7 @@ def _near(square: float) -> bool:
 
 
 def _whole(expected: Expected, circle: Circle) -> NDArray[np.float64]:
-    """Covariance of a form along its travel by all causes."""
+    """Return a form's covariance along its travel by all causes."""
     effects = np.hstack([np.zeros((COEFFICIENTS, 1)), *expected.effects_um.values()])
     effects = along_travel(circle)[:, None] * effects
     return effects @ effects.T

@@ -1,8 +1,7 @@
-"""A run and those of other tests, as one normal variable: what all of them show of the machine, and where this circle should lie then.
+"""A run and those of other tests as one normal variable, and this circle's expectation.
 
-Circles of one machine share its causes. What the circles of other tests read is therefore also known of this one, as far as the same
-causes act on both: the conditional mean and covariance of a normal variable [Rasmussen and Williams, Gaussian Processes for Machine
-Learning (2006), eq. 2.23 and 2.24]. How large this machine's errors are beside their usual size nobody knows; the other runs say it.
+Circles share the machine's causes. The others' readings therefore condition this one [Rasmussen and Williams, Gaussian
+Processes for Machine Learning (2006), eq. 2.23 and 2.24]. They also show the size of this machine's errors.
 """
 
 from __future__ import annotations
@@ -54,7 +53,7 @@ class Together:
 
 
 def together(one: Seen, runs: Sequence[Seen], forms: Forms) -> Together | None:
-    """Return a run beside the runs of other tests; None where nothing is known of it, or no other test was measured.
+    """Return a run beside other tests; None without knowledge or others.
 
     Args:
         one: the run.
@@ -76,14 +75,13 @@ def together(one: Seen, runs: Sequence[Seen], forms: Forms) -> Together | None:
 
 
 def expected_beside(both: Together | None) -> Expected | None:
-    """Return where the circle of the first run should lie, by what the runs of other tests show.
+    """Return the first run's expected circle given the others.
 
-    The sizes of the machine's errors are weighed by the likelihood of the other runs. Where these differ from one another by more
-    than they should, each test held against the rest [R. and W., section 5.4.2], the covariance grows with them: a machine may have
-    causes that nobody named.
+    Sizes of machine errors are weighed by likelihood. If the others disagree, each test against the rest [R. and W.,
+    section 5.4.2], the covariance grows, since causes may be missing.
 
     Args:
-        both: the runs; None gives None.
+        both: None gives None.
     """
     if both is None or (own := both.runs[0].run.expected) is None:
         return None
@@ -99,7 +97,7 @@ def expected_beside(both: Together | None) -> Expected | None:
 
 
 def _straying(both: Together, size: int) -> float:
-    """By how many times more than they should the other tests differ from what the rest of them show; one at the least."""
+    """Return the factor by which other tests disagree with the rest, at least one."""
     if len(both.rows) < FEWEST_OTHERS:
         return 1.0
     lengths = [both.others.length_without(size, rows) / median_length(len(rows)) for rows in both.rows.values()]
@@ -109,7 +107,7 @@ def _straying(both: Together, size: int) -> float:
 def _placed(
     own: Expected, circle: Circle, more_um: NDArray[np.float64], covariance_um2: NDArray[np.float64]
 ) -> Expected:
-    """Return an expectation whose form, centre and mean reading are moved by a form along the travel [µm]."""
+    """Return an expectation with form, centre and mean moved by a form along the travel [µm]."""
     start = np.radians(circle.start_deg)
     # A shift d along the bar at the start is sqrt 2 of a cosine's coefficient; a raised bar sees cos e of it.
     along = np.sqrt(2.0) * circle.bar_mm / circle.radius_mm
@@ -131,12 +129,12 @@ def _placed(
 
 
 def read_um(one: Seen) -> NDArray[np.float64]:
-    """Return coefficients of the readings themselves, along the travel: bars and circles of another length are distinguished by the mean."""
+    """Return coefficients of the readings along the travel; their mean shows other lengths."""
     return along_travel(one.run.circle) * one.coefficients_um + _length_um(one.run.circle)
 
 
 def expected_um(one: Run | Planned) -> NDArray[np.float64]:
-    """Return the same as expected without other runs."""
+    """Return the same expected without other runs."""
     form = np.zeros(COEFFICIENTS) if one.expected is None else one.expected.form_um
     return along_travel(one.circle) * form + _length_um(one.circle)
 

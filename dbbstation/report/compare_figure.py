@@ -43,7 +43,6 @@ def compare_figure(found: Comparison, wanted: FigureFormat | Stamped = FigureFor
 
 
 def _worst(found: Comparison) -> list[RunDifference]:
-    """The runs that differ most, one of each test."""
     by_test: dict[str, RunDifference] = {}
     for run in sorted(found.runs, key=lambda run: (-float(np.sum(run.found_mm**2)), -run.rms_mm)):
         by_test.setdefault(run.pair.test, run)
@@ -66,7 +65,6 @@ def _map(axes: Axes, found: Comparison, tests: list[tuple[str, int]], direction:
 
 
 def _overlay(readings: Axes, differences: Axes, run: RunDifference) -> None:
-    """Both readings about the commanded circle, and under them what they differ by."""
     theta = run.pair.theta_deg
     readings.plot(theta, 1e3 * run.pair.a_mm, color=COLOUR_A, linewidth=1.0, label="A")
     readings.plot(theta, 1e3 * run.pair.b_mm, color=COLOUR_B, linewidth=1.0, label="B")

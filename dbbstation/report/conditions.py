@@ -23,7 +23,6 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
     """Return name and value of each condition; what nobody noted is said to be not noted.
 
     Args:
-        session: the session.
         circles: its runs that are shown, of which dates and temperatures are given.
         job: what it was measured for, as typed; empty: what the session says.
     """
@@ -109,7 +108,6 @@ def _bar(bar: Bar | None, waiver: str) -> tuple[tuple[str, str], ...]:
 
 
 def _shop(session: SessionFolder) -> str:
-    """Temperature before, and after the last run where it was noted then."""
     before = _degc(session.ambient_temp_c)
     last = max((run.started for run in session.runs if run.started is not None), default=None)
     after = [

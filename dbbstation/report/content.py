@@ -49,7 +49,6 @@ class Modelled:
     """A model beside the circles.
 
     Attributes:
-        identified: the model.
         evaluation: what it leaves; None where that could not be worked out.
         problem: why it could not; empty where it could.
     """
@@ -65,9 +64,7 @@ class Reported:
 
     Attributes:
         found: circles as measured, with findings.
-        chosen: filter of their figures.
         settings: of the shop, with its tolerances.
-        coverage_factor: k of U = k u.
         before: circles measured before; None where none are given.
         modelled: a model beside them; None where none is given.
         job: what was measured for; empty where not said.
@@ -90,7 +87,6 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
     """Return the numbers of a report: what its command prints as JSON, and its template shows.
 
     Args:
-        reported: what goes into it.
         page: file that it is written to.
     """
     tolerances, coverage_factor = reported.settings.tolerances, reported.coverage_factor
@@ -133,13 +129,7 @@ def certified_of(reported: Reported) -> Certified:
 
 
 def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance) -> ReportContent:
-    """Return what the template of a report names beside its numbers.
-
-    Args:
-        reported: what goes into it.
-        numbers: what `numbers_of` returns of it.
-        provenance: where it comes from.
-    """
+    """Return what the template of a report names beside its numbers."""
     found, modelled = reported.found, reported.modelled
     bad = {one.worst.test for one in numbers.tolerances if one.worst is not None and not one.within}
     bad |= {one.entry.test for one in found.circles if one.problem or (one.judgement and one.judgement.wrong)}
@@ -201,7 +191,6 @@ def _ranking(reported: Reported) -> ShownCauses | None:
 
 
 def _notes_before(reported: Reported) -> list[str]:
-    """Return remarks on the circles before: whether they are of another machine, first of all."""
     if reported.before is None:
         return []
     one, other = reported.before.sessions[0].machine, reported.found.sessions[0].machine
@@ -246,7 +235,6 @@ def _findings(found: Circled) -> ShownFindings:
 
 
 def _budgets(circles: CirclesResult) -> Iterable[tuple[str, Budget]]:
-    """Yield the name and the budget of every figure."""
     for one in (*circles.runs, *circles.pairs):
         if not isinstance(one, RunWithoutCircle):
             yield from one.uncertainty.items()
@@ -257,7 +245,6 @@ def _not_stated(circles: CirclesResult) -> list[str]:
 
 
 def _why_not(circles: CirclesResult) -> list[str]:
-    """Return why figures have no uncertainty, with their names."""
     of: dict[str, dict[str, None]] = {}
     for figure, budget in _budgets(circles):
         if budget.why_not:

@@ -57,9 +57,6 @@ def draw_maps(panels: Sequence[Axes], titles: Sequence[str], maps: Sequence[Resi
     """Draw maps side by side, both directions of each, with one scale whose zero is white.
 
     Args:
-        panels: two for each map.
-        titles: one for each map.
-        maps: of the same tests.
         noise_um: of one reading: the scale reaches that far at least, so that noise does not shout [µm].
     """
     reach = max(noise_um, *(one.reach_um for one in maps))

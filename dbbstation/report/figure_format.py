@@ -31,7 +31,6 @@ class Stamped:
     """A format together with where the figure comes from.
 
     Attributes:
-        format: of the file.
         provenance: kept in the metadata of the file.
     """
 
@@ -48,7 +47,6 @@ def in_format(figure: Figure, wanted: FigureFormat | Stamped) -> bytes:
     """Return the figure's bytes: the same for the same figure and provenance, without a date.
 
     Args:
-        figure: what was drawn.
         wanted: format, with where the figure comes from; that goes into the metadata that the format has for it.
     """
     kind = wanted.format if isinstance(wanted, Stamped) else wanted

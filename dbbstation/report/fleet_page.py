@@ -30,7 +30,6 @@ class MachineRow:
         name: serial number, or the name in its machine file.
         session: that is shown: the last one that was done, or one that failed.
         others: how many further sessions it has.
-        unlike: values that are unlike, the greatest score first.
         marks: places of the scores of the others on the strip.
         marked: places of those that are unlike.
         words: the strip, for those who do not see it.
@@ -46,12 +45,7 @@ class MachineRow:
 
 
 def fleet_html(result: FleetResult, provenance: Provenance) -> bytes:
-    """Return a fleet as HTML: one file without script; it links only to results that lie beside it.
-
-    Args:
-        result: of the fleet.
-        provenance: where it comes from.
-    """
+    """Return a fleet as HTML: one file without script; it links only to results that lie beside it."""
     machines: dict[str, list[FleetSession]] = {}
     for session in result.sessions:
         machines.setdefault(session.machine or session.session, []).append(session)

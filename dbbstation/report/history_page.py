@@ -56,15 +56,9 @@ class Drawing:
     """One quantity over time as what an SVG needs.
 
     Attributes:
-        name: of the quantity.
-        ident: of the drawing in the page.
         points: one short stroke for each value, round.
-        bars: U of each value, up and down.
         levels: of the stretches between changes.
         limits: heights of the limits inside the field.
-        dates: ticks in time.
-        heights: ticks of the value.
-        events: what changed.
         words: what it shows, for those who do not see it.
     """
 
@@ -84,8 +78,6 @@ def history_html(history: HistoryResult, provenance: Provenance, tolerances_from
     """Return histories as HTML: one file without script that refers to nothing outside it, the same for the same content.
 
     Args:
-        history: of all machines.
-        provenance: where it comes from.
         tolerances_from: file with the shop's tolerances; empty where there is none.
     """
     k = history.coverage_factor
@@ -115,13 +107,7 @@ def history_html(history: HistoryResult, provenance: Provenance, tolerances_from
 
 
 def draw(one: QuantityHistory, ident: str, coverage_factor: float) -> Drawing:
-    """Return the drawing of one quantity.
-
-    Args:
-        one: the quantity, with at least one value.
-        ident: of the drawing in the page.
-        coverage_factor: k of U = k u.
-    """
+    """Return the drawing of one quantity."""
     values = one.values
     days = [datetime.fromisoformat(value.started or "").timestamp() / _DAY_S for value in values]
     x = _scale(min(days), max(days), LEFT + 6.0, WIDTH - RIGHT - 6.0)
@@ -172,7 +158,6 @@ def _reach(values: Sequence[HistoryValue], k: float, limit: float | None) -> tup
 def _levels(
     values: Sequence[HistoryValue], at: Mapping[str, tuple[float, float]], y: Callable[[float], float]
 ) -> Iterable[str]:
-    """Yield a stroke for each stretch with one level."""
     stretch: list[tuple[float, float]] = []
     for session, level in (*((value.session, value.level) for value in values), ("", None)):
         if stretch and (level is None or level != stretch[0][1]):

@@ -25,9 +25,7 @@ def rounded(value: float | None, u: float | None, coverage_factor: float) -> str
     """Return a number with as many decimals as its uncertainty gives a meaning: one, or two digits of a smaller U.
 
     Args:
-        value: the number.
         u: its standard uncertainty; None where not known.
-        coverage_factor: k of U = k u.
     """
     if value is None:
         return DASH
@@ -64,12 +62,7 @@ def headline(machine: MachineHistoryResult) -> str:
 
 
 def changes_in_words(machine: MachineHistoryResult, coverage_factor: float) -> Iterator[str]:
-    """Yield what changed on a machine: one line for each session that showed something, with its largest quantities.
-
-    Args:
-        machine: its history.
-        coverage_factor: k of U = k u.
-    """
+    """Yield what changed on a machine: one line for each session that showed something, with its largest quantities."""
     for change in machine.changes:
         found, since = change.found, change.since
         when = f"{found.name} ({found.date})"
@@ -86,14 +79,7 @@ def changed_in_words(one: ChangedQuantity, coverage_factor: float) -> str:
 
 
 def difference_in_words(difference: float, u: float, unit: str, coverage_factor: float) -> str:
-    """Return a difference with its sign, U and unit.
-
-    Args:
-        difference: in `unit`.
-        u: its standard uncertainty.
-        unit: of both.
-        coverage_factor: k of U = k u.
-    """
+    """Return a difference with its sign, U and unit."""
     value = rounded(difference, u, coverage_factor)
     sign = "" if value.startswith("-") else "+"
     return f"{sign}{value} {unit} (U {rounded(coverage_factor * u, u, coverage_factor)})"

@@ -24,7 +24,6 @@ def report_html(numbers: ReportResult, content: ReportContent) -> bytes:
     page runs no other script, whatever people typed.
 
     Args:
-        numbers: of the report.
         content: what the page shows beside them.
     """
     script = files("dbbstation.report").joinpath("templates", "polar.js").read_text("utf-8").strip()

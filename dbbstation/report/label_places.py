@@ -63,7 +63,6 @@ def place_labels(
         anchors: places that the labels belong to [inch].
         sizes: width and height of each label [inch].
         within: what labels must not leave.
-        keep_off: what they must not cover.
 
     Returns:
         A box for each; None where no room is left for it.

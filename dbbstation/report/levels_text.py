@@ -24,7 +24,6 @@ def level_sentences(levels: Levels, unit: str) -> list[str]:
     """Sentences of an answer: whether anything differs, what it follows and which law it is, and whether to correct.
 
     Args:
-        levels: the answer.
         unit: of measured and simulated values; empty where it has none.
     """
     found = [*_difference(levels.differs, unit)]

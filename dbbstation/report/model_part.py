@@ -12,12 +12,7 @@ if TYPE_CHECKING:
 
 
 def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tuple[str, str, str, str, str], ...]:
-    """Return source, parameter, value, U and unit of every parameter of the machine; U is a dash where it is not known.
-
-    Args:
-        identified: the model.
-        coverage_factor: k of U = k u.
-    """
+    """Return source, parameter, value, U and unit of every parameter of the machine; U is a dash where it is not known."""
     u = identified.uncertainties
     rows = []
     for fitted in identified.model.sources:
@@ -32,11 +27,7 @@ def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tup
 
 
 def quality_of_fit(identified: IdentifiedModel) -> str:
-    """Return what the fit of a model left beside the noise of its readings, in words; empty where the model does not say.
-
-    Args:
-        identified: the model.
-    """
+    """Return what the fit of a model left beside the noise of its readings, in words; empty where the model does not say."""
     report = identified.report
     keys = ("nominal_rms_um", "residual_within_mounting_rms_um", "noise_um")
     nominal, left, noise = (report.get(key) for key in keys)

@@ -45,10 +45,6 @@ def chromium() -> str:
 def printed(html: bytes, browser: str) -> bytes:
     """Return a report as PDF.
 
-    Args:
-        html: the report.
-        browser: what `chromium` returns.
-
     Raises:
         StationError: the browser fails, with what it said last.
     """

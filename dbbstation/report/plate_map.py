@@ -24,10 +24,7 @@ class MapPlace:
     """Where balls stand, one above another.
 
     Attributes:
-        x: on the map.
-        y: on the map.
         label: bore, or X and Y where there is none.
-        tests: names of the tests there.
         marked: whether one of them needs attention.
     """
 
@@ -42,7 +39,6 @@ def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tupl
     """Return the places of tests; +X is to the right, +Y up.
 
     Args:
-        tests: by name; at least one.
         marked: names of those that need attention.
     """
     at: dict[tuple[int, int], list[PlannedTest]] = {}

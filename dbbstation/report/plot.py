@@ -63,10 +63,7 @@ class PlotPanel:
     """Runs that are drawn in one picture: both directions of one test in one session.
 
     Attributes:
-        session: its name.
-        test: its name.
         drawn: runs in drawing order, each with whether it is thin.
-        not_drawn: repeats that are left out.
     """
 
     session: str
@@ -82,7 +79,6 @@ class Plotted:
     Attributes:
         kind: what is shown of the circles.
         found: the circles, of one or more sessions.
-        chosen: filter of their figures.
         program: name and version of the program that draws.
     """
 
@@ -122,11 +118,7 @@ class Plotted:
         return [one for panel in self.panels() for one, _ in panel.drawn]
 
     def result(self, figure: str) -> PlotResult:
-        """Return what the figure shows: what its command prints as JSON.
-
-        Args:
-            figure: its file.
-        """
+        """Return what the figure shows: what its command prints as JSON."""
         panels = self.panels()
         return PlotResult(
             figure=figure,
@@ -260,7 +252,6 @@ def _keys(plotted: Plotted, panels: Sequence[PlotPanel]) -> list[Key]:
 
 
 def _title_block(plotted: Plotted, panels: Sequence[PlotPanel]) -> list[list[Cell]]:
-    """Rows of the title block: one for each session, and one for what was drawn."""
     rows = []
     for session in plotted.found.sessions:
         of = [one for one in plotted.on_sheet() if one.session == session.name]

@@ -37,8 +37,6 @@ def draw_map(
     """Draw the balls of tests and the mean centre of the circles about each; +X is to the right, +Y up.
 
     Args:
-        sheet: to draw on.
-        box: to draw in.
         name: of the panel; empty for none.
         tests: of the plan, by name.
         circles: of one session, with figures.

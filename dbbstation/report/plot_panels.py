@@ -41,9 +41,6 @@ def draw_polar(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn], reach_
     """Draw traces about their least-squares circles; rings are one division apart.
 
     Args:
-        sheet: to draw on.
-        box: to draw in.
-        name: of the panel.
         drawn: runs with figures.
         reach_um: deviation that reaches as far as a trace may; None for the greatest of these [µm].
     """
@@ -91,14 +88,7 @@ def draw_deviation(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) ->
 
 
 def draw_together(sheet: Sheet, box: Box, name: str, runs: Mapping[str, Sequence[MeasuredCircle]]) -> None:
-    """Draw the runs of several sessions over the angle, a colour for each session.
-
-    Args:
-        sheet: to draw on.
-        box: to draw in.
-        name: of the panel.
-        runs: by session.
-    """
+    """Draw the runs of several sessions over the angle, a colour for each session."""
     axes = _chart(sheet, box, [name], "deviation, µm")
     for colour, (session, of) in zip(_colours(len(runs)), runs.items(), strict=True):
         for k, one in enumerate(of):
@@ -143,7 +133,6 @@ def draw_spectrum(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) -> 
 
 
 def _chart(sheet: Sheet, box: Box, lines: Sequence[str], unit: str) -> Axes:
-    """Axes with a caption above and room for numbers."""
     top = _caption(sheet, box, lines)
     axes = sheet.axes(
         Box(box.left + _SIDE_IN, box.bottom + _FOOT_IN, box.width - _SIDE_IN - 0.12, top - box.bottom - _FOOT_IN - 0.05)

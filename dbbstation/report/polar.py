@@ -44,7 +44,6 @@ class PolarTrace:
     Attributes:
         points: of the path, as SVG takes them.
         direction: `ccw` or `cw`.
-        former: whether it was measured before.
         thin: whether it is a repeat of one that is drawn already.
         name: of the run, in few letters.
         title: what is shown where the pointer rests on it.
@@ -68,7 +67,6 @@ class Drawn:
         direction: `ccw` or `cw`.
         name: in few letters.
         title: what is shown where the pointer rests on it.
-        former: whether it is drawn in grey.
         thin: whether it is a repeat of one that is drawn already.
     """
 
@@ -83,12 +81,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Ring:
-    """A circle of equal deviation.
-
-    Attributes:
-        radius: in units of the figure.
-        um: deviation [µm].
-    """
+    """A circle of equal deviation."""
 
     radius: float
     um: float
@@ -104,13 +97,9 @@ class Polar:
     """The circles of one test.
 
     Attributes:
-        test: its name.
-        what: the circle in words.
         traces: in drawing order.
         rings: nominal circle and one division either way.
-        step_um: of a division [µm].
         scale: units of the figure per µm.
-        not_drawn: repeats that are left out.
     """
 
     test: str
@@ -126,9 +115,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
     """Return the circles of a test about their least-squares centres, before and now to one scale.
 
     Args:
-        test: its name.
         now: its runs with figures, in the order in which they were measured; at least one.
-        before: the same, measured before.
     """
     drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in chosen(runs)]
     analysed = [(one, one.analysis, former, thin) for one, former, thin in drawn if one.analysis is not None]
@@ -151,10 +138,7 @@ def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int =
     """Return any paths of one circle to one scale.
 
     Args:
-        test: its name.
-        circle: as commanded.
         paths: in drawing order; at least one.
-        not_drawn: repeats that are left out.
     """
     most_um = max(float(np.abs(one.deviation_um).max()) for one in paths)
     scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
@@ -194,7 +178,6 @@ def chosen(runs: Sequence[MeasuredCircle], most: int = MOST_DRAWN) -> list[tuple
 
     Args:
         runs: of one test, in the order in which they were measured.
-        most: of one direction.
     """
     drawn: list[tuple[MeasuredCircle, bool]] = []
     for direction in dict.fromkeys(one.entry.direction for one in runs):

@@ -39,8 +39,6 @@ class Cell:
     """One cell of a title block.
 
     Attributes:
-        name: what it holds.
-        value: that, as one text.
         share: of the sheet's width, beside the other cells of its row.
     """
 
@@ -73,9 +71,6 @@ class Sheet:
         Args:
             width_in: of the sheet [inch].
             room_in: height that the panels take [inch].
-            title: of the sheet.
-            keys: of its legend.
-            block: rows of its title block.
         """
         self.width_in = width_in
         self.inner_in = width_in - 2.0 * MARGIN_IN
@@ -149,7 +144,6 @@ def wrapped(text: str, size_pt: float, width_in: float, most: int) -> list[str]:
         text: of one paragraph; white space of any kind is a space.
         size_pt: of its letters [pt].
         width_in: of the lines [inch].
-        most: lines.
     """
     rest, lines = " ".join(text.split()), list[str]()
     while rest and len(lines) < most:
@@ -165,7 +159,6 @@ def wrapped(text: str, size_pt: float, width_in: float, most: int) -> list[str]:
 
 
 def _fitting(text: str, size_pt: float, width_in: float) -> int:
-    """How many letters of a text fit into a width, one at the least."""
     low, high = 1, len(text)
     while low < high:
         middle = (low + high + 1) // 2
@@ -174,7 +167,6 @@ def _fitting(text: str, size_pt: float, width_in: float) -> int:
 
 
 def _rows(keys: Sequence[Key], width_in: float) -> list[list[tuple[float, Key]]]:
-    """Entries of a legend in rows, each with where it begins."""
     rows: list[list[tuple[float, Key]]] = []
     x = 0.0
     for key in keys:

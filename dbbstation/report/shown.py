@@ -19,11 +19,7 @@ class ShownSession:
     """A session as the page shows it.
 
     Attributes:
-        name: of its folder.
-        measured: when, in words.
         identity: what machine, bar and the like are, each with its name.
-        conditions: each with its name.
-        places: of the balls, on the map.
         known: whether the places of the balls are.
     """
 
@@ -42,7 +38,6 @@ class ShownCauses:
     Attributes:
         session: whose circles they act on.
         why_not: why there are none; empty where there are.
-        rows: of their table.
         polars: circles without the first cause.
     """
 
@@ -74,9 +69,7 @@ class ShownModel:
     Attributes:
         problem: why it could not be evaluated; empty where it could.
         failed: whether physics is missing from it.
-        quality: of its fit.
         parameters: rows of their table.
-        not_visible: what its recordings could not see.
     """
 
     problem: str
@@ -91,26 +84,13 @@ class ReportContent:
     """What the template of a report names beside its numbers.
 
     Attributes:
-        machine: its name.
         virtual: names of sessions of a virtual machine.
-        job: what was measured for.
-        sessions: that have circles.
         reasons_shown: how many reasons of the verdict the first page has.
-        map_width: of the map, in its own units.
-        polar_size: of a polar trace, in its own units.
-        polar_radius: of the circle in it.
-        polars: of every test.
         ranking: causes; None without a model.
         before_name: session that was measured before; empty for none.
         several: whether there is more than one session.
-        findings: of all runs.
-        not_stated: causes that are in no U.
-        why_not: why figures have no U.
-        tolerances_from: file of the tolerances.
         modelled: a model beside the circles; None for none.
-        notes: remarks.
         files: name and SHA-256 of every file that the report rests on.
-        provenance: where it comes from.
     """
 
     machine: str

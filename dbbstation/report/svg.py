@@ -29,7 +29,6 @@ def as_svg(figure: Figure, metadata: Mapping[str, Any] | None = None) -> bytes:
     memory happens to lie; clipping frames, whose names are hashes of all digits, are therefore counted in their order.
 
     Args:
-        figure: what was drawn.
         metadata: as Matplotlib takes it for SVG: names of Dublin Core.
     """
     out = io.BytesIO()

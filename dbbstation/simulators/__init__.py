@@ -1,1 +1,1 @@
-"""Simulators of the user: read from their files, run in processes of their own, written out as code."""
+"""Users' simulators: read, run in processes, written as code."""

@@ -1,4 +1,4 @@
-"""Terms that were found as Python code to paste into the simulator."""
+"""Found terms as Python code for the simulator."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _LATE = """    times, values = before or ([], [])
 
 
 def missing_code(answer: SimulatorComparison) -> str:
-    """Text of a Python module with a function for each term: `value(t, signals)`, or with a state for those with a memory."""
+    """Return a Python module with a function per term: `value(t, signals)`, or with a state."""
     lines = [
         f'"""What {answer.model.name} lacks, as found from its recordings. Add each term at its port."""',
         "",
@@ -120,7 +120,7 @@ POINTS = 41
 
 
 def _body(term: Term, a: str, shape: str) -> str:
-    """Body of a term with a memory; empty for the others."""
+    """Return the body of a term with memory; else empty."""
     if term.form is TermForm.MEMORY:
         return _BEHIND.format(tau=shape, out=f"{a} * (x + behind)")
     if term.form is TermForm.LAG:

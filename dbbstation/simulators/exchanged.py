@@ -1,7 +1,7 @@
-"""Simulators that are no Python class: they take what acts at their ports as inputs, and return the signals there.
+"""Simulators that take port inputs and return port signals.
 
-A term that follows the simulated state is then found by rounds: simulate, evaluate the term over the signals that came back, simulate
-with that, until it changes no more [waveform relaxation; Lelarasmee, Ruehli and Sangiovanni-Vincentelli, IEEE Trans. CAD 1 (1982) 131].
+Terms of the simulated state are found by iteration [waveform relaxation; Lelarasmee, Ruehli and Sangiovanni-Vincentelli,
+IEEE Trans. CAD 1 (1982) 131].
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class ExchangedSimulator(Simulator):
     """A simulator that takes what acts at its ports as inputs.
 
     Args:
-        ports: names of the signals at each port, by its name.
+        ports: signal names by port.
     """
 
     def __init__(self, ports: Mapping[str, tuple[str, ...]], outputs: tuple[str, ...]) -> None:
@@ -45,7 +45,7 @@ class ExchangedSimulator(Simulator):
     @property
     @abstractmethod
     def said(self) -> str:
-        """What it is called where it fails."""
+        """Return its name for failures."""
 
     @abstractmethod
     def simulate_once(
@@ -54,12 +54,12 @@ class ExchangedSimulator(Simulator):
         parameters: Mapping[str, float],
         acting: Mapping[str, NDArray[np.float64]],
     ) -> Mapping[str, NDArray[np.float64]]:
-        """Return outputs by name, and signals as `port.signal`, shape (n,), where something acts at the ports, shape (n,)."""
+        """Return outputs by name, and signals as `port.signal`, shape (n,), for inputs at the ports, shape (n,)."""
 
     def simulate(
         self, inputs: Mapping[str, NDArray[np.float64]], parameters: Mapping[str, float], ports: Ports
     ) -> Mapping[str, NDArray[np.float64]]:
-        """Simulate until what acts at the ports and the signals there agree."""
+        """Simulate until port inputs and signals agree."""
         t = inputs["t"]
         acting = {name: np.zeros(len(t)) for name in self._ports}
         first = 0.0
@@ -80,7 +80,7 @@ class ExchangedSimulator(Simulator):
     def _acts(
         self, name: str, t: NDArray[np.float64], found: Mapping[str, NDArray[np.float64]], ports: Ports
     ) -> NDArray[np.float64]:
-        """What acts at a port where the signals are these, shape (n,)."""
+        """Return the input of a port for these signals, shape (n,)."""
         signals = {}
         for signal in self._ports[name]:
             values = found.get(f"{name}.{signal}")

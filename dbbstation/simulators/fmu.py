@@ -1,6 +1,6 @@
-"""A simulator that is an FMU (FMI 2 or 3), run by FMPy, which is an extra of the installation.
+"""A simulator as FMU (FMI 2 or 3), run by the optional FMPy.
 
-What acts at a port is an input of the FMU, of the port's name; signals are variables of it.
+Ports are FMU inputs of the port's name; signals are its variables.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 
 class FmuSimulator(ExchangedSimulator):
-    """An FMU. Its outputs are taken at equal steps, and by straight lines between them where rows are not.
+    """An FMU with outputs at equal steps, interpolated linearly.
 
     Args:
-        variables: name of the FMU's variable, by our name, where they differ; signals are named `port.signal`, or `signal`.
-        ports: names of the signals at each port, by its name.
-        limit_s: longest time that a simulation may take [s].
+        variables: FMU names by ours; signals are `port.signal` or `signal`.
+        ports: signal names by port.
+        limit_s: per simulation.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class FmuSimulator(ExchangedSimulator):
         """Simulate the FMU once.
 
         Raises:
-            SimulationFault: FMPy is not installed, the FMU lacks a variable, fails, or takes too long.
+            SimulationFault: FMPy is missing, the FMU lacks a variable, fails, or takes too long.
         """
         try:
             import fmpy  # noqa: PLC0415 - an extra

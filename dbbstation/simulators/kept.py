@@ -1,7 +1,7 @@
-"""Simulations that were run before, kept by their content in the user's cache folder, so that they need not be run again.
+"""Earlier simulations kept by content in the user's cache folder.
 
-What is kept is never the only copy of anything. What counts as content: the simulator's files, command and names of variables, the
-program, the inputs, parameters and terms of the simulation. What the simulator reads besides does not count.
+Content: the simulator's files, command and variable names, the program, inputs, parameters and terms; not other files
+that it reads.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ _PATIENCE_S = 5.0
 
 
 class KeptSimulations:
-    """Simulations of one simulator under one set of recordings. A context.
+    """Kept simulations of one simulator and its recordings. A context.
 
     Args:
         content: hash of the simulator's files.
 
     Attributes:
-        problem: why nothing can be kept, in words; empty where it can.
+        problem: why nothing can be kept; may be empty.
     """
 
     def __init__(self, content: str, model: Model) -> None:
@@ -58,10 +58,10 @@ class KeptSimulations:
     def known(
         self, asks: Iterable[SimulationRequest], shape: Mapping[int, tuple[int, int]]
     ) -> dict[SimulationRequest, SimulationOutcome]:
-        """What is kept of simulations.
+        """Return kept simulations.
 
         Args:
-            shape: of the outputs of each run, by its number.
+            shape: of each run's outputs, by number.
         """
         found: dict[SimulationRequest, SimulationOutcome] = {}
         if self._base is None:
@@ -78,7 +78,7 @@ class KeptSimulations:
         return found
 
     def keep(self, pairs: Sequence[tuple[SimulationRequest, SimulationOutcome]]) -> None:
-        """Keep simulations that were run; those with signals are too large."""
+        """Keep simulations without signals, which are too large."""
         rows = [(_key(ask), found.outputs.astype("<f8").tobytes()) for ask, found in pairs if _kept_at_all(ask)]
         if self._base is None or not rows:
             return
@@ -124,7 +124,7 @@ def simulations_folder() -> Path:
 
 
 def _make_room(used: Path) -> None:
-    """Forget what was used longest ago until the rest is small enough; what is used now, only where it alone is too large."""
+    """Forget the longest unused until the rest is small enough."""
     with contextlib.suppress(OSError):
         room = MOST_BYTES
         for one in sorted(used.parent.glob("*.sqlite"), key=lambda file: (file != used, -file.stat().st_mtime)):
@@ -138,7 +138,7 @@ def _kept_at_all(ask: SimulationRequest) -> bool:
 
 
 def _of_all(content: str, model: Model) -> str:
-    """Hash of everything that all simulations have in common."""
+    """Return the hash of what all simulations share."""
     digest = hashlib.sha256(content.encode())
     digest.update(repr([(o.name, o.filter_s) for o in model.outputs]).encode())
     digest.update(repr([(port.name, sorted(port.signals)) for port in model.ports]).encode())

@@ -1,4 +1,4 @@
-"""A simulator and its recordings, from their files to what is compared."""
+"""Load a simulator and its recordings for comparison."""
 
 from __future__ import annotations
 
@@ -44,9 +44,8 @@ class LoadedSimulator:
 
     Attributes:
         path: of `model.yaml`.
-        source: Python file of the simulator, or what runs its program or FMU.
-        file: what `model.yaml` says.
-        own: physics of the user's own at ports.
+        source: Python file, or runner of a program or FMU.
+        own: own physics at ports.
     """
 
     path: Path
@@ -59,7 +58,7 @@ class LoadedSimulator:
 
     @property
     def content(self) -> str:
-        """Key of the simulator: its files, Python files beside it, physics of the user's own, and what its command and FMU are given."""
+        """Return the simulator's key: all its files, own physics, command and FMU."""
         given = {"task": "simulate", "program": self.file.program, "variables": self.file.variables}
         return key_of(given, digests_of((*self._files, *self.own_files), self.path.parent))
 
@@ -87,10 +86,10 @@ class LoadedSimulator:
 def load_simulator(
     path: Path, recordings: Sequence[Path], own_files: Sequence[Path] = (), numbers: NumberLanguage | None = None
 ) -> LoadedSimulator:
-    """Read a simulator, its recordings, and physics of the user's own. Python files are executed.
+    """Read a simulator, recordings and own physics. Python files are executed.
 
     Raises:
-        InputError: every fault of every file with its line.
+        InputError: every fault with its line.
     """
     file = read_simulator(path)
     faults: list[Problem] = []
@@ -114,7 +113,7 @@ def load_simulator(
 
 
 def _source(path: Path, file: SimulatorFile) -> Path | ExchangedSimulator:
-    """Python file of a simulator, which is executed, or its program or FMU.
+    """Return a simulator's executed Python file, or its program or FMU.
 
     Raises:
         InputError: the Python file cannot be run, or has no simulator that can be made.
@@ -132,7 +131,7 @@ def _source(path: Path, file: SimulatorFile) -> Path | ExchangedSimulator:
 
 
 def simulator_of(python: Path) -> Simulator:
-    """Simulator of a Python file, which is executed.
+    """Return the simulator of an executed Python file.
 
     Raises:
         InputError: it cannot be run, or has no simulator that can be made.
@@ -159,10 +158,10 @@ def _simulator_of(python: Path, _content: bytes) -> Simulator:
 
 
 def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
-    """Physics of the user's own.
+    """Return own physics.
 
     Raises:
-        InputError: faults of the files; a port that is not there.
+        InputError: faults of files; an unknown port.
     """
 
     def fault_of(one: PortSource) -> tuple[str, str] | None:
@@ -176,14 +175,14 @@ def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
 
 
 def know(files: Sequence[Path]) -> None:
-    """Run files of physics of the user's own in this process, each once, so that terms that hold it can be read here."""
+    """Run own physics once in this process, so that its terms can be unpickled."""
     for path in files:
         if module_name(path) not in sys.modules:
             classes_in_files([path], PortSource, CONTRACT, [])  # type: ignore[type-abstract]  # faults were told where it was loaded
 
 
 def _try_once(one: PortSource, signals: Iterable[str]) -> None:
-    """Ask physics of the user's own for its numbers, and once for what it does, so that a fault is found before anything is simulated."""
+    """Try own physics once before any simulation."""
     values = {p.name: p.grid[len(p.grid) // 2] if p.grid else p.plausible for p in one.parameters()}
     float(one.value(0.0, dict.fromkeys(signals, 1.0), values))
 

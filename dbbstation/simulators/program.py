@@ -1,4 +1,4 @@
-"""A simulator that is a program of any language: it reads `inputs.csv` and `parameters.json` and writes `outputs.csv`."""
+"""A simulator as program: it reads `inputs.csv` and `parameters.json` and writes `outputs.csv`."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ LINES_TOLD = 3
 
 
 class ProgramSimulator(ExchangedSimulator):
-    """A program that is run once for every simulation, in an empty folder of its own.
+    """A program run once per simulation in an empty folder.
 
     Args:
-        command: program and arguments; files beside the model file are named by their whole path.
-        ports: names of the signals at each port, by its name.
-        limit_s: longest time that it may take [s].
+        command: with whole paths of files beside the model file.
+        ports: signal names by port.
+        limit_s: per simulation.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class ProgramSimulator(ExchangedSimulator):
         """Run the program once.
 
         Raises:
-            SimulationFault: it cannot be run, fails, takes too long, or writes something else than was asked for.
+            SimulationFault: it cannot run, fails, takes too long, or writes other outputs.
         """
         with tempfile.TemporaryDirectory(prefix="dbbstation-") as name:
             folder = Path(name)
@@ -110,12 +110,12 @@ def _read(path: Path) -> dict[str, NDArray[np.float64]]:
 
 
 def whole_command(words: tuple[str, ...], folder: Path) -> tuple[str, ...]:
-    """Return a command with its files beside the model file by their whole path."""
+    """Return a command with whole paths of files beside the model file."""
     return tuple(str((folder / word).absolute()) if (folder / word).is_file() else word for word in words)
 
 
 def files_of(command: tuple[str, ...]) -> list[Path]:
-    """Files that a command names, which are its content."""
+    """Return the files of a command, which are its content."""
     found = [Path(word) for word in command if Path(word).is_file()]
     program = shutil.which(command[0])
     return sorted({*found, *([Path(program)] if program else [])})

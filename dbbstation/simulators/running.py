@@ -1,4 +1,4 @@
-"""Simulations in processes of their own: on all cores, each once, limited in time and number."""
+"""Simulations in processes on all cores, each once, limited in time and number."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ TOGETHER = 8
 
 
 class Runs:
-    """Simulations of one simulator. Use it as a context: its processes end with it.
+    """Simulations of one simulator; a context.
 
     Args:
-        count: of processes; None: one for each core; 0: this one does it all, and nothing limits its time.
-        most: simulations that may be run; None: what ten minutes hold.
-        keeps: whether simulations are kept on disk, and those that are kept there are not run again.
+        count: of processes; None: one per core; 0: this one, without time limit.
+        most: allowed simulations; None: ten minutes' worth, estimated while running.
+        keeps: keep simulations on disk and reuse them.
 
     Attributes:
-        most: that may be run; an estimate that is made better while they run, where only their time is limited.
+        most: allowed simulations; None: ten minutes' worth, estimated while running.
     """
 
     def __init__(
@@ -76,15 +76,15 @@ class Runs:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End them; those that still simulate are ended at once."""
+        """End all processes."""
         self._stack.__exit__(kind, error, trace)
 
     def __call__(self, asks: Sequence[SimulationRequest]) -> list[SimulationOutcome]:
-        """Answers to all, from those that are known where they are.
+        """Return all answers, known ones reused.
 
         Raises:
-            BudgetSpentError: more simulations than allowed would be run.
-            CalibrationError: one raised, returned what it should not, or took too long; with its input.
+            BudgetSpentError: more simulations than allowed.
+            CalibrationError: one failed, returned something invalid, or took too long; with its input.
         """
         fresh = [ask for ask in dict.fromkeys(asks) if ask not in self._known]
         if self._kept is not None and fresh:
@@ -105,7 +105,7 @@ class Runs:
         return [self._known[ask] for ask in asks]
 
     def _refuse_beyond(self, more: int) -> None:
-        """Refuse more simulations than are allowed, by number or, where none was given, by time."""
+        """Refuse more simulations than allowed by number or time."""
         if self._by_time:
             if not more or self.seconds < MOST_SECONDS:
                 return
@@ -118,13 +118,13 @@ class Runs:
 
     @property
     def left_s(self) -> float | None:
-        """Time that the simulations that are left will take about; None where nothing limits their number."""
+        """Return the remaining time, about [s]; None without limit."""
         if self.most is None or not self.ran:
             return None
         return (self.most - self.ran) * self.seconds / self.ran
 
     def allow(self, first: Sequence[SimulationRequest]) -> float:
-        """Run a first simulation, set the number that may be run where none was given, and return its time [s]."""
+        """Run a first simulation, set the allowed number if unset, and return its time [s]."""
         self(first)
         again = list(dict.fromkeys(first))
         if not self.ran:
@@ -182,16 +182,16 @@ STARTING_S = 20.0
 def _several(
     source: Path | ExchangedSimulator, own_files: tuple[Path, ...], model: Model, asks: bytes
 ) -> list[SimulationOutcome]:
-    """Simulations in a process of their own, which must know classes of the user's before it can read what is asked of them."""
+    """Run simulations in a process that knows the user's classes."""
     know(own_files)
     return [_one(source, model, ask) for ask in pickle.loads(asks)]  # noqa: S301 - what the process above made
 
 
 def _one(source: Path | ExchangedSimulator, model: Model, ask: SimulationRequest) -> SimulationOutcome:
-    """One simulation.
+    """Run one simulation.
 
     Raises:
-        CalibrationError: it failed; says with which input, and in which line.
+        CalibrationError: it failed; names input and line.
     """
     simulator = simulator_of(source) if isinstance(source, Path) else source
     place = str(source) if isinstance(source, Path) else source.said

@@ -1,1 +1,1 @@
-"""Machines of one kind, each held against the others."""
+"""Machines of one kind compared."""

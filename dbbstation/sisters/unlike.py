@@ -1,11 +1,9 @@
-"""Which of many machines is unlike its sisters in some quantity, at a stated rate of false alarms.
+"""Find machines unlike their sisters, at a stated rate of false alarms.
 
-Machines that are alike scatter normally about a middle, by a scatter that is the same for all of them, and each value has its
-own standard uncertainty beside. Middle and scatter are estimated from the machines themselves: by weights, the scatter as Paule and
-Mandel do [Paule and Mandel 1982, J. Res. NBS 87, 377; DerSimonian and Kacker 2007, Contemp. Clin. Trials 28, 105]. A machine that is
-unlike the others must not hide itself or another one in these estimates. So the machine that is farthest off is taken out, again and
-again up to a quarter of them, each held against those that are left; the last that is too far off for chance shows how many are unlike
-[Rosner 1983, Technometrics 25, 165]. Of one machine this is the test of Grubbs, which is exact where uncertainties are alike.
+Like machines scatter normally about a middle, plus own standard uncertainties. Weights and scatter follow [Paule and
+Mandel 1982, J. Res. NBS 87, 377; DerSimonian and Kacker 2007, Contemp. Clin. Trials 28, 105]. The farthest machine is
+removed repeatedly, up to a quarter, each tested against the rest; the last significant one gives the number [Rosner 1983,
+Technometrics 25, 165]. For one machine this is the test of Grubbs.
 """
 
 from __future__ import annotations
@@ -43,12 +41,12 @@ _ROUNDED = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Sisters:
-    """Machines held against their sisters, quantity by quantity; arrays have shape (q, n), NaN where nothing is known.
+    """Machines against sisters, shape (q, n), NaN if unknown.
 
     Attributes:
-        score: standard normal where it is like them, from those that are not unlike.
-        scatter: their standard deviation beyond their uncertainties, in the quantity's unit.
-        smallest_seen: departure from the middle from which on a machine would count as unlike, in the quantity's unit.
+        score: standard normal for a like machine, by the like ones.
+        scatter: beyond uncertainties, in the quantity's unit.
+        smallest_seen: departure that would count as unlike, in the quantity's unit.
     """
 
     unlike: NDArray[np.bool_]
@@ -64,9 +62,9 @@ def held_against_sisters(
     """Hold machines against their sisters.
 
     Args:
-        values: of each quantity and machine, shape (q, n); NaN where a machine has none.
-        u: standard uncertainties, in the same units, shape (q, n); NaN or 0 where not known: the scatter covers them then.
-        false_alarms: probability of any unlike value where all machines are alike, all quantities and machines together.
+        values: shape (q, n); NaN for missing.
+        u: standard uncertainties, shape (q, n); NaN or 0 if unknown, covered by scatter.
+        false_alarms: probability of any unlike value over all, for like machines.
     """
     unlike = unlike_machines(values, u, false_alarms)
     return _scored(values, u, unlike, _share(values, false_alarms))
@@ -75,7 +73,7 @@ def held_against_sisters(
 def unlike_machines(
     values: NDArray[np.float64], u: NDArray[np.float64], false_alarms: float = FALSE_ALARMS
 ) -> NDArray[np.bool_]:
-    """Return which machines are unlike their sisters, shape (q, n); arguments as those of `held_against_sisters`."""
+    """Return unlike machines, shape (q, n); arguments as of `held_against_sisters`."""
     known = np.isfinite(values)
     left = known.copy()
     variance = np.where(np.isfinite(u), u, 0.0) ** 2
@@ -103,7 +101,7 @@ def unlike_machines(
 
 
 def _share(values: NDArray[np.float64], false_alarms: float) -> float:
-    """Return the false alarms that one quantity may give: all together give as many as are stated [Bonferroni]."""
+    """Return one quantity's false alarms [Bonferroni]."""
     compared = int((np.isfinite(values).sum(axis=1) >= FEWEST).sum())
     return false_alarms / max(compared, 1)
 
@@ -111,10 +109,10 @@ def _share(values: NDArray[np.float64], false_alarms: float) -> float:
 def _middle(
     values: NDArray[np.float64], variance: NDArray[np.float64], taken: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return weighted mean and squared scatter of the machines that are taken, shape (q,) each.
+    """Return weighted mean and squared scatter, shape (q,) each.
 
-    The scatter solves sum((x - mean)^2 / (scatter^2 + u^2)) = n - 1, or is zero where the left side is less with none. Newton's
-    steps begin below the solution: with the greatest u for all, every weight is as small as it can be.
+    The scatter solves sum((x - mean)^2 / (scatter^2 + u^2)) = n - 1, or is zero. Newton starts below, with the greatest u
+    for all.
     """
     count = taken.sum(axis=1)
     x = np.where(taken, values, 0.0)
@@ -141,7 +139,7 @@ def _middle(
 
 @dataclass(frozen=True, eq=False)
 class _Departure:
-    """One machine of each quantity, held against others; arrays have shape (q,)."""
+    """One machine of each quantity against others, shape (q,)."""
 
     off: NDArray[np.float64]
     spread: NDArray[np.float64]
@@ -151,7 +149,7 @@ class _Departure:
 
     @property
     def beyond(self) -> NDArray[np.float64]:
-        """Probability of that much on this side, by Student's t; not a number counts as a half."""
+        """Return the probability beyond, by Student's t; nan gives a half."""
         probability = stdtr(self.freedom, -np.abs(self.off) / self.spread)
         return np.asarray(np.where(np.isfinite(probability), probability, 0.5))
 
@@ -159,10 +157,10 @@ class _Departure:
 def _departure(
     values: NDArray[np.float64], variance: NDArray[np.float64], others: NDArray[np.bool_], machine: NDArray[np.int64]
 ) -> _Departure:
-    """Hold one machine of each quantity against the others.
+    """Return one machine of each quantity against the others.
 
-    A scatter that values of unlike uncertainty tell is known less well than their number says: its degrees of freedom are
-    those of Satterthwaite, by the Fisher information of the scatter [Viechtbauer 2005, J. Educ. Behav. Stat. 30, 261].
+    Scatter of unequal uncertainties has Satterthwaite's freedom by its Fisher information [Viechtbauer 2005, J. Educ.
+    Behav. Stat. 30, 261].
     """
     rows = np.arange(len(values))
     middle, square = _middle(values, variance, others)

@@ -1,1 +1,1 @@
-"""Error sources: one physical cause per file, and the contract that they share."""
+"""Error sources: one physical cause per file, and their contract."""

@@ -1,9 +1,8 @@
-"""The contract of an error source: what it is given, what it declares, what it answers.
+"""The contract of an error source.
 
-A machine model is its nominal geometry plus a list of error sources. A source is asked for its `effect` on a
-`Motion` and for the derivative of that effect by each of its parameters. It sees a measured length only as the place
-of the bar's own encoder, and never changes anything but struts, joints, the tool tip, the bar's reading or a motor's
-current.
+A machine model is nominal geometry plus error sources. A source gives its `effect` on a `Motion` and the derivative by
+its parameters. It uses readings only as places of the bar's encoder, and changes only struts, joints, tool tip, reading
+or motor current.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ State = Any
 
 
 class Owner(StrEnum):
-    """What a source belongs to. Only what is the machine's is predicted and compensated elsewhere."""
+    """Owner of a source; only the machine's are predicted and compensated."""
 
     MACHINE = "machine"
     SESSION = "session"
@@ -50,7 +49,7 @@ class Owner(StrEnum):
 
 
 class Need(StrEnum):
-    """What a source must be given beside the machine."""
+    """What a source needs beside the machine."""
 
     POSE = "pose"
     PATH = "path"
@@ -62,12 +61,11 @@ class Need(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class SetUpErrors:
-    """What a micrometer read of balls that were put up at the spindle [CAL III-A, IV]; NaN where nobody measured.
+    """Micrometer readings of balls at the spindle [CAL III-A, IV]; NaN if not measured.
 
     Attributes:
-        fixed_ball_mm: fixed ball less tool tip while the machine stood at the ball's commanded place, machine frame, shape (3,)
-            [mm].
-        moving_ball_mm: moving ball less tool tip, platform frame, shape (3,) [mm].
+        fixed_ball_mm: fixed ball less tool tip at the ball's commanded place, machine frame, shape (3,).
+        moving_ball_mm: moving ball less tool tip, platform frame, shape (3,).
     """
 
     fixed_ball_mm: NDArray[np.float64]
@@ -80,8 +78,8 @@ class Thermometer:
     """One thermometer over a session.
 
     Attributes:
-        time_s: on the clock of `Motion.time_s`, rising, shape (q,) [s].
-        degc: what it showed, what it rounds off smoothed, shape (q,) [degC].
+        time_s: on the clock of `Motion.time_s`, rising, shape (q,).
+        degc: without quantisation, shape (q,).
     """
 
     time_s: NDArray[np.float64]
@@ -90,30 +88,25 @@ class Thermometer:
 
 @dataclass(frozen=True)
 class Setup:
-    """How a run was set up: which ball, which mounting, which bar, and how well each is known.
+    """Set-up of a run: ball, mounting and bar with their uncertainties.
 
-    Names are unique over all sessions of a fit: runs that share a name share that error.
+    Runs that share a name share that error, over all sessions of a fit.
 
     Attributes:
         ball: entry of the CMM sheet.
-        fixed_ball_mm: centre of the fixed ball as the CMM knows it, machine frame, shape (3,) [mm].
-        mounting_repeatability_mm: of the holder, one standard deviation, for all axes or each, shape (3,) [mm].
-        ball_uncertainty_mm: of the CMM, one standard deviation per axis [mm].
-        bar_uncertainty_mm: of the bar's calibrated length, one standard deviation; of a bar that nobody calibrated more than any
-            calibrator leaves [mm].
-        bar_reads_long_mm: reading less true distance, as calibrator and temperature let expect it: part of every reading, and
-            never taken off one [mm].
-        bar_length_mm: distance of the balls at which the bar was calibrated; None where nobody calibrated it [mm].
-        place_known: False for a ball that was put up under the spindle: `fixed_ball_mm` is where the machine was told to stand
-            then, and nobody knows where the ball is.
-        set_up_errors: micrometer readings of such a ball; None where there are none.
-        plate: jig plate that the ball stands on; None where it stands in no bore.
-        run: name of the run; empty where it has none.
-        start_uncertainty_deg: how well the beginning of its turn is known along the travel, one standard deviation; zero where
-            angles were recorded [deg].
-        moving_s: beginning and end of every run of the session, in order, on the clock of `Motion.time_s` [s]; empty where nobody
-            noted them.
-        thermometers: what each of them showed over the session, by the name of its column without the unit.
+        fixed_ball_mm: centre by CMM, machine frame, shape (3,).
+        mounting_repeatability_mm: one standard deviation, common or per axis, shape (3,).
+        ball_uncertainty_mm: of the CMM, one standard deviation per axis.
+        bar_uncertainty_mm: of the calibrated length, one standard deviation; large without calibration.
+        bar_reads_long_mm: expected reading less true distance, included in predictions and never subtracted from readings.
+        bar_length_mm: calibrated distance of the balls, or None.
+        place_known: False under the spindle, where `fixed_ball_mm` is the machine's commanded place.
+        set_up_errors: micrometer readings, or None.
+        plate: None for a ball in no bore.
+        run: may be empty.
+        start_uncertainty_deg: of the turn's begin, one standard deviation; zero with recorded angles.
+        moving_s: begin and end of all runs in order, on the clock of `Motion.time_s`; may be empty.
+        thermometers: over the session, by column without unit.
     """
 
     session: str
@@ -137,28 +130,24 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class Motion(WithLogged):
-    """A whole run as commanded, in time order, with what was logged beside it.
+    """A commanded run in time order, with logged columns.
 
-    Rows before `kept` are the way there: they give backlash, lag and friction their history and are not
-    compared with a recording.
+    Rows outside `kept` give sources their history and are not compared.
 
     Attributes:
         poses: commanded [X, Y, Z, A, B, C], shape (n, 6) [mm, deg].
-        is_path: the rows follow each other on one path; otherwise they are poses without a history.
-        straight: the machine goes straight from row to row, as a program has it, and what bends does so at a row; otherwise
-            the rows are samples of a smooth path, such as a circle, which bends between them as well.
+        is_path: rows are successive; otherwise poses without history.
+        straight: straight between rows, as a program; otherwise samples of a smooth path.
         kept: the rows that count.
-        time_s: since the session's first sample, shape (n,) [s]; None where unknown.
-        logged: what was logged beside the bar, by the name of its column, shape (n,) each; `temperature_degc` and
-            `motor_current_a` give it by sensor and motor.
-        load_n: axial forces that the motors hold, positive where the platform pulls, shape (n, 6) [N]; None: those of
-            the machine file's weights at the commanded poses.
-        setup: None for poses that nobody measured.
-        reading_mm: what the bar showed, shape (n,) [mm]: the place of its encoder, for errors of that encoder alone;
-            None where nothing was measured.
-        reading_is_measured: that came from an instrument, with its noise; otherwise from a model.
-        put_up: the machine standing still while the fixed ball was put up at its tool tip: the ball stands where the
-            tip really was in the last row; None for a ball of known place.
+        time_s: since the session's first sample, shape (n,); None if unknown.
+        logged: by column, shape (n,) each; see `temperature_degc` and `motor_current_a`.
+        load_n: axial forces of the motors, positive if the platform pulls, shape (n, 6); None: by the machine file's weights at
+            commanded poses.
+        setup: None for unmeasured poses.
+        reading_mm: as place of the bar's encoder, shape (n,); None if unmeasured.
+        reading_is_measured: from an instrument with noise, not a model.
+        put_up: the machine standing while the ball was set at its tip, whose actual last place the ball has; None for a known
+            place.
     """
 
     poses: NDArray[np.float64]
@@ -178,32 +167,32 @@ class Motion(WithLogged):
         return len(self.poses)
 
     def frames(self, machine: Machine) -> Frames:
-        """Commanded poses as frames of the platform; worked out once, whatever number of sources asks."""
+        """Return commanded frames of the platform, cached."""
         return self.once("frames", machine, lambda: Frames.from_poses(self.poses, machine.hexapod.rotation))
 
     def struts(self, machine: Machine) -> Struts:
-        """Struts of the machine at the commanded poses; worked out once, whatever number of sources asks."""
+        """Return struts at commanded poses, cached."""
         return self.once("struts", machine, lambda: inverse(machine.hexapod, self.frames(machine)))
 
     def once(self, what: str, machine: Machine | None, work: Callable[[], Worked]) -> Worked:
-        """Something that hangs on the motion and a machine's joints alone, worked out once as long as these are asked for."""
+        """Return what depends on the motion and a machine's joints, cached while in use."""
         joints, known = None if machine is None else machine.hexapod, self._known.get(what)
         if known is None or known[0] is not joints:
             known = self._known[what] = joints, work()
         return cast("Worked", known[1])
 
     def commanded(self, frames: Frames, machine: Machine) -> Motion:
-        """The motion with other poses, those of these frames."""
+        """Return the motion with these frames."""
         motion = replace(self, poses=frames.to_poses(machine.hexapod.rotation))
         motion._known["frames"] = machine.hexapod, frames  # noqa: SLF001 - of the same class
         return motion
 
     def stretch(self, rows: slice) -> Motion:
-        """Some of the rows, in time order; all of them count."""
+        """Return some rows in time order; all count."""
         return self._of_rows(lambda values, _: values[rows])
 
     def after(self, earlier: Motion) -> Motion:
-        """An earlier stretch and this one behind it, which has what the earlier one has; all rows count."""
+        """Return an earlier stretch with this one behind it; all rows count."""
         before = earlier._rows()
         return self._of_rows(lambda values, name: np.concatenate([before[name], values]))
 
@@ -218,7 +207,7 @@ class Motion(WithLogged):
 
     @cached_property
     def provides(self) -> frozenset[Need]:
-        """What sources may ask of this motion."""
+        """Return what sources may use of this motion."""
         given = {Need.POSE: True, Need.PATH: self.is_path, Need.TIME: self.time_s is not None}
         given |= {Need.TEMPERATURE: bool(self.temperature_degc), Need.CURRENT: self.motor_current_a is not None}
         given[Need.READING] = self.reading_mm is not None
@@ -236,20 +225,16 @@ class Parameter:
     """One number of a source.
 
     Attributes:
-        name: unique within the source; its unit is its last part where it has one.
+        name: unique in the source, ending with its unit.
         plausible: usual size, one standard deviation, in that unit.
         meaning: one line with the sign.
-        grid: values to search over, where the effect is not proportional to the parameter (a time constant, a phase); empty for
-            an amplitude, which the effect is proportional to.
-        tolerance: standard deviation that the machine file states, in that unit: a fit takes it for known; None where nothing is
-            stated.
-        newer: True for one that the source had not always: models written before lack it, and it is zero there.
-        positive: True for what cannot be negative, such as a compliance or a friction: where a fit says so beyond its
-            uncertainty, something else is at work.
-        listed: True where only the values of `grid` are possible and nothing between them, as of a part that is bought.
-        part: amplitudes with one label may be wrong alone, such as those of one order of a ball's form; empty for those of a
-            strut, and for a source that has no parts.
-        strut: strut that it is of, 1 to 6; the amplitudes of one strut may be wrong alone. None where it is of none.
+        grid: search values of a nonlinear parameter (time constant, phase); empty for an amplitude.
+        tolerance: the machine file's standard deviation, used as prior; or None.
+        newer: True if older models lack it, where it is zero.
+        positive: cannot be negative; a significant negative fit indicates another cause.
+        listed: only values of `grid` are possible.
+        part: amplitudes with one label may be wrong alone; empty for a strut's and for sources without parts.
+        strut: 1 to 6; its amplitudes may be wrong alone. None for none.
     """
 
     name: str
@@ -266,20 +251,19 @@ class Parameter:
 
     @property
     def alone_with(self) -> str:
-        """Part of the source that may be wrong while the others are not: that of its strut, or the one stated."""
+        """Return the part that may be wrong alone: by strut, or as stated."""
         return self.part or (f"strut {self.strut}" if self.strut else "")
 
     @property
     def largest(self) -> float:
-        """Greatest size of a value that a model may have, in the parameter's unit."""
+        """Return the greatest size allowed in a model, in the parameter's unit."""
         return max(BEYOND_PLAUSIBLE * self.plausible, *(10.0 * abs(value) for value in self.grid), 0.0)
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Least and greatest value of a nonlinear parameter in a fit; an amplitude has none.
+        """Return limits of a nonlinear parameter in a fit; None for amplitudes.
 
-        A positive parameter such as a time constant may lie one step of its grid, a ratio, beyond either end; another one as far as
-        the grid is long.
+        Positive parameters may exceed their grid by one step (ratio), others by its length.
         """
         grid = sorted(self.grid)
         if len(grid) < 2 or self.listed:  # noqa: PLR2004 - a step has two ends
@@ -295,10 +279,10 @@ def of_each_strut(
     """Return one amplitude for each strut.
 
     Args:
-        name: of the parameter; `{}` stands for the strut, 1 to 6.
-        plausible: usual size, one standard deviation, in that unit.
+        name: `{}` stands for the strut, 1 to 6.
+        plausible: one standard deviation, in that unit.
         meaning: one line with the sign; `{}` stands for the strut.
-        positive: True for what cannot be negative.
+        positive: cannot be negative.
     """
     return tuple(
         Parameter(name.format(k), unit, plausible, meaning.format(k), positive=positive, strut=k)
@@ -308,20 +292,19 @@ def of_each_strut(
 
 @dataclass(frozen=True)
 class Effect:
-    """What a source does, or the derivative of that by its parameters (one further axis of length p, last).
+    """A source's effect, or its derivative by parameters (last axis of length p).
 
-    An array without the sample axis holds for every sample. None is no effect.
+    Arrays without sample axis hold for every sample. None is no effect.
 
     Attributes:
-        strut_mm: actual minus believed strut length, shape (6,) or (n, 6) [mm].
-        base_joint_mm: actual minus nominal base joint, machine frame, shape (6, 3) or (n, 6, 3) [mm].
-        platform_joint_mm: actual minus nominal platform joint, platform frame, same shapes [mm].
-        tool_tip_mm: shift of tool tip and tool ball against the platform, platform frame, (3,) or (n, 3) [mm].
-        fixed_ball_mm: actual minus known centre of the fixed ball, machine frame, (3,) or (n, 3) [mm].
-        reading_mm: added to the bar's reading, shape () or (n,) [mm].
-        load_n: added to the axial forces that the motors hold, positive where the platform pulls, shape (6,) or
-            (n, 6) [N].
-        current_a: added to the motor currents, shape (6,) or (n, 6) [A].
+        strut_mm: actual minus believed length, shape (6,) or (n, 6).
+        base_joint_mm: actual minus nominal, machine frame, shape (6, 3) or (n, 6, 3).
+        platform_joint_mm: actual minus nominal, platform frame, same shapes.
+        tool_tip_mm: shift of tip and ball, platform frame, (3,) or (n, 3).
+        fixed_ball_mm: actual minus known centre, machine frame, (3,) or (n, 3).
+        reading_mm: added to the reading, shape () or (n,).
+        load_n: added to the motors' axial forces, positive if the platform pulls, shape (6,) or (n, 6).
+        current_a: added to motor currents, shape (6,) or (n, 6).
     """
 
     strut_mm: NDArray[np.float64] | None = None
@@ -334,11 +317,11 @@ class Effect:
     current_a: NDArray[np.float64] | None = None
 
     def __add__(self, other: Effect) -> Effect:
-        """Both effects together; arrays with and without the sample axis add up."""
+        """Return the sum of both effects."""
         return Effect(**{f.name: _sum(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)})
 
     def rows(self, rows: slice) -> Effect:
-        """The effect in some of the rows; what holds for every sample still does."""
+        """Return the effect in some rows."""
         taken = {}
         for name, axes in EFFECT_SHAPES.items():
             array = getattr(self, name)
@@ -346,11 +329,11 @@ class Effect:
         return Effect(**taken)
 
     def last(self, count: int) -> Effect:
-        """The effect in the last rows; what holds for every sample still does."""
+        """Return the effect in the last rows."""
         return self.rows(slice(-count, None) if count else slice(0, 0))
 
     def times(self, values: NDArray[np.float64]) -> Effect:
-        """The effect of parameter values, where `self` is a derivative by p parameters, shape (p,)."""
+        """Return the effect of values, shape (p,), if `self` is a derivative."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
         return Effect(**{name: None if array is None else array @ values for name, array in arrays.items()})
 
@@ -383,11 +366,9 @@ still not longer than one point for each millimetre."""
 
 
 class ErrorSource(ABC):
-    """One physical cause.
+    """One physical cause, without state.
 
-    A source without parameters to fit at run time is still a source: its class is its identity, instances
-    carry no state. Where a source belongs to a session or a mounting there is one set of parameter values per
-    session or mounting; `shared_by` says which runs share a set.
+    Session and mounting sources have values per sharing set, named by `shared_by`.
     """
 
     name: ClassVar[str]
@@ -424,7 +405,7 @@ class ErrorSource(ABC):
 
     @abstractmethod
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Parameters in the order of every `values` array.
+        """Return the parameters in the order of `values`.
 
         Raises:
             ModelError: the machine file lacks what the source needs, such as masses.
@@ -432,34 +413,33 @@ class ErrorSource(ABC):
 
     @abstractmethod
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """What parameter values, shape (p,), do to a motion."""
+        """Return the effect of values, shape (p,), on a motion."""
 
     @abstractmethod
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Derivative of `effect` by each parameter: arrays with one further axis of length p, last."""
+        """Return the derivative of `effect`, with a last axis of length p."""
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> State:  # noqa: ARG002
-        """Return what is remembered before the first row of a run.
+        """Return the memory before a run's first row.
 
         Args:
-            motion: the run, or as much of its beginning as is known: it shows which way the struts set out.
-            values: of the parameters, shape (p,).
+            motion: the run or its beginning, which shows the struts' directions.
+            values: shape (p,).
         """
         return None
 
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: State
     ) -> tuple[Effect, State]:
-        """Return the effect along one stretch of a program, and what is remembered behind its last row.
+        """Return the effect along one stretch, and the memory behind it.
 
-        However a program is cut into stretches, each asked for with the state behind the one before, the effects are those of
-        `effect` for the whole. What a source does not need the path for has no state. One that needs the path and does not
-        say what it remembers is given all rows so far each time: right, and slow in long programs.
+        Stretches of any cut give the effects of the whole. Sources without history have no state. A path source that does
+        not define its memory receives all rows each time, slowly.
 
         Args:
-            motion: the stretch, in time order; `straight`.
-            values: of the parameters, shape (p,).
-            state: of `begin`, or behind the stretch before; it stays as it is, so that a stretch can be asked for again.
+            motion: in time order; `straight`.
+            values: shape (p,).
+            state: from `begin` or the previous stretch; not modified.
         """
         if Need.PATH not in self.needs:
             return self.effect(motion, machine, values), None
@@ -474,19 +454,19 @@ class ErrorSource(ABC):
         values: NDArray[np.float64],
         state: State,
     ) -> NDArray[np.float64]:
-        """Return the strut errors along a stretch in which the struts come to certain lengths, shape (n, 6) [mm].
+        """Return strut errors along a stretch with given reached lengths, shape (n, 6) [mm].
 
-        Asked of sources that `builds_up`.
+        For sources that `builds_up`.
 
         Args:
-            motion: a command that nearly leads there.
-            reached: the stretch as this source alone should let the struts come to it.
-            values: of the parameters, shape (p,).
+            motion: a command near the solution.
+            reached: the stretch as this source alone should reach it.
+            values: shape (p,).
         """
         raise NotImplementedError
 
     def shared_by(self, motion: Motion) -> str:
-        """Name of the set of parameter values that this motion takes; motions with one name share the set."""
+        """Return the name of the set of values that this motion uses."""
         if self.belongs_to is Owner.MACHINE or motion.setup is None:
             return ""
         if self.belongs_to is Owner.SESSION:
@@ -494,68 +474,68 @@ class ErrorSource(ABC):
         return motion.setup.mounting if self.belongs_to is Owner.MOUNTING else motion.setup.instrument
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
-        """Shortest way over which the effect of these values goes up and down once [mm]: `detail_mm`, if nothing else."""
+        """Return the shortest way of one wave of these values [mm]: by default `detail_mm`."""
         return self.detail_mm
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:  # noqa: ARG002
-        """Standard deviations, shape (p,), that plan and session state for this motion's set; None: not stated.
+        """Return stated standard deviations of this motion's set, shape (p,), or None.
 
-        A stated size makes the set a random effect of the fit.
+        A stated size makes a random effect.
         """
         return None
 
     def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:  # noqa: ARG002
-        """Whether runs can show the effect at values of its parameters of shape, shape (s,).
+        """Return whether runs can show the effect at shape parameters, shape (s,).
 
-        False where they show only a part of it that anything may look like: a diagnosis must not look for it there.
+        False if they show only an ambiguous part.
         """
         return True
 
     def by_temperature(self) -> ErrorSource | None:
-        """Return the same cause in the form that follows logged temperatures; None where it knows none.
+        """Return the cause's form by logged temperatures, or None.
 
-        It has the same name and other parameters; a model has one of the two.
+        It has the same name; a model has one of both.
         """
         return None
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
-        """Return the same cause by other laws: the one that follows logged temperatures, if nothing else.
+        """Return other laws of the cause: by default that by temperatures.
 
-        Each has the same name and owner, another `law` and other parameters; a model has one of them.
+        Each has the same name and owner and another `law`; a model has one of them.
         """
         logged = self.by_temperature()
         return () if logged is None else (logged,)
 
     def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Return what other constants of the law would change in the effect, each less the effect: arrays with one further axis, last.
+        """Return changes of the effect by other constants of the law, with a last axis.
 
-        For constants that are no parameters, since a recording seldom shows them, and that machines differ in: a diagnosis takes each
-        of these changes as possible in any share of up to about one. Nothing if nothing is said.
+        For machine-dependent constants that recordings seldom show: a diagnosis allows each change in a share up to about
+        one. None by default.
         """
         return Effect()
 
     @property
     def law(self) -> str:
-        """Which of the laws of its cause it is: what it varies with, if nothing else is said."""
+        """Return the name of the law: by default what it varies with."""
         return self.varies_with
 
     @property
     def simpler_law(self) -> str | None:
-        """Law of the same cause that this one becomes where its nonlinear parameters have no effect; None if there is none."""
+        """Return the law without nonlinear parameters, or None."""
         return None
 
     @property
     def has_history(self) -> bool:
-        """Whether its effect in a row hangs on the rows before."""
+        """Return whether a row's effect depends on earlier rows."""
         return Need.PATH in self.needs
 
     @property
     def of_currents(self) -> bool:
-        """Whether it says what currents the motors draw, and changes nothing else."""
+        """Return whether it only affects motor currents."""
         return Need.CURRENT in self.needs
 
     def found_compliance(self, machine: Machine, values: NDArray[np.float64]) -> Compliance | None:  # noqa: ARG002
-        """Return the compliance of the struts that these values say; None for a source that says nothing of it."""
+        """Return the struts' compliance by these values, or None."""
         return None
 
     def current_per_load(
@@ -564,14 +544,14 @@ class ErrorSource(ABC):
         machine: Machine,  # noqa: ARG002
         values: NDArray[np.float64],  # noqa: ARG002
     ) -> NDArray[np.float64] | None:
-        """Derivative of `current_a` by the load of that motor, shape (n, 6) [A/N]; None: no current hangs on a load."""
+        """Return the derivative of `current_a` by the motor's load, shape (n, 6) [A/N]; None: no dependence."""
         return None
 
     def require(self, motion: Motion) -> None:
-        """Refuse a motion that lacks what the source needs.
+        """Refuse a motion that lacks needed data.
 
         Raises:
-            ModelError: names the source and what is missing.
+            ModelError: names source and missing data.
         """
         missing = self.needs - motion.provides
         if missing:
@@ -592,25 +572,25 @@ _HOW_TO_GIVE = {
 
 
 class SourceWithHistory(ErrorSource):
-    """A source that says what it remembers: `begin` and `advance` have to be written, and a whole run is one stretch."""
+    """A source with defined memory: `begin` and `advance`."""
 
     @abstractmethod
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> State:
-        """Return what is remembered before the first row of a run."""
+        """Return the memory before a run's first row."""
 
     @abstractmethod
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: State
     ) -> tuple[Effect, State]:
-        """Return the effect along one stretch, and what is remembered behind its last row."""
+        """Return the effect along one stretch, and the memory behind it."""
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """The effect along the whole run, taken as one stretch."""
+        """Return the effect of the run as one stretch."""
         return self.advance(motion, machine, values, self.begin(motion, machine, values))[0]
 
 
 class LinearSource(ErrorSource):
-    """A source whose effect is proportional to its parameters: only the derivative has to be written."""
+    """A source proportional to its parameters: only the derivative is written."""
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Derivative times values."""
@@ -622,8 +602,8 @@ class Fitted:
     """A source with values for one of its sets, as a model carries it.
 
     Attributes:
-        values: parameter values in the order of `source.parameters`, shape (p,).
-        shared: name of the set, empty for the machine's own sources.
+        values: in parameter order, shape (p,).
+        shared: name of the set; empty for the machine's.
     """
 
     source: ErrorSource
@@ -632,5 +612,5 @@ class Fitted:
 
     @classmethod
     def zero(cls, source: ErrorSource, machine: Machine, shared: str = "") -> Self:
-        """Return the source with all its parameters at zero."""
+        """Return the source with zero values."""
         return cls(source, np.zeros(len(source.parameters(machine))), shared)

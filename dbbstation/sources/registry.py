@@ -1,4 +1,4 @@
-"""Every error source by name: one file each in `causes` and `unmodelled`, found by looking, and those of installed packages."""
+"""Every error source by name, of the package and installed packages."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ HOW_TO_ADD = "one of your own is given with --source-file FILE.py, or its packag
 
 
 def known_sources() -> Mapping[str, ErrorSource]:
-    """All error sources of the package and of installed ones, sorted by name.
+    """Return all error sources, sorted by name.
 
     Raises:
-        InputError: an installed package has a source that cannot be loaded, does not keep the contract, or whose name is taken.
+        InputError: an installed source cannot be loaded, breaks the contract, or has a taken name.
     """
     return _known()[0]
 
 
 @cache
 def _known() -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
-    """All that are known without a file being named, and where those come from that are not the package's."""
+    """Return all sources without files, and the origins of foreign ones."""
     faults: list[Problem] = []
     others = installed(GROUP, _BASE, faults)
     found, whose = _with(in_folders(_BASE, causes, unmodelled), {}, others, faults)
@@ -46,7 +46,7 @@ _BASE: type[ErrorSource] = ErrorSource  # type: ignore[type-abstract]  # what de
 
 
 def known_with(others: Sequence[FoundClass[ErrorSource]], faults: list[Problem]) -> Mapping[str, ErrorSource]:
-    """All that are known, and sources made from further classes; what these lack of the contract is added to `faults`.
+    """Return all sources with those of further classes; their faults go to `faults`.
 
     Raises:
         InputError: as `known_sources`.
@@ -70,7 +70,7 @@ def _with(
 
 
 def _checked(found: FoundClass[ErrorSource], faults: list[Problem]) -> ErrorSource | None:
-    """Return a source made from a class; None with what it lacks added."""
+    """Return a source from a class, or None with its faults added."""
     kind, place = found.kind, found.place
     said, line = undeclared(kind), place.line
     if not said:
@@ -88,13 +88,13 @@ def _checked(found: FoundClass[ErrorSource], faults: list[Problem]) -> ErrorSour
 
 
 def sources_named(names: Iterable[str], known: Mapping[str, ErrorSource] | None = None) -> tuple[ErrorSource, ...]:
-    """Sources by their names.
+    """Return sources by name.
 
     Args:
-        known: every error source by name; those of the package and of installed ones if None.
+        known: None: those of package and installed packages.
 
     Raises:
-        ModelError: a name that no source has.
+        ModelError: an unknown name.
     """
     among = known_sources() if known is None else known
     return tuple(

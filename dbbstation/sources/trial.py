@@ -1,8 +1,4 @@
-"""Whether a class that somebody wrote keeps the contract of an error source: what it declares, and a run to try it on.
-
-Sources of the package are held to the contract by tests. One that comes from elsewhere is looked at before it is used,
-so that a shape or a sign that does not fit is said of the source and not found later in a fit.
-"""
+"""The trial of a foreign error source against the contract, before its use."""
 
 from __future__ import annotations
 
@@ -48,7 +44,7 @@ OTHER_SIZE = 0.7
 
 @cache
 def trial_machine() -> Machine:
-    """Return a regular hexapod with everything that a machine file may state."""
+    """Return a regular hexapod with all optional data."""
     turn = np.radians(120.0)
     joints_mm = []
     for radius_mm, half_deg, first_deg, height_mm in ((730.0, 5.0, 90.0, 0.0), (395.0, 10.0, 150.0, 500.0)):
@@ -85,7 +81,7 @@ def trial_machine() -> Machine:
 
 
 def undeclared(kind: type[ErrorSource]) -> list[str]:
-    """Say what a class lacks of the contract before it can be made; empty where nothing is."""
+    """Return what a class lacks before it can be made; may be empty."""
     faults = []
     missing = sorted(getattr(kind, "__abstractmethods__", ()))
     if missing:
@@ -119,14 +115,14 @@ def undeclared(kind: type[ErrorSource]) -> list[str]:
 
 
 def tried(source: ErrorSource, machine: Machine) -> list[str]:
-    """Say what is wrong with a source's parameters, effect and derivative; empty where nothing is.
+    """Return faults of a source's parameters, effect and derivative; may be empty.
 
     Args:
-        source: made from a class that lacks nothing.
-        machine: to try it on, a circle about the middle of its travel.
+        source: from a complete class.
+        machine: tried on a circle about mid-travel.
 
     Raises:
-        Exception: whatever the source's own code raises.
+        Exception: of the source's code.
     """
     try:
         parameters = source.parameters(machine)
@@ -157,7 +153,7 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
 
 
 def _of_history(source: ErrorSource, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> list[str]:
-    """Whether a program in two stretches has the effect of the whole, as a compensation needs it that goes forward."""
+    """Check that a program in two stretches has the effect of the whole."""
     if source.looks_ahead or not source.has_history:
         return []
     motion = replace(motion, straight=True)
@@ -179,7 +175,7 @@ def _of_history(source: ErrorSource, motion: Motion, machine: Machine, values: N
 
 
 def _of_other_laws(source: ErrorSource, parameters: Sequence[Parameter], machine: Machine) -> list[str]:
-    """Its forms by temperature and by other laws, where there are any: model files and diagnoses tell them apart."""
+    """Check its forms by temperature and other laws."""
     form = source.by_temperature()
     if form is not None:
         if (form.name, form.belongs_to) != (source.name, source.belongs_to) or form.varies_with == source.varies_with:
@@ -238,7 +234,7 @@ def _of_proportion(
     parameters: Sequence[Parameter],
     values: NDArray[np.float64],
 ) -> list[str]:
-    """Whether nothing comes of nothing, and twice the effect of twice the amplitudes but where a path is remembered."""
+    """Check that zero gives nothing, and doubled amplitudes doubled effects, unless paths are remembered."""
     zero = np.zeros(len(parameters))
     nothing = source.effect(motion, machine, zero)
     slopes = source.derivative(motion, machine, zero)
@@ -277,7 +273,7 @@ def _of_needs(source: ErrorSource, motion: Motion) -> list[str]:
 
 
 def _circle(machine: Machine) -> Motion:
-    """One turn about the middle of the travel with everything that a source may ask for."""
+    """Return one turn about mid-travel with all data."""
     theta = np.linspace(0.0, 2.0 * np.pi, 181)
     centre = middle(machine).position_mm[0]
     poses = np.zeros((len(theta), 6))
@@ -318,7 +314,7 @@ def _of_derivative(
     parameters: Sequence[Parameter],
     values: NDArray[np.float64],
 ) -> list[str]:
-    """Compare the derivative with what the effect does over a small step to both sides."""
+    """Compare the derivative with central differences."""
     derivative = source.derivative(motion, machine, values)
     faults = []
     for k, parameter in enumerate(parameters):

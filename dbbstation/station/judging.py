@@ -33,7 +33,6 @@ class JudgedRun:
 
     Attributes:
         completed: figures and findings.
-        accepted: whether it counts.
         reason: why it does not; empty where it does.
     """
 
@@ -107,7 +106,6 @@ class RunJudge:
 
         Args:
             run: which run; storage may not have heard of it yet.
-            recording: the whole of it.
         """
         entry = RunEntry(
             test=run.test,

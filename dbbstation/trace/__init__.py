@@ -1,1 +1,1 @@
-"""Bar trajectories: as recorded, cut to the circle, analysed. Raw and centred are two types. Pure mathematics."""
+"""Bar trajectories: recorded, cut, analysed; raw and centred are two types."""

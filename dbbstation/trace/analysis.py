@@ -23,12 +23,12 @@ AGREED_MM = 1e-9
 
 @dataclass(frozen=True)
 class CircleFigures:
-    """What a circular test says in three numbers [CAL Table III].
+    """Three figures of a circular test [CAL Table III].
 
     Attributes:
-        centre_mm: centre of the least-squares circle from the fixed ball, in X and Y [mm].
-        mean_radial_error_um: mean of bar length minus nominal bar length, about the commanded centre [µm].
-        circularity_um: greatest minus least radial deviation after least-squares centring [µm].
+        centre_mm: least-squares centre from the fixed ball, X and Y.
+        mean_radial_error_um: mean less nominal bar length, about the commanded centre.
+        circularity_um: range of radial deviation after least-squares centring.
     """
 
     centre_mm: tuple[float, float]
@@ -44,12 +44,12 @@ class CircleFigures:
 def best_circle(
     theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float64], near_mm: NDArray[np.float64] | None = None
 ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
-    """Least-squares circle through points given in polar coordinates [CAL eq 6], by Gauss-Newton.
+    """Return the least-squares circle through polar points [CAL eq 6], by Gauss-Newton.
 
     Args:
-        theta_deg: angles, shape (n,) [deg].
-        radius_mm: distances from the origin, shape (n,) [mm].
-        near_mm: where the centre is about, shape (2,) [mm]; the origin if None. A near one saves steps.
+        theta_deg: shape (n,).
+        radius_mm: from the origin, shape (n,).
+        near_mm: approximate centre, shape (2,), to save steps; None: the origin.
 
     Returns:
         Centre (x, y), shape (2,) [mm]; radius [mm]; radial deviations of the points, shape (n,) [mm].
@@ -80,10 +80,9 @@ def best_circle(
 
 
 def _step(columns: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return the least-squares solution of few columns, shape (k,); None where they do not determine one.
+    """Return the least-squares solution of few columns, shape (k,), or None.
 
-    By normal equations, a tenth of the work of an orthogonal solution: what rounding leaves the next step of Gauss-Newton takes
-    out. Columns of a small part of the turn are too much alike for that and are solved orthogonally.
+    Normal equations suffice, since Gauss-Newton corrects rounding; short arcs are solved orthogonally.
 
     Args:
         columns: shape (k, n).
@@ -103,12 +102,12 @@ WORST_CONDITION = 1e6
 
 @dataclass(frozen=True, eq=False)
 class BallPath:
-    """A path as seen from the fixed ball, and its least-squares circle.
+    """A path about the fixed ball with its least-squares circle.
 
     Attributes:
-        theta_deg: angles about the ball, from +X towards +Y, within 0 to 360, shape (n,) [deg].
-        centre_mm: of the circle, from the ball, shape (2,) [mm].
-        deviation_mm: radial deviations of the points from the circle, shape (n,) [mm].
+        theta_deg: about the ball, from +X towards +Y, 0 to 360, shape (n,).
+        centre_mm: from the ball, shape (2,).
+        deviation_mm: radial, shape (n,).
     """
 
     theta_deg: NDArray[np.float64]
@@ -118,15 +117,14 @@ class BallPath:
 
 
 def path_about_ball(theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float64]) -> BallPath:
-    """Least-squares circle of a path, with each point at its angle about the fixed ball.
+    """Return a path's least-squares circle, each point at its angle about the fixed ball.
 
-    A recording has commanded angles, which count about the commanded centre. Seen from a ball that stands c beside it a
-    point is turned by about c/R. Taken at its commanded angle, a perfect circle would have the second harmonic c²/(2R):
-    0.13 µm at 0.2 mm, 13 µm at 2 mm.
+    Commanded angles count about the commanded centre. Seen from a ball at distance c a point turns by c/R. At commanded
+    angles a perfect circle would have the second harmonic c²/(2R): 0.13 µm at 0.2 mm, 13 µm at 2 mm.
 
     Args:
-        theta_deg: commanded angles, shape (n,) [deg].
-        radius_mm: distances from the fixed ball in the plane of the circle, shape (n,) [mm].
+        theta_deg: commanded, shape (n,).
+        radius_mm: from the fixed ball in the circle's plane, shape (n,).
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -144,13 +142,13 @@ def path_about_ball(theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float6
 
 
 def horizontal_radius_mm(raw: RawCircle, length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance of the moving ball from the vertical through the fixed ball, where the bar is raised [mm]."""
+    """Return the moving ball's distance from the vertical through the fixed ball [mm]."""
     height = raw.circle.bar_mm * np.sin(np.radians(raw.circle.elevation_deg))
     return np.sqrt(length_mm**2 - height**2)
 
 
 def measured_path(raw: RawCircle) -> BallPath:
-    """Path of a raw circle as measured, about the ball; worked out once.
+    """Return a raw circle's path about the ball, cached.
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -165,7 +163,7 @@ _PATHS: WeakKeyDictionary[RawCircle, BallPath] = WeakKeyDictionary()
 
 
 def figures(raw: RawCircle, length_mm: NDArray[np.float64] | None = None) -> CircleFigures:
-    """Figures of a raw circle, worked out once, or of other lengths at the same angles, shape (n,) [mm].
+    """Return figures of a raw circle, cached, or of other lengths at its angles, shape (n,) [mm].
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -194,7 +192,7 @@ def _figures(raw: RawCircle, length_mm: NDArray[np.float64]) -> CircleFigures:
 
 
 def centred(raw: RawCircle) -> CentredCircle:
-    """Remove the centre, as the standard circular test does [CAL III-A step 4], at commanded angles [CAL eq 6].
+    """Remove the centre [CAL III-A step 4], at commanded angles [CAL eq 6].
 
     Raises:
         TraceError: the points do not determine a circle.

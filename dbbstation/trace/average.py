@@ -1,4 +1,4 @@
-"""Averages of a raw circle over equal sectors, for work that does not need every sample."""
+"""Averages of a raw circle over equal sectors."""
 
 from __future__ import annotations
 
@@ -19,17 +19,14 @@ if TYPE_CHECKING:
 
 
 def sector_of(raw: RawCircle, sectors: int) -> NDArray[np.int64]:
-    """Sector of every sample, counted from 0 without gaps, shape (n,)."""
+    """Return every sample's sector, from 0 without gaps, shape (n,)."""
     sector = np.minimum((raw.phi_deg * (sectors / FULL_TURN_DEG)).astype(np.int64), sectors - 1)
     _, counted = np.unique(sector, return_inverse=True)
     return counted.astype(np.int64)
 
 
 def averaged(raw: RawCircle, sectors: int) -> RawCircle:
-    """Return the circle with one sample per sector, each the mean of the samples in it.
-
-    Still raw: averaging within half a degree removes nothing of the circle's place or shape.
-    """
+    """Return the circle with the mean sample of each sector, still raw."""
     sector = sector_of(raw, sectors)
     return replace(
         raw,
@@ -41,7 +38,7 @@ def averaged(raw: RawCircle, sectors: int) -> RawCircle:
 
 
 def means(values: NDArray[np.float64], group: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Mean of the rows of each group, shape (groups, ...); groups count from 0 without gaps."""
+    """Return each group's mean row, shape (groups, ...); groups count from 0 without gaps."""
     count = np.bincount(group)
     if values.ndim == 1:
         return np.bincount(group, values) / count
@@ -51,10 +48,10 @@ def means(values: NDArray[np.float64], group: NDArray[np.int64]) -> NDArray[np.f
 def by_angle(
     raw: RawCircle, curves: Sequence[NDArray[np.float64]], sectors: int
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Means over sectors of the turn, by rising angle: for drawing.
+    """Return sector means of the turn by rising angle, for drawing.
 
     Args:
-        curves: at its samples, shape (n,) each.
+        curves: shape (n,) each.
 
     Returns:
         Angle from +X towards +Y, shape (s,) [deg], and each curve, shape (s,).

@@ -1,4 +1,4 @@
-"""Circles cut out of recordings: raw ones, which calibrate a machine, and centred ones, which cannot."""
+"""Circles cut from recordings: raw ones calibrate a machine, centred ones cannot."""
 
 from __future__ import annotations
 
@@ -18,15 +18,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class RawCircle(WithLogged):
-    """One full turn of raw bar lengths in time order, no centre removed, shapes (n,) unless said otherwise.
+    """One full turn of raw lengths in time order, shapes (n,).
 
     Attributes:
-        name: what to call the run in messages.
-        t_s: time since the recording's first sample [s].
-        phi_deg: progress along the turn, 0 up to 360 [deg].
-        logged: what was logged beside the bar, by the name of its column.
-        start_uncertainty_deg: how well the beginning of the turn is known, one standard deviation; zero where angles were
-            recorded [deg].
+        name: for messages.
+        t_s: since the recording's first sample.
+        phi_deg: along the turn, 0 to 360.
+        logged: by column.
+        start_uncertainty_deg: of the turn's begin, one standard deviation; zero with recorded angles.
     """
 
     name: str
@@ -48,11 +47,11 @@ class RawCircle(WithLogged):
 
 @dataclass(frozen=True, eq=False)
 class CentredCircle:
-    """A circle after centre compensation [CAL eq 6]: its position on the machine is gone and cannot come back.
+    """A circle after centre compensation [CAL eq 6], without its position.
 
     Attributes:
-        theta_deg: angle from +X towards +Y, shape (n,) [deg].
-        deviation_mm: radial deviation from the best-fit circle, shape (n,) [mm].
+        theta_deg: from +X towards +Y, shape (n,).
+        deviation_mm: from the best-fit circle, shape (n,).
     """
 
     name: str

@@ -1,7 +1,6 @@
-"""Columns of a recorded run, each declared once: what it means, who reads it, which values are plausible.
+"""Columns of a recorded run, each declared once.
 
-A new column is a line in `COLUMNS`. Reading, checking, writing, cutting and averaging take it from here, and an error source
-finds it in `Motion.logged` under its name.
+A line in `COLUMNS` makes a column read, checked, written, cut, averaged and visible in `Motion.logged`.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class ColumnKind(StrEnum):
-    """What a column is, and with that who reads it."""
+    """Kinds of columns by their use."""
 
     TIME = "time"
     """Cutting, sources that act in time."""
@@ -43,9 +42,9 @@ class Column:
 
     Attributes:
         meaning: one line with the sign.
-        decimals: as written by the station.
-        size: greatest plausible absolute value, in that unit.
-        of: sensor or motor that it is of, as in `strut3` or `motor3`; empty where there is one only.
+        decimals: written by the station.
+        size: greatest plausible absolute value.
+        of: sensor or motor, as in `strut3`; may be empty.
     """
 
     name: str
@@ -100,23 +99,23 @@ TEXTS = (STATUS, CRC)
 
 
 def is_known(name: str) -> bool:
-    """Whether the format has a column of this name."""
+    """Return whether the format has this column."""
     return name in COLUMNS or name in TEXTS
 
 
 class WithLogged:
-    """What carries the columns that were logged beside the bar, `logged`: values by the name of their column, shape (n,)."""
+    """Holder of logged columns: values by name, shape (n,)."""
 
     logged: Logged
 
     @property
     def temperature_degc(self) -> dict[str, NDArray[np.float64]]:
-        """Logged temperatures by sensor (`bar`, `jig`, `machine`, `strut1` ... `strut6`), shape (n,) each [degC]."""
+        """Return temperatures by sensor (`bar`, `jig`, `machine`, `strut1` ... `strut6`), shape (n,) each [degC]."""
         return {COLUMNS[name].of: values for name, values in self.logged.items() if _is(name, ColumnKind.TEMPERATURE)}
 
     @property
     def motor_current_a(self) -> NDArray[np.float64] | None:
-        """Logged currents of the six motors, NaN for one that was not logged, shape (n, 6) [A]; None where none was."""
+        """Return the motors' currents, NaN for unlogged ones, shape (n, 6) [A]; None without any."""
         there = next((values for name, values in self.logged.items() if _is(name, ColumnKind.CURRENT)), None)
         if there is None:
             return None
@@ -126,7 +125,7 @@ class WithLogged:
 
 
 def each(logged: Logged, change: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Logged:
-    """Return every column changed in one way: cut, averaged, continued."""
+    """Return every column changed alike."""
     return {name: change(values) for name, values in logged.items()}
 
 
@@ -137,7 +136,7 @@ def temperatures(by_sensor: Logged) -> Logged:
 
 
 def currents(current_a: NDArray[np.float64]) -> Logged:
-    """Return the currents of the six motors, shape (n, 6) [A], as columns."""
+    """Return six motors' currents, shape (n, 6) [A], as columns."""
     return dict(zip(_named(ColumnKind.CURRENT), np.ascontiguousarray(current_a.T), strict=True))
 
 

@@ -1,4 +1,4 @@
-"""Cutting the full turn out of a recording that also holds feed-in, overshoot and feed-out."""
+"""Cut the full turn from a recording with feed-in, overshoot and feed-out."""
 
 from __future__ import annotations
 
@@ -76,16 +76,12 @@ INSIDE_FEEDINGS = 3.0
 def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircle:
     """Return the full turn of a recording.
 
-    Rows with angles are taken as they are: they are cut already. Otherwise the turn is anchored midway between
-    feed-in and feed-out, and angles follow from the programmed feed: controls dwell at the corners, so the
-    trace's duration says little.
-
-    Args:
-        recording: of a whole run.
+    Rows with angles are cut already. Otherwise the turn is centred between feed-in and feed-out, with angles by the
+    programmed feed, since controls dwell at corners.
 
     Raises:
-        TraceError: no feed-in or feed-out, a gap, a bar that left the circle, or a feed that is not the programmed one; with the
-            lost samples first where the line counted some or the times show some, since these may be the cause.
+        TraceError: no feed-in or feed-out, a gap, a bar off the circle, or another feed; lost samples are named first as a
+            possible cause.
     """
     try:
         return _cut(recording, circle)
@@ -101,10 +97,9 @@ def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircl
 
 
 def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
-    """Return how many samples of the turn are missing and how many are there; of the whole recording where it has no turn.
+    """Return missing and present samples of the turn, or of the recording without turn.
 
-    Missing are those that never came and those that cannot be used. What is missing before the feed-in or behind the feed-out
-    harms nothing: a bar may be put up there while nothing comes.
+    Unusable ones are missing. Losses outside the turn do no harm.
     """
     try:
         t_s = _cut(recording, circle).t_s
@@ -114,7 +109,7 @@ def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
 
 
 def unusable_on_turn(recording: Recording, circle: Circle) -> int:
-    """Return how many samples between the first and the last of the turn are there and cannot be used; 0 without a turn."""
+    """Return unusable samples within the turn; 0 without a turn."""
     try:
         return _left_out(recording, _cut(recording, circle).t_s)
     except TraceError:
@@ -150,20 +145,19 @@ def _turn(recording: Recording, circle: Circle) -> RawCircle:
 
 
 def progress_deg(recording: Recording, circle: Circle, edges: tuple[float, float]) -> NDArray[np.float64]:
-    """Progress of every sample along the turn by the programmed feed, 0 at its start, shape (n,) [deg].
+    """Return each sample's progress by the programmed feed, 0 at the turn's start, shape (n,) [deg].
 
     Args:
-        edges: times of feed-in and feed-out [s].
+        edges: feed-in and feed-out [s].
     """
     return FULL_TURN_DEG / 2.0 + (recording.t_s - (edges[0] + edges[1]) / 2.0) * circle.turning_deg_s
 
 
 def start_uncertainty_deg(recording: Recording, circle: Circle) -> float:
-    """How well the middle between two edges is known along the travel, one standard deviation [deg].
+    """Return the uncertainty of the middle between edges along the travel, one standard deviation [deg].
 
-    An edge that lies between two samples is anywhere between them: spacing / sqrt(12), and their mean that over
-    sqrt(2). Where several samples lie on the feed-in, straight lines through them find it in so many times less; what
-    is too small to matter is zero.
+    An edge between two samples has spacing / sqrt(12); their mean that over sqrt(2). Several samples on the feed-in
+    divide it by their number; negligible values are zero.
     """
     spacing_s = float(np.median(np.diff(recording.good.t_s)))
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
@@ -173,14 +167,13 @@ def start_uncertainty_deg(recording: Recording, circle: Circle) -> float:
 
 
 def edges_of(recording: Recording, circle: Circle) -> tuple[float, float]:
-    """Times of feed-in and feed-out [s].
+    """Return the times of feed-in and feed-out [s].
 
-    The edges lie at different angles, so the machine's own error there, a tenth of a millimetre or more, would move
-    them by different amounts against one common threshold: by 0.02 degrees, which costs more than the noise of a
-    whole run. Each edge is therefore taken halfway between the lengths on its two sides.
+    Each edge is halfway between the lengths on its sides: a common threshold would shift them by the machine's error,
+    0.02 degrees for a tenth of a millimetre.
 
     Raises:
-        TraceError: one of them is missing, or less than a turn lies between them.
+        TraceError: one is missing, or less than a turn lies between.
     """
     t, length = recording.good.t_s, recording.good.length_mm
     if not len(t):
@@ -223,25 +216,25 @@ COUNTS_BACKWARDS = "the gauge counts the wrong way round: turn its counting dire
 
 
 def _counts_backwards(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle) -> bool:
-    """Whether both ends of a trace stand below its middle by a feed-in: mirrored about the bar's length."""
+    """Return whether both ends lie below the middle by a feed-in, as with an inverted gauge."""
     ends = (float(np.median(length[np.abs(t - end) <= STANDING_S])) for end in (t[0], t[-1]))
     return all(abs(float(np.median(length)) - end - circle.feed_in_mm) < 0.5 * circle.feed_in_mm for end in ends)
 
 
 def _first_below(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle) -> int | None:
-    """Index of the first sample half the feed-in below the length at the start, on the way in; None where none is."""
+    """Return the first sample half a feed-in below the start's length, or None."""
     standing = np.abs(t - t[0]) <= STANDING_S
     below = np.flatnonzero(length < float(np.median(length[standing])) - circle.feed_in_mm / 2.0)
     return int(below[0]) if len(below) and below[0] > 0 else None
 
 
 def _edge(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle, first: int) -> float:
-    """Time of an edge, seen on the way in: halfway between the lengths outside and inside of it [s].
+    """Return an edge's time on the way in, halfway between outside and inside [s].
 
     Args:
-        t: times, rising or falling, shape (n,) [s].
-        length: lengths, shape (n,) [mm].
-        first: index of the first sample below half the feed-in.
+        t: rising or falling, shape (n,) [s].
+        length: shape (n,) [mm].
+        first: first sample below half the feed-in.
     """
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     after_s = np.abs(t - t[first]) * np.where(np.arange(len(t)) < first, -1.0, 1.0)
@@ -256,9 +249,9 @@ def _edge(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle, f
 
 
 def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> None:
-    """Compare the feed with the ones that duration and overlap show.
+    """Compare the feed with duration and overlap.
 
-    Dwelling at corners makes a trace longer, nothing makes it shorter; and the overlap passes the same places twice.
+    Dwelling only lengthens a trace; the overlap passes the same places twice.
     """
     duration = edges[1] - edges[0]
     at_least = circle.feed_mm_min * circle.swept_deg / circle.turning_deg_s / duration
@@ -279,9 +272,9 @@ def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]
 
 
 def overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float] | None:
-    """Feed and its standard deviation [mm/min] that make both passes of the overlap agree; worked out once.
+    """Return feed and standard deviation [mm/min] that match both passes of the overlap, cached.
 
-    Looked for about the programmed feed and about the one that the trace's duration suggests; the better match counts.
+    The search starts at the programmed feed and at that of the duration.
 
     Returns:
         None where the overlap cannot tell: too few samples, or a trace too round to show a shift.
@@ -293,13 +286,12 @@ def overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float
 def overlap_feed_under(
     recording: Recording, circle: Circle, edges: tuple[float, float], noise_mm: float
 ) -> tuple[float, float] | None:
-    """Feed that the overlap shows and its standard uncertainty [mm/min], where the noise of the turn is known.
+    """Return the overlap's feed and standard uncertainty [mm/min] under known noise.
 
-    What the pieces scatter by says little of noise that remembers the piece before, and the pieces that scatter least by chance would be
-    believed. Noise that was read off the whole turn counts where it makes more.
+    Scatter of pieces understates correlated noise; the turn's noise counts if larger.
 
     Args:
-        noise_mm: standard deviation of white noise, per sample, that would give slow figures the same uncertainty [mm].
+        noise_mm: white noise per sample of equal effect on slow figures.
 
     Returns:
         None where the overlap cannot tell, as of `overlap_feed`.
@@ -313,7 +305,7 @@ def overlap_feed_under(
 
 
 def _found_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float, float] | None:
-    """Feed, its standard deviation [mm/min], and what it would be for each millimetre of white noise [1/min]; worked out once."""
+    """Return feed, standard deviation [mm/min], and the latter per mm of white noise [1/min], cached."""
     found = _FEEDS.setdefault(recording, {})
     key = (circle, edges)
     if key not in found:
@@ -348,10 +340,10 @@ def _overlap_feed(
 def _match(
     recording: Recording, circle: Circle, middle: float, start_s: float
 ) -> tuple[float, float, float, float] | None:
-    """Duration of a turn near `start_s` at which both passes agree, and what it is known by.
+    """Return the turn's duration near `start_s` at which both passes match, with its uncertainty.
 
-    Where the second pass comes a time T after the first, their difference is offset + slope (T - turn): a regression
-    on the slope of the common shape gives what T is off by, and its uncertainty; a few rounds settle it.
+    If the second pass comes T later, the difference is offset + slope (T - turn): regression on the common slope,
+    repeated.
 
     Returns:
         The duration, its standard deviation [s], what is left [mm], and the standard deviation for each millimetre of white noise
@@ -389,10 +381,7 @@ def _match(
 
 
 def _slopes(t_s: NDArray[np.float64], piece: NDArray[np.int64]) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Return what gives the mean slope of a smooth curve in each piece, from its values at the same times.
-
-    The polynomial is fitted by an orthogonal basis that is worked out once, not for every curve.
-    """
+    """Return a function for the mean slope of smooth curves in each piece, at fixed times."""
     middle, half_s = 0.5 * (t_s[0] + t_s[-1]), 0.5 * (t_s[-1] - t_s[0])
     powers = np.polynomial.polynomial.polyvander((t_s - middle) / half_s, SHAPE_ORDER)
     orthogonal, upper = np.linalg.qr(powers)
@@ -402,14 +391,13 @@ def _slopes(t_s: NDArray[np.float64], piece: NDArray[np.int64]) -> Callable[[NDA
 
 
 def one_turn_deg(theta_deg: NDArray[np.float64], circle: Circle) -> NDArray[np.float64]:
-    """Progress along one turn at recorded angles, NaN where a sample lies outside of it, shape (n,) [deg].
+    """Return progress along one turn at recorded angles, NaN outside, shape (n,) [deg].
 
-    A run that passes places twice must not count them twice. Of more than a turn the first one counts that begins at the plan's
-    start; where none does that is whole, the one in the middle of the run. What begins a turn a little early, or ends it at its
-    full 360 degrees, does not stand at the turn's other end.
+    Of a longer run the first whole turn from the plan's start counts, else the middle one. Slight overlaps at its ends do
+    not move across.
 
     Args:
-        theta_deg: from +X towards +Y, in order of time, with or without steps of a turn, shape (n,) [deg].
+        theta_deg: from +X towards +Y, in order of time, with or without steps of a turn, shape (n,).
     """
     travelled = circle.direction.sign * (np.unwrap(theta_deg, period=FULL_TURN_DEG) - circle.start_deg)
     first, last = float(travelled.min()), float(travelled.max())
@@ -426,7 +414,7 @@ def one_turn_deg(theta_deg: NDArray[np.float64], circle: Circle) -> NDArray[np.f
 
 
 def _selected(recording: Recording, circle: Circle, phi_deg: NDArray[np.float64], rows: NDArray[np.bool_]) -> RawCircle:
-    """Rows of the turn that the instrument called usable, refused where the turn has holes or the bar left it."""
+    """Return usable rows of the turn; refuse holes and a bar off the circle."""
     if recording.usable is not None:
         rows = rows & recording.usable
     phi = phi_deg[rows]

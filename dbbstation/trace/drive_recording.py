@@ -1,4 +1,4 @@
-"""A raw recording of one drive: where it was, and which force drove it."""
+"""A raw recording of one drive: position and force."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class DriveRecording:
     """Samples of one drive, in time order.
 
     Attributes:
-        t_s: time, rising, shape (n,) [s].
-        position_mm: along the drive's axis, shape (n,) [mm].
-        force_n: that drives it, positive towards greater positions, shape (n,) [N].
+        t_s: rising, shape (n,).
+        position_mm: along the axis, shape (n,).
+        force_n: driving, positive towards greater positions, shape (n,).
     """
 
     name: str

@@ -1,8 +1,4 @@
-"""How far the bar's reading goes where the machine feeds in and out: the only way in a recording whose length is commanded.
-
-On the circle a bar reads its own length and what the machine is wrong by. Along the feed-in, and the feed-out, the machine goes a
-commanded way along the bar, a hundred times what it is wrong by there.
-"""
+"""Ways of feed-in and feed-out by the readings, the only commanded change of length."""
 
 from __future__ import annotations
 
@@ -38,8 +34,8 @@ class FeedingWay:
     """A feed-in or a feed-out.
 
     Attributes:
-        phi_deg: progress along the turn at its corner with the circle [deg].
-        way_um: length outside less length at the corner [µm].
+        phi_deg: of its corner along the turn.
+        way_um: length outside less at the corner.
     """
 
     phi_deg: float
@@ -50,11 +46,11 @@ class FeedingWay:
 def feeding_ways(
     recording: Recording, circle: Circle, edges: tuple[float, float]
 ) -> tuple[FeedingWay, FeedingWay] | None:
-    """Return how far feed-in and feed-out went by the readings; None where samples beside one of them are too few.
+    """Return feed-in and feed-out ways by the readings, or None for too few samples.
 
     Args:
-        recording: of a whole run, without angles.
-        edges: times of feed-in and feed-out, of `trace.cut.edges_of` [s].
+        recording: whole, without angles.
+        edges: from `trace.cut.edges_of` [s].
     """
     good = recording.good
     phi = progress_deg(good, circle, edges)
@@ -68,11 +64,11 @@ def feeding_ways(
 def _way(
     recording: Recording, circle: Circle, behind_s: NDArray[np.float64], along_deg: NDArray[np.float64]
 ) -> tuple[float, float] | None:
-    """Way and its standard uncertainty at one corner [µm].
+    """Return way and standard uncertainty at one corner [µm].
 
     Args:
-        behind_s: how long each was taken on the circle's side of the edge, shape (n,) [s].
-        along_deg: arc from the corner to where each was taken, shape (n,) [deg].
+        behind_s: time on the circle's side of the edge, shape (n,).
+        along_deg: arc from the corner, shape (n,).
     """
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     outside = recording.length_mm[(behind_s > -OUTSIDE_FEEDINGS * feeding_s) & (behind_s < -feeding_s)]

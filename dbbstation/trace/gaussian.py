@@ -18,9 +18,9 @@ samples themselves can just show."""
 
 
 def transmission(undulations: NDArray[np.float64], cut_off_upr: float) -> NDArray[np.float64]:
-    """Share of the amplitude of an undulation that passes, 0.5 at the cut-off.
+    """Return an undulation's transmitted share, 0.5 at the cut-off.
 
-    exp(-π (α k / k_c)²) with α = sqrt(ln 2 / π), which is 2^-(k / k_c)² [ISO 16610-21:2011, 5.3].
+    exp(-π (α k / k_c)²), α = sqrt(ln 2 / π), which is 2^-(k / k_c)² [ISO 16610-21:2011, 5.3].
 
     Args:
         undulations: per revolution, shape (k,).
@@ -29,14 +29,14 @@ def transmission(undulations: NDArray[np.float64], cut_off_upr: float) -> NDArra
 
 
 def gaussian(theta_deg: NDArray[np.float64], values: NDArray[np.float64], cut_off_upr: float) -> NDArray[np.float64]:
-    """Return a closed profile without its short undulations, at the same angles.
+    """Return a closed profile without short undulations, at the same angles.
 
-    Samples need not lie equally close: each counts by the arc that it stands for.
+    Each sample counts by its arc.
 
     Args:
-        theta_deg: angles of a full turn, shape (n,) [deg].
-        values: at these angles, shape (n,), any unit.
-        cut_off_upr: undulations per revolution of which half the amplitude passes.
+        theta_deg: of a full turn, shape (n,).
+        values: shape (n,), any unit.
+        cut_off_upr: half of whose amplitude passes.
     """
     cells = max(LEAST_CELLS, 1 << int(np.ceil(np.log2(CELLS_PER_SAMPLE * len(theta_deg)))))
     place = np.mod(theta_deg, FULL_TURN_DEG) / FULL_TURN_DEG * cells

@@ -1,4 +1,4 @@
-"""Samples that a recording lacks: what the line or a busy computer lost between two that came."""
+"""Samples missing between recorded ones."""
 
 from __future__ import annotations
 
@@ -17,13 +17,10 @@ _REGULAR = 0.9
 
 
 def lost_samples(t_s: NDArray[np.float64]) -> int:
-    """Return how many samples are missing between the first and the last, as far as their times show it.
-
-    A device that samples at a fixed rate leaves whole periods where samples were lost. Times without a fixed rate, such
-    as those of a computer that asks when it has time, show nothing: 0.
+    """Return missing samples by times of a fixed rate; 0 without a fixed rate.
 
     Args:
-        t_s: times of the samples, rising, shape (n,) [s].
+        t_s: rising, shape (n,).
     """
     if len(t_s) < _FEWEST:
         return 0
@@ -39,20 +36,20 @@ def lost_samples(t_s: NDArray[np.float64]) -> int:
 
 
 def share_lost(lost: int, kept: int, unusable: int = 0) -> str:
-    """Return how many samples were lost, in words with the share of all.
+    """Return the number of lost samples with their share, in words.
 
     Args:
-        unusable: of the missing ones, how many are recorded but cannot be used.
+        unusable: recorded but unusable, of these.
     """
     how = "were lost or cannot be used" if unusable else "were lost"
     return f"{lost} of {lost + kept} samples {how} ({100.0 * lost / (lost + kept):.2g} %)"
 
 
 def too_many_lost(lost: int, kept: int, largest_percent: float, unusable: int = 0) -> str:
-    """Return what is wrong with a run that lost so many samples; empty where that is within the limit.
+    """Return the fault of too many lost samples; empty within the limit.
 
     Args:
-        unusable: of the lost ones, how many are recorded but cannot be used.
+        unusable: recorded but unusable, of these.
     """
     if 100.0 * lost <= largest_percent * (lost + kept):
         return ""

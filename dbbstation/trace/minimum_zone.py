@@ -1,4 +1,4 @@
-"""The minimum zone of a path: the two concentric circles of least separation with all its points between them."""
+"""The minimum zone: two concentric circles of least separation around a path."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class MinimumZone:
     """Two concentric circles.
 
     Attributes:
-        centre_mm: their centre (x, y) [mm].
+        centre_mm: (x, y).
     """
 
     centre_mm: tuple[float, float]
@@ -48,15 +48,14 @@ class MinimumZone:
 
 
 def minimum_zone(points_mm: NDArray[np.float64]) -> MinimumZone:
-    """Return the minimum zone of a closed path, exactly.
+    """Return the exact minimum zone of a closed path.
 
-    Two points on the outer and two on the inner circle determine it: at a least width the chord of two points that touch
-    outside crosses that of two that touch inside [Rivlin, Approximation by circles, Computing 21 (1979)]. Its centre is
-    therefore where the bisectors of two pairs meet. All pairs of a few points are tried; the zone that is found for them is
-    no wider than that of all points. Whichever points stick out join the few, until none does: then it is that of all.
+    Two outer and two inner points determine it, with crossing chords [Rivlin, Approximation by circles, Computing 21
+    (1979)]; its centre is where two bisectors meet. All pairs of a few points are tried, and protruding points join them
+    until none is left.
 
     Args:
-        points_mm: of a path round the origin, shape (n, 2) [mm].
+        points_mm: round the origin, shape (n, 2).
 
     Raises:
         TraceError: fewer than four different points.
@@ -75,7 +74,7 @@ def minimum_zone(points_mm: NDArray[np.float64]) -> MinimumZone:
 
 
 def _extremes(points_mm: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Indices of the farthest and nearest point of each sector."""
+    """Return farthest and nearest point of each sector."""
     # Sorting all points takes longer than the search: those of a sound path differ from the first.
     first = points_mm[:FEWEST_POINTS]
     if len(np.unique(first, axis=0)) < FEWEST_POINTS and len(np.unique(points_mm, axis=0)) < FEWEST_POINTS:
@@ -93,7 +92,7 @@ def _extremes(points_mm: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _best_centre(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Centre of the minimum zone of a few points, by all crossings of the bisectors of two pairs, shape (2,) [mm]."""
+    """Return the zone's centre for a few points by all bisector crossings, shape (2,) [mm]."""
     pairs = np.array(list(combinations(range(len(points_mm)), 2)))
     first, second = points_mm[pairs[:, 0]], points_mm[pairs[:, 1]]
     along = second - first
@@ -117,7 +116,7 @@ def _best_centre(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _widths(centres_mm: NDArray[np.float64], points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Width of the zone of points about each of several centres, shape (centres,) [mm]."""
+    """Return the zone's width about each centre, shape (centres,) [mm]."""
     # Points first: ranges are then taken row by row of a thousand centres, not centre by centre of a dozen points.
     across, along = (points_mm[:, k, None] - centres_mm[:, k] for k in (0, 1))
     return np.asarray(np.ptp(np.sqrt(across * across + along * along), axis=0))

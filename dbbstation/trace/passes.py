@@ -29,8 +29,8 @@ class Passes:
     """Second pass less first.
 
     Attributes:
-        phi_deg: progress of the first pass, counted from the start of the turn, shape (n,) [deg].
-        apart_um: second pass less first, shape (n,) [µm].
+        phi_deg: of the first pass, from the turn's start, shape (n,).
+        apart_um: shape (n,).
     """
 
     phi_deg: NDArray[np.float64]
@@ -39,16 +39,16 @@ class Passes:
 
     @property
     def mean_um(self) -> float:
-        """How much longer the bar reads after one turn [µm]."""
+        """Return the reading's growth after one turn [µm]."""
         return float(self.apart_um.mean())
 
     def u_mean_um(self, sigma_um: float) -> float:
-        """Standard uncertainty of that by a noise of `sigma_um` per sample of either pass [µm]."""
+        """Return its standard uncertainty for noise `sigma_um` per sample [µm]."""
         return sigma_um * float(np.sqrt(2.0 / len(self.apart_um)))
 
 
 def passes_of(recording: Recording, circle: Circle) -> Passes | None:
-    """Return both passes of the overlap of a recording; None where it has none, because it was cut or is too short.
+    """Return both passes of the overlap; None if cut or too short.
 
     Raises:
         TraceError: feed-in or feed-out is missing.

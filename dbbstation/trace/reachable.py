@@ -1,14 +1,9 @@
-"""Lengths that the bar can have, by how fast the machine moves it: what a line without a checksum may have made up shows here.
+"""Possible lengths of the bar by the machine's speed: false readings without checksum show.
 
-The fixed ball stands and the tool tip moves with the feed F, so between two readings the distance of the balls changes by no more
-than F times their time apart, whatever the machine's errors are (triangle inequality). On the full turn the machine moves across
-the bar, and what changes the length there are its errors alone. They stay within the feed-in A (a turn that leaves it is refused)
-and are mostly made of few undulations: a curve of no more than n undulations per revolution that stays within A changes by no more
-than n A per radian (Bernstein's inequality). With A = 1.5 mm, n = 3, F = 1000 mm/min and a radius of 150 mm these are 0.6 mm in a
-second, with the override: 43 um from one reading of a display (14 per second) to the next, 2.4 um at 250 readings per second.
-
-To both comes what a machine does at once. A reading beyond is doubtful, unless the ones behind it agree with it: then the bar did
-move, was hit or left its seat, which other checks find and say.
+The distance changes by at most F times the time (triangle inequality). On the full turn only errors change it: within the
+feed-in A and with at most n undulations, by at most n A per radian (Bernstein's inequality). With A = 1.5 mm, n = 3, F =
+1000 mm/min, radius 150 mm and override that is 0.6 mm/s: 43 um between readings at 14 per second, 2.4 um at 250. Sudden
+errors are added. A reading beyond is doubtful unless later ones agree with it.
 """
 
 from __future__ import annotations
@@ -42,7 +37,7 @@ AGREEING = 3
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """A reading: its time [s], itself [mm], standard uncertainty of the time [s]."""
+    """Time [s], length [mm] and time uncertainty [s] of a reading."""
 
     t_s: float
     length_mm: float
@@ -50,10 +45,10 @@ class _Seen:
 
 
 class Reachable:
-    """Tells lengths that the bar can have from others, from readings in time order.
+    """Tells possible lengths from others, in time order.
 
     Args:
-        circle: as commanded; None: nothing moves the bar, it is on its calibrator.
+        circle: None: the bar rests on its calibrator.
     """
 
     def __init__(self, circle: Circle | None) -> None:
@@ -69,25 +64,25 @@ class Reachable:
         self._on_turn_mm_s = min(across_mm_s, feed_mm_s)
 
     def note(self, t_s: float, length_mm: float, t_uncertainty_s: float = 0.0) -> None:
-        """Take a reading that is held against nothing, while nobody knows how fast the bar is moved."""
+        """Note a reading at unknown speed, without judging it."""
         self._believe(_Seen(t_s, length_mm, t_uncertainty_s))
 
     @classmethod
     def standing(cls, lengths_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which readings of a bar that stands can be its length, shape (n,).
+        """Return which readings of a resting bar are possible, shape (n,).
 
         Args:
-            lengths_mm: in time order, shape (n,) [mm].
+            lengths_mm: in time order, shape (n,).
         """
         bar = cls(None)
         bar.note(0.0, float(np.median(lengths_mm)))
         return np.array([not bar.doubt(0.0, float(one), on_turn=False) for one in lengths_mm], dtype=np.bool_)
 
     def doubt(self, t_s: float, length_mm: float, t_uncertainty_s: float = 0.0, *, on_turn: bool) -> str:
-        """Return why a reading cannot be the bar's length; empty where it can.
+        """Return why a reading is impossible, or an empty text.
 
         Args:
-            on_turn: the machine is on the full turn, not on its way to the circle or from it.
+            on_turn: on the full turn, not its approach.
         """
         one, last = _Seen(t_s, length_mm, t_uncertainty_s), self._good
         if last is None or self._follows(last, one, on_turn=on_turn):
@@ -111,6 +106,6 @@ class Reachable:
         return abs(one.length_mm - before.length_mm) <= self._limit_mm(before, one, on_turn=on_turn)
 
     def _limit_mm(self, before: _Seen, one: _Seen, *, on_turn: bool) -> float:
-        """Return by how much the length may change from one reading to another [mm]."""
+        """Return the allowed change between two readings [mm]."""
         longest_s = one.t_s - before.t_s + HALF_WIDTH * (one.t_uncertainty_s + before.t_uncertainty_s)
         return (self._on_turn_mm_s if on_turn else self._off_turn_mm_s) * max(longest_s, 0.0) + SUDDEN_MM

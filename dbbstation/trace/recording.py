@@ -1,4 +1,4 @@
-"""A run as it was recorded, before anything is done to it."""
+"""A run as recorded."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Recording(WithLogged):
-    """Samples of one run in time order, shapes (n,) unless said otherwise.
+    """Samples of one run in time order, shapes (n,).
 
     Attributes:
-        name: what to call the run in messages, its file where it has one.
-        t_s: host time since the first sample, strictly increasing [s].
-        length_mm: distance between the ball centres, raw [mm].
-        theta_deg: commanded angle from +X towards +Y [deg]; present where the rows are already cut to the
-            circle, None where the circle has to be found in the trace.
-        logged: what was logged beside the bar, by the name of its column.
-        usable: False for samples that the instrument itself called bad, and for doubtful ones; they stay in the recording.
+        name: for messages, its file if any.
+        t_s: host time since the first sample, strictly rising.
+        length_mm: between ball centres, raw.
+        theta_deg: commanded, from +X towards +Y, of a cut recording; None: find the circle in the trace.
+        logged: by column.
+        usable: False for bad and doubtful samples, which stay.
     """
 
     name: str
@@ -41,7 +40,7 @@ class Recording(WithLogged):
 
     @property
     def good(self) -> Recording:
-        """The samples that can be used: all that a calculation may see."""
+        """Return the usable samples, for all calculations."""
         # Not kept where it is the recording itself: one that names itself stays in the memory until the collector of garbage comes by.
         return self if self.usable is None or self.usable.all() else self._usable_rows
 

@@ -1,4 +1,4 @@
-"""A length that does not change, from many readings of it: mean and standard uncertainty."""
+"""Mean and standard uncertainty of a constant length."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Steady:
     """Mean of readings of one length.
 
     Attributes:
-        drift_mm: mean of the last batch minus that of the first [mm].
+        drift_mm: last batch's mean minus the first's.
     """
 
     mean_mm: float
@@ -33,16 +33,15 @@ class Steady:
 def steady(readings_mm: NDArray[np.float64], resolution_mm: float | None = None) -> Steady:
     """Return mean and standard uncertainty of readings of one length.
 
-    The type A part is the standard deviation of the mean of ten batches, since readings that follow each other are not
-    independent [GUM 4.2.3, 4.2.7]. The resolution adds its rectangular distribution, d / sqrt(12) [GUM F.2.2.1], which averaging does
-    not take away where the length does not move.
+    Type A is the standard deviation of the mean of ten batches, for correlated readings [GUM 4.2.3, 4.2.7]. The
+    resolution adds d / sqrt(12) [GUM F.2.2.1].
 
     Args:
-        readings_mm: in time order, shape (n,), at least twenty [mm].
-        resolution_mm: step of the readings; None: the smallest difference between two of them [mm].
+        readings_mm: in time order, shape (n,), at least twenty.
+        resolution_mm: None: the smallest difference.
 
     Raises:
-        ValueError: fewer readings, or all are alike and no resolution is given.
+        ValueError: fewer readings, or all equal without resolution.
     """
     if len(readings_mm) < 2 * BATCHES:
         raise ValueError(f"{len(readings_mm)} readings, at least {2 * BATCHES} are needed")

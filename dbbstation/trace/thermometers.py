@@ -1,4 +1,4 @@
-"""What thermometers logged in the runs of a session, as curves over its time."""
+"""Thermometers over a session as curves."""
 
 from __future__ import annotations
 
@@ -15,12 +15,9 @@ if TYPE_CHECKING:
 def logged_curve(
     runs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Temperature over a session: two points for each run, the smoothest curve that shows what was logged.
+    """Return temperature over a session: two points per run, the smoothest curve within the resolution.
 
-    A thermometer that shows tenths says no more than that it is within half a tenth: of all curves within that of the
-    means of each half run the one of least bending is taken. One of fine steps is followed as it is.
-
-    What changes within half a run is lost.
+    Of all curves within half a step of each half run's mean, the least bent is taken. Changes within half a run are lost.
 
     Args:
         runs: times [s] and temperatures [degC] of each run, shape (n,) each.
@@ -54,6 +51,6 @@ SHOWN_K = 1e-3
 
 
 def _resolution(degc: NDArray[np.float64]) -> float:
-    """Greatest step of which all differences of what was shown are multiples [K]; zero where there was one value only."""
+    """Return the greatest common step of shown differences [K]; zero for one value."""
     steps = np.diff(np.unique(np.round(degc / SHOWN_K).astype(np.int64)))
     return SHOWN_K * float(np.gcd.reduce(steps)) if len(steps) else 0.0

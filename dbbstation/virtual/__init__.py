@@ -1,1 +1,1 @@
-"""A machine and an instrument that are not there: what the package is tried on, shown with and tested against."""
+"""A virtual machine and instrument for trials, demonstrations and tests."""

@@ -1,4 +1,4 @@
-"""The virtual measuring cell: machine, ball and bar in virtual time, told what to do by one thread, read by another."""
+"""The virtual cell: machine, ball and bar in virtual time."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class _Running:
 
 
 class VirtualCell:
-    """What the bar reads at any virtual time.
+    """The bar's reading at any virtual time.
 
-    Before a run and while a ball is put up the bar lies aside. After a run it stands where the run ended.
+    The bar lies aside before a run and during set-up; after a run it stays.
 
     Args:
-        clock: virtual time [s].
+        clock: [s].
     """
 
     def __init__(self, machine: VirtualMachine, clock: ScaledClock) -> None:
@@ -41,7 +41,7 @@ class VirtualCell:
         self._origin_s: float | None = None
 
     def length_mm_at(self, t_s: float) -> float | None:
-        """Reading at a virtual time [mm]; None while the bar lies aside."""
+        """Return the reading at a virtual time [mm]; None while the bar lies aside."""
         with self._lock:
             running, block_mm = self._running, self._block_mm
         if block_mm is not None:
@@ -51,10 +51,10 @@ class VirtualCell:
         return running.run.length_mm_at(t_s - running.begin_s) + self.machine.noise_mm()
 
     def mount(self, test: str) -> int:
-        """Put up the ball of a test, touching its holder in any case; return the number of the mounting.
+        """Put up a test's ball anew; return the mounting's number.
 
         Raises:
-            MachineError: a run goes on, or the plan has no such test.
+            MachineError: a run goes on, or an unknown test.
         """
         self._refuse_while_running("put up a ball")
         if test not in self.machine.plan.tests:
@@ -65,10 +65,7 @@ class VirtualCell:
             return self.machine.mount(self.machine.plan.tests[test].ball)
 
     def calibrate(self, length_mm: float) -> None:
-        """Put the bar on a calibrator, until a ball is put up or a run started.
-
-        Args:
-            length_mm: of the calibrator [mm].
+        """Put the bar on a calibrator until the next ball or run.
 
         Raises:
             MachineError: a run goes on.
@@ -79,10 +76,10 @@ class VirtualCell:
         self._clock.run_until(math.inf)
 
     def start(self, test: str, direction: Direction, path: CommandedPath | None = None) -> VirtualRun:
-        """Start a run now; its ball is put up first where another one stands.
+        """Start a run; another ball is replaced first.
 
         Raises:
-            MachineError: another run goes on, or this one cannot be run.
+            MachineError: another run goes on, or this one is impossible.
         """
         self._refuse_while_running("start another run")
         if self._origin_s is None:
@@ -97,7 +94,7 @@ class VirtualCell:
         return run
 
     def stop(self) -> None:
-        """Stop the machine where it is and lay the bar aside."""
+        """Stop the machine and lay the bar aside."""
         self._clock.settle()
         with self._lock:
             self._running = self._block_mm = None
@@ -111,7 +108,7 @@ class VirtualCell:
             )
 
     def status(self) -> dict[str, object]:
-        """What the cell does, as plain values."""
+        """Return the state as plain values."""
         self._clock.settle()
         with self._lock:
             running = self._running

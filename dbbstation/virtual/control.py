@@ -41,10 +41,10 @@ _LONGEST = 4096
 
 
 class CellCommands:
-    """Obeys the commands of the protocol.
+    """Obeys the protocol's commands.
 
     Args:
-        programs: turns the name of a program into what it commands; None: there are none.
+        programs: from a program's name to its command; None: none.
     """
 
     def __init__(self, cell: VirtualCell, programs: Programs | None = None) -> None:
@@ -88,10 +88,10 @@ class CellCommands:
 
 
 class ControlServer:
-    """Answers on a loopback port, in one thread; use it in a `with` block.
+    """Answers on a loopback port in one thread; a `with` block.
 
     Args:
-        obey: turns a line into an answer.
+        obey: from a line to its answer.
     """
 
     def __init__(self, obey: Callable[[str], dict[str, object]]) -> None:

@@ -1,4 +1,4 @@
-"""Talks to the control address of a virtual machine."""
+"""Client of a virtual machine's control address."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ class ControlClient:
     """Sends one command per connection.
 
     Args:
-        url: as `emulate` prints it, such as `tcp://127.0.0.1:41234`.
+        url: such as `tcp://127.0.0.1:41234`.
 
     Raises:
-        MachineError: the address is none, or is on another computer: a program must not move a machine that nobody
-            at it can see.
+        MachineError: no such address, or another computer, whose machine nobody watches.
     """
 
     def __init__(self, url: str) -> None:
@@ -44,7 +43,7 @@ class ControlClient:
         """Send a command, return its answer.
 
         Raises:
-            MachineError: nobody answers, or the machine refuses.
+            MachineError: no answer, or a refusal.
         """
         try:
             with socket.create_connection(self._address, timeout=_PATIENCE_S) as line:
@@ -67,7 +66,7 @@ class ControlClient:
         return answer
 
     def free(self) -> None:
-        """Stop a run that still goes on, left over from a program that died.
+        """Stop a run of a dead program.
 
         Raises:
             MachineError: nobody answers.

@@ -1,4 +1,4 @@
-"""The virtual machine: a nominal controller drives actual geometry, a bar between two balls reads the distance."""
+"""The virtual machine: nominal controller, actual geometry, a bar between balls."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ _SESSION, _BAR = "virtual session", "virtual bar"
 
 @dataclass(frozen=True)
 class Sizes:
-    """How well the virtual measurement goes, one standard deviation each.
+    """Accuracy of the virtual measurement, one standard deviation each.
 
     Attributes:
-        set_up_mm: of balls that are put up under the spindle, fixed and moving, per axis [mm].
+        set_up_mm: of balls under the spindle, per axis.
     """
 
     noise_mm: float = 0.0003
@@ -41,11 +41,10 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class VirtualRun:
-    """A run computed before it starts.
+    """A run computed before its start.
 
     Attributes:
-        direction: sense of travel.
-        length_mm: true distance plus the bar's own error at the times of the path, shape (n,) [mm].
+        length_mm: distance plus the bar's error at the path's times, shape (n,).
     """
 
     test: str
@@ -55,17 +54,16 @@ class VirtualRun:
     length_mm: NDArray[np.float64]
 
     def length_mm_at(self, t_s: float) -> float:
-        """Distance at a time after the start of the run; it stands still before and after [mm]."""
+        """Return the distance at a time after the start, constant beyond the ends [mm]."""
         return float(np.interp(t_s, self.path.t_s, self.length_mm))
 
 
 class VirtualMachine:
-    """A machine with known errors, a plan's balls to mount, circles to run.
+    """A machine with known errors, mountable balls and circles.
 
     Args:
-        truth: nominal machine with what is wrong with the actual one.
-        seed: of mountings, ball coordinates, bar and noise.
-        sizes: how well the measurement goes.
+        truth: nominal machine with errors.
+        seed: of mountings, balls, bar and noise.
     """
 
     def __init__(self, truth: MachineModel, plan: Plan, *, seed: int = 0, sizes: Sizes | None = None) -> None:
@@ -82,16 +80,16 @@ class VirtualMachine:
 
     @property
     def bar_error_mm(self) -> float:
-        """What the bar reads less the true distance [mm]."""
+        """Return the bar's reading less true distance [mm]."""
         return float(self._bar.values[0])
 
     def check(self) -> None:
-        """Compute every run of the plan once, so that what cannot be run is known before anything starts.
+        """Compute every planned run once, to find impossible ones.
 
         Raises:
             TravelError: a circle leaves the travel.
             MachineError: the actual machine cannot take a pose.
-            ModelError: an error source of the truth needs what a virtual machine does not have, such as temperatures.
+            ModelError: a source of the truth needs missing data, such as temperatures.
         """
         self.plan.check(self.truth.machine)
         for test in self.plan.tests.values():
@@ -99,7 +97,7 @@ class VirtualMachine:
             self.truth.bar(Motion(path.poses, is_path=True, time_s=path.t_s, setup=self._setup(test.ball)))
 
     def mount(self, ball: Ball) -> int:
-        """Put a ball up, which makes a new mounting even where it stood there before; return its number."""
+        """Put a ball up anew; return the mounting's number."""
         self.mountings += 1
         self.mounted = ball
         return self.mountings
@@ -107,18 +105,17 @@ class VirtualMachine:
     def run(
         self, test: str, direction: Direction, *, path: CommandedPath | None = None, begin_s: float = 0.0
     ) -> VirtualRun:
-        """Compute a run, with its ball put up first where another one stands.
+        """Compute a run, with its ball put up if needed.
 
-        A ball that is put up under the spindle stands where the tool tip is when its mounting's first run begins.
+        A ball under the spindle stands at the tip of its mounting's first run.
 
         Args:
-            direction: sense of travel.
-            path: what a program commands; the plan's circle by default.
-            begin_s: session time at which it will start, for errors that grow with time [s].
+            path: None: the plan's circle.
+            begin_s: in the session, for errors over time.
 
         Raises:
-            MachineError: the plan has no such run, or the actual machine cannot take a pose of the path.
-            ModelError: an error source of the truth needs what a virtual machine does not have, such as temperatures.
+            MachineError: an unplanned run, or an impossible pose.
+            ModelError: a source of the truth needs missing data, such as temperatures.
         """
         planned = self._planned(test, direction)
         if self.mounted is None or self.mounted.name != planned.ball.name:
@@ -135,19 +132,16 @@ class VirtualMachine:
         return VirtualRun(test, direction, self.mountings, path, model.bar(motion).length_mm)
 
     def restart_noise(self) -> None:
-        """Begin the noise of a run: it shall not depend on how many samples nobody read before."""
+        """Restart the noise for a run, independent of earlier samples."""
         self._restarted += 1
         self._noise = np.random.default_rng([self._scatter.seed, 5, self._restarted])
 
     def noise_mm(self) -> float:
-        """Return the error of the next reading [mm]."""
+        """Return the next reading's error [mm]."""
         return float(self._noise.normal(0.0, self.sizes.noise_mm)) if self.sizes.noise_mm else 0.0
 
     def describe(self) -> dict[str, object]:
-        """Everything that is wrong, by source, set and parameter, in the parameters' units.
-
-        Of balls that were put up under the spindle also how they stand at the tool tip, as a micrometer would read it.
-        """
+        """Return all errors by source, set and parameter, in their units, and set-ups under the spindle."""
         under = self._under_spindle
         sources = (*self.truth.sources, self._bar, *self._scatter.all(), *(f for *_, of in under.values() for f in of))
         return {

@@ -1,4 +1,4 @@
-"""What the virtual control commands over time, from a toolpath: of a plan's circle or of an NC program."""
+"""Commands of the virtual control over time."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class CommandedPath:
-    """Poses with their times; in between the machine moves evenly.
+    """Poses with times; motion is even in between.
 
     Attributes:
-        t_s: rising, from 0, shape (n,) [s].
-        poses: commanded, shape (n, 6) [mm, deg].
+        t_s: rising from 0, shape (n,).
+        poses: shape (n, 6) [mm, deg].
     """
 
     t_s: NDArray[np.float64]
@@ -37,12 +37,12 @@ class CommandedPath:
 
 
 def circle_path(circle: Circle) -> CommandedPath:
-    """Return the whole path of a run, with the dwells and corners that controls make."""
+    """Return a run's path with dwells and corners."""
     return path_of(circle_toolpath(circle, "circle", approach=None))
 
 
 def path_of(toolpath: Toolpath) -> CommandedPath:
-    """Return what a toolpath commands while the bar is on: from its first pause to its last where it has them.
+    """Return what a toolpath commands with the bar on: first to last pause, if any.
 
     Raises:
         MachineError: it does not move.

@@ -1,4 +1,4 @@
-"""What is wrong with the virtual machine, drawn at random with stated sizes: a seed makes the same machine again."""
+"""Random errors of the virtual machine, reproducible by seed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _KINEMATIC = ("strut-reference-length", "base-joints")
 
 
 def random_kinematics(machine: Machine, seed: int) -> tuple[Fitted, ...]:
-    """Return the 24 kinematic errors of a random machine."""
+    """Return 24 random kinematic errors."""
     rng = np.random.default_rng([seed, 1])
     return tuple(
         Fitted(source, rng.normal(0.0, JOINT_ERROR_MM, len(source.parameters(machine))))
@@ -32,11 +32,11 @@ def random_kinematics(machine: Machine, seed: int) -> tuple[Fitted, ...]:
 
 @dataclass
 class MeasurementErrors:
-    """Errors of the measurement: of each mounting or set-up, of each ball's coordinates, of the bar's length.
+    """Errors of mountings, ball coordinates and bar.
 
     Args:
-        seed: makes the same errors again; those of a ball do not depend on what else was mounted.
-        set_up_mm: of balls that are put up under the spindle by hand, standard deviation per axis [mm].
+        seed: a ball's errors do not depend on other mountings.
+        set_up_mm: under the spindle by hand, standard deviation per axis.
     """
 
     seed: int
@@ -52,7 +52,7 @@ class MeasurementErrors:
         return Fitted(source, rng.normal(0.0, self.bar_uncertainty_mm, 1), shared)
 
     def ball(self, ball: Ball, shared: str) -> Fitted:
-        """Error of a ball's coordinates, the same in all its mountings."""
+        """Return a ball's coordinate error, common to its mountings."""
         if ball.name not in self._of_balls:
             rng = np.random.default_rng([self.seed, 3, *ball.name.encode()])
             (source,) = sources_named(("ball-coordinate",))
@@ -60,7 +60,7 @@ class MeasurementErrors:
         return self._of_balls[ball.name]
 
     def mounting(self, ball: Ball, number: int, shared: str) -> Fitted:
-        """Where the ball came to stand when it was put up for the `number`-th time."""
+        """Return a ball's place in its `number`-th mounting."""
         if number not in self._of_mountings:
             rng = np.random.default_rng([self.seed, 4, number])
             (source,) = sources_named(("mounting",))
@@ -68,9 +68,9 @@ class MeasurementErrors:
         return self._of_mountings[number]
 
     def set_up(self, number: int) -> SetUp:
-        """How the balls of the `number`-th mounting stand at the tool tip, where one was put up under the spindle."""
+        """Return the balls' places at the tip in the `number`-th mounting under the spindle."""
         return SetUp.drawn(np.random.default_rng([self.seed, 6, number]), self.set_up_mm)
 
     def all(self) -> tuple[Fitted, ...]:
-        """What was drawn so far, of balls and mountings."""
+        """Return all drawn errors of balls and mountings."""
         return (*self._of_balls.values(), *self._of_mountings.values())

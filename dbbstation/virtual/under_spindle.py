@@ -1,4 +1,4 @@
-"""A ball that is put up under the spindle, and the moving ball that is attached after it [CAL III-A, Fig 4]."""
+"""A fixed ball under the spindle and the moving ball attached after it [CAL III-A, Fig 4]."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _STANDING_S = np.array([0.0, 1.0, 2.0])
 
 
 class MovingBall(ToolBallOffset):
-    """The moving ball is off the tool tip, otherwise each time it is attached."""
+    """The moving ball's offset from the tip, different each time."""
 
     name = "moving-ball"
     belongs_to = Owner.MOUNTING
@@ -34,12 +34,11 @@ class MovingBall(ToolBallOffset):
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """How balls really stand.
+    """Actual places of balls.
 
     Attributes:
-        fixed_ball_mm: fixed ball less tool tip while the machine stood at the ball's commanded place, machine frame,
-            shape (3,) [mm].
-        moving_ball_mm: moving ball less tool tip, platform frame, shape (3,) [mm].
+        fixed_ball_mm: fixed ball less tool tip at its commanded place, machine frame, shape (3,).
+        moving_ball_mm: moving ball less tool tip, platform frame, shape (3,).
     """
 
     fixed_ball_mm: NDArray[np.float64]
@@ -47,7 +46,7 @@ class SetUp:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, size_mm: float) -> Self:
-        """Draw both balls' errors of a size, one standard deviation per axis [mm]."""
+        """Draw both balls' errors, one standard deviation per axis [mm]."""
         fixed, moving = rng.normal(0.0, size_mm, (2, 3))
         return cls(fixed, moving)
 
@@ -57,21 +56,21 @@ class SetUp:
         return cls(np.zeros(3), np.zeros(3))
 
     def read(self, rng: np.random.Generator, uncertainty_mm: float) -> SetUpErrors:
-        """Return what a micrometer of an uncertainty, one standard deviation [mm], reads of it."""
+        """Return a micrometer's reading with this standard deviation [mm]."""
         fixed, moving = rng.standard_normal((2, 3)) * uncertainty_mm
         return SetUpErrors(self.fixed_ball_mm + fixed, self.moving_ball_mm + moving, uncertainty_mm)
 
 
 def put_up(truth: MachineModel, circle: Circle, setup: Setup, balls: SetUp, at_s: float = 0.0) -> tuple[Fitted, Fitted]:
-    """Return what a set-up does to the bar: where the fixed ball came to stand, how the moving ball sits.
+    """Return a set-up's effect on the bar: fixed and moving ball.
 
     Args:
-        circle: tells where and at which tilt the machine was told to stand.
-        balls: how they stand at the tool tip.
+        circle: gives the commanded place and tilt.
+        balls: at the tool tip.
 
     Raises:
         KinematicsError: the machine cannot take the pose.
-        ModelError: a source needs what a standing machine does not give, such as temperatures.
+        ModelError: a source needs data that a standing machine lacks.
     """
     pose = np.array([*circle.ball_mm, *circle.tilt_deg])
     standing = Motion(np.tile(pose, (len(_STANDING_S), 1)), is_path=True, time_s=at_s + _STANDING_S, setup=setup)

@@ -1,6 +1,6 @@
-"""The virtual instrument: answers on a pseudo-terminal as a protocol file says, byte for byte, at the speed of its line.
+"""The virtual instrument: answers on a pseudo-terminal by a protocol file, at the line's speed.
 
-It is driven by the same grammar as the driver. What it measures is a function of virtual time; one thread does the rest.
+It uses the driver's grammar and measures a function of virtual time.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _UNDER_WAY = 64
 
 @dataclass(slots=True)
 class _Outgoing:
-    """Bytes on their way: the first is complete one character time after `start_s`."""
+    """Bytes in transit, the first complete one character time after `start_s`."""
 
     raw: bytes
     start_s: float
@@ -52,21 +52,19 @@ class _Outgoing:
 
 
 class VirtualInstrument:
-    """A length instrument that is not there; use it in a `with` block, which switches it on and off.
+    """A virtual length instrument; a `with` block switches it.
 
     Args:
-        length_mm_at: length in mm at a virtual time in s; None: the bar is not between the balls, which the instrument tells in
-            its own way as a fault. Called from the instrument's thread.
-        clock: virtual time; real time by default.
-        rate_hz: samples per second of a stream, instead of the protocol's.
-        baud: rate that the device is set to. On a pseudo-terminal the rate of the program at the other end is known, and where
-            the two differ, both hear what a wrong baud rate makes of the bytes.
-        pty: use a pseudo-terminal; otherwise a loopback socket.
-        seed: of the moments, within its bounds, at which a device that is asked takes its length.
+        length_mm_at: length at a virtual time [s]; None: no bar, reported as a fault. Called in the instrument's thread.
+        clock: virtual time; None: real time.
+        rate_hz: of a stream, instead of the protocol's.
+        baud: of the device. A pseudo-terminal knows the other side's rate and garbles bytes if different.
+        pty: pseudo-terminal, else loopback socket.
+        seed: of latching moments within bounds.
 
     Attributes:
-        port: what a program opens to talk to it.
-        unknown_bytes: bytes that came and were no command.
+        port: for the program.
+        unknown_bytes: that were no command.
     """
 
     def __init__(
@@ -109,7 +107,7 @@ class VirtualInstrument:
         self._damage: Callable[[bytes], bytes] | None = None
 
     def start(self) -> None:
-        """Open the line and switch the instrument on; `port` is known from then on."""
+        """Open the line and switch on; sets `port`."""
         self._end = open_end(pty=self._pty)
         self.port = self._end.port
         self._stop.clear()
@@ -118,10 +116,10 @@ class VirtualInstrument:
         self._thread.start()
 
     def stop(self) -> None:
-        """Switch the instrument off and close the line.
+        """Switch off and close the line.
 
         Raises:
-            Exception: what `length_mm_at` raised.
+            Exception: from `length_mm_at`.
         """
         self._stop.set()
         if self._thread is not None:
@@ -144,7 +142,7 @@ class VirtualInstrument:
     # Faults, for tests and for showing what they look like.
 
     def go_silent(self) -> None:
-        """Send nothing any more after the frame that is under way, as an instrument that is switched off."""
+        """Send nothing after the current frame, as if switched off."""
         with self._lock:
             self._silent = True
             self._outgoing = deque(frame for frame in self._outgoing if frame.sent)
@@ -155,30 +153,30 @@ class VirtualInstrument:
             self._silent = False
 
     def hang_up(self) -> None:
-        """Close the line while a program uses it, as with an adapter pulled out."""
+        """Close the line in use, as if unplugged."""
         self.stop()
 
     def send_garbage(self, raw: bytes) -> None:
-        """Send bytes that are no reading, as noise on the cable."""
+        """Send noise bytes."""
         with self._lock:
             self._send(raw, self.clock())
 
     def cut_next_frame(self, keep: int, *, then_silent: bool = False) -> None:
-        """Send only the first `keep` bytes of the next frame, and nothing more after it with `then_silent`."""
+        """Send only `keep` bytes of the next frame, then nothing with `then_silent`."""
         with self._lock:
             self._to_cut, self._silent_after_cut = keep, then_silent
 
     def damage_next_frame(self, damage: Callable[[bytes], bytes]) -> None:
-        """Send the next frame as `damage` returns it, as noise on the cable makes it; `length_mm_at` may call it too."""
+        """Send the next frame changed by `damage`; may be called in `length_mm_at`."""
         self._damage = damage
 
     def drop_samples(self, count: int) -> None:
-        """Do not send the next samples; the counter goes on."""
+        """Skip samples; the counter goes on."""
         with self._lock:
             self._to_drop += count
 
     def show_parity(self) -> None:
-        """Put even parity into the eighth bit, as a port with 8 data bits sees a line with 7 and parity."""
+        """Put even parity into the eighth bit, as 8 data bits see 7 with parity."""
         with self._lock:
             self._parity_shows = True
 
@@ -198,7 +196,7 @@ class VirtualInstrument:
             self._failure = error
 
     def _pause_s(self) -> float:
-        """Return how long nothing is due, in real seconds."""
+        """Return the time until something is due, in real seconds."""
         with self._lock:
             if self._outgoing:
                 first = self._outgoing[0]
@@ -213,7 +211,7 @@ class VirtualInstrument:
             return min(max(self.clock.real_s(due_s - self.clock()), 0.0), tick_s)
 
     def _hear(self, raw: bytes) -> None:
-        """Act on every complete command; forget bytes that begin none."""
+        """Obey complete commands; drop other bytes."""
         ask = self.protocol.ask
         follow_up = b"" if ask.follow_up is None else ask.follow_up.request
         known = {ask.request, follow_up, *(step.send for step in ask.start + ask.stop)} - {b""}
@@ -257,7 +255,7 @@ class VirtualInstrument:
             self._send_sample(now_s + self._dice.uniform(*self.protocol.latch_bounds_s()), replied_s)
 
     def _sample(self, now_s: float, *, connected: bool) -> None:
-        """Take the samples of a stream that are due; where nobody listens they are gone, as on a real line."""
+        """Take due samples of a stream; without listener they are lost."""
         while self._running and self._next_sample_s <= now_s and not (connected and len(self._outgoing) >= _BACKLOG):
             at_s = self._next_sample_s
             self._next_sample_s += 1.0 / self._rate_hz
@@ -287,7 +285,7 @@ class VirtualInstrument:
         self._silent = self._silent_after_cut
 
     def _send(self, raw: bytes, start_s: float) -> None:
-        """Put bytes on the line, behind those that are still on their way."""
+        """Queue bytes on the line."""
         if self._silent or not raw:
             return
         if self._outgoing:
@@ -298,7 +296,7 @@ class VirtualInstrument:
         self._outgoing.append(_Outgoing(raw, start_s))
 
     def _transmit(self, end: End, now_s: float) -> None:
-        """Write every byte whose time has come; bytes for nobody are gone."""
+        """Write due bytes; without listener they are lost."""
         while self._outgoing:
             first = self._outgoing[0]
             due = min(len(first.raw), int((now_s - first.start_s) / self._character_s + 1e-6))

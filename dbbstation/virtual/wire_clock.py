@@ -1,4 +1,4 @@
-"""Virtual time: real time, faster, so that a circle of a minute need not take a minute."""
+"""Virtual time: real time, faster."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _PATIENCE_S = 25.0
 
 
 class ScaledClock:
-    """A clock that runs `scale` times as fast as real time and starts at 0.
+    """A clock that starts at 0, `scale` times as fast as real time.
 
     Args:
-        scale: virtual seconds per real second, above 0.
+        scale: above 0.
 
     Raises:
         ValueError: the scale is not above 0.
@@ -45,27 +45,27 @@ class ScaledClock:
         return (time.monotonic() - self._start_s) * self.scale
 
     def real_s(self, virtual_s: float) -> float:
-        """Return how many real seconds these virtual seconds last."""
+        """Return the real duration of virtual seconds."""
         return virtual_s / self.scale
 
     def stand_s(self) -> float:
-        """Return how long the bar stands outside before a run begins [s of virtual time]."""
+        """Return the bar's waiting time before a run [s of virtual time]."""
         return STAND_S * self.scale
 
     def advance(self) -> None:
-        """Let time pass because samples were read; this clock needs nobody to do that."""
+        """Do nothing: this clock runs by itself."""
 
     def run_until(self, t_s: float) -> None:
-        """Let time pass up to the end of a run; this clock goes on anyhow."""
+        """Do nothing: this clock runs by itself."""
 
     def settle(self) -> None:
-        """Wait until time stands; on this clock it never does, and nothing is waited for."""
+        """Do nothing: this clock never stands."""
 
 
 class WaitingClock(ScaledClock):
-    """Machine time that passes during runs only, and only as fast as the samples are read.
+    """Machine time that passes only during runs, as fast as samples are read.
 
-    A busy computer delays samples in real time and changes nothing in machine time.
+    A busy computer changes nothing in machine time.
     """
 
     def __init__(self) -> None:
@@ -78,30 +78,30 @@ class WaitingClock(ScaledClock):
         return self._now_s
 
     def real_s(self, virtual_s: float) -> float:
-        """Return 0 while time can pass: nothing is waited for."""
+        """Return 0 while time can pass."""
         return virtual_s if self._now_s >= self._until_s else 0.0
 
     def stand_s(self) -> float:
-        """Return how long the bar stands outside before a run begins [s]."""
+        """Return the bar's waiting time before a run [s]."""
         return _STAND_WAITING_S
 
     def advance(self) -> None:
-        """Let a little time pass, up to the end of the run."""
+        """Advance a little, up to the run's end."""
         with self._stands:
             self._now_s = min(self._now_s + _STEP_S, self._until_s)
             if self._now_s >= self._until_s:
                 self._stands.notify_all()
 
     def run_until(self, t_s: float) -> None:
-        """Let time pass up to a time after the end of a run [s]."""
+        """Advance to a time after a run's end [s]."""
         with self._stands:
             self._until_s = t_s + _BEHIND_S
 
     def settle(self) -> None:
-        """Wait until the run is over and time stands.
+        """Wait until the run is over.
 
         Raises:
-            MachineError: nobody reads the samples of the run.
+            MachineError: nobody reads the run's samples.
         """
         with self._stands:
             if not self._stands.wait_for(lambda: self._now_s >= self._until_s, _PATIENCE_S):

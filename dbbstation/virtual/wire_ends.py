@@ -1,4 +1,4 @@
-"""The instrument's end of a line on this computer: a pseudo-terminal, or a loopback socket where there are none."""
+"""The instrument's end of a line: pseudo-terminal or loopback socket."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from dbbstation.system.pseudo_terminal import HAS_PTY, PtyEnd
 
 
 class End(Protocol):
-    """What the virtual instrument needs of a line."""
+    """A line for the virtual instrument."""
 
     port: str
     """Name under which a program opens the other end."""
 
     @property
     def connected(self) -> bool:
-        """Whether a program has the other end open, as of the last `wait` or `read`."""
+        """Return whether a program is connected, as of the last `wait` or `read`."""
 
     def wait(self, real_s: float) -> bool:
-        """Wait at most so long for bytes; return whether there is something to read."""
+        """Wait for bytes; return whether there are any."""
 
     def read(self) -> bytes:
         """Return the bytes that have come."""
 
     def write(self, raw: bytes) -> int:
-        """Send what the line takes at once; return how many bytes that was."""
+        """Send what the line takes; return the number of bytes."""
 
     def host_baud(self) -> int | None:
-        """Return the rate that the other side is set to, None where the line does not tell."""
+        """Return the other side's rate, or None."""
 
     def close(self) -> None:
-        """Close the line: the other side sees the device unplugged."""
+        """Close the line, as if unplugged."""
 
 
 def open_end(*, pty: bool = HAS_PTY) -> End:
@@ -55,7 +55,7 @@ class SocketEnd:
         return self._client is not None
 
     def wait(self, real_s: float) -> bool:
-        """Wait at most so long for bytes; return whether there is something to read."""
+        """Wait for bytes; return whether there are any."""
         ready = select.select([self._client or self._server], [], [], real_s)[0]
         if ready and self._client is None:
             self._client, _ = self._server.accept()
@@ -81,7 +81,7 @@ class SocketEnd:
         return raw
 
     def write(self, raw: bytes) -> int:
-        """Send what the line takes at once; return how many bytes that was."""
+        """Send what the line takes; return the number of bytes."""
         if self._client is None:
             return len(raw)
         try:
@@ -92,7 +92,7 @@ class SocketEnd:
             return len(raw)
 
     def host_baud(self) -> int | None:
-        """Return nothing: a socket has no rate."""
+        """Return None: a socket has no rate."""
         return None
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""What a receiver makes of bytes that were sent at another baud rate: the bits are sent, and sampled at the wrong times."""
+"""Bytes received at another baud rate."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ TOLERANCE = 0.04
 
 
 def heard_at(raw: bytes, line: LineSettings, *, sent_baud: int, heard_baud: int) -> bytes:
-    """Return what comes out of a receiver at `heard_baud` when `raw` is sent at `sent_baud`, one byte after the other.
+    """Return what a receiver at `heard_baud` makes of `raw` sent at `sent_baud`.
 
-    Both sides use the data bits, parity and stop bits of `line`; the receiver does not check them, as a serial port
-    whose parity check is off.
+    Both use `line`'s data bits, parity and stop bits, unchecked.
     """
     if abs(heard_baud / sent_baud - 1.0) <= TOLERANCE:
         return raw

@@ -104,7 +104,7 @@ def _plans(plan: str | None, part: str | None) -> list[str]:
 
 
 def _rows(which: str, draws: int | None, seed: int, keep: Path | None) -> list[Row]:
-    """Rows of a part that draws sessions, recordings or circles one by one."""
+    """Return rows of a part with single draws."""
     from dbbstation.cli.progress import progress_bar
     from studies.coverage_calibration import CASES, OF_BARS, coverage_of_calibration
     from studies.coverage_feed import coverage_of_feed
@@ -140,7 +140,7 @@ def _print_rows(rows: list[Row]) -> None:
 
 
 def _circles(draws: int, seed: int, keep: Path | None, *, as_json: bool) -> dict[str, Any]:
-    """Draw circles, and print how often U about each figure contains the truth."""
+    """Print how often U about circle figures contains the truth."""
     from dbbstation.cli.output import print_table
     from dbbstation.cli.progress import progress_bar
     from studies.coverage_circles import CELLS, KINDS, coverage_of_circles, pooled

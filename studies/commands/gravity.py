@@ -149,7 +149,6 @@ def _print_compliance(compliance: dict[str, Any]) -> None:
 
 
 def _print_meaning(numbers: dict[str, Any]) -> None:
-    """How much of what the paper could not remove is absorption."""
     conditions = numbers["conditions"]
     click.echo(
         "A kinematic calibration that does not know of gravity takes up most of it, differently at every place of the\n"

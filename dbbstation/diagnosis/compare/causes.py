@@ -33,8 +33,6 @@ class When:
 
     Attributes:
         label: as printed; empty for a change of a cause that does the same in both sessions.
-        of_a: factor of what it does on the way of A.
-        of_b: factor of what it does on the way of B.
     """
 
     label: str
@@ -51,8 +49,6 @@ class Change:
     """One error source over both sessions.
 
     Attributes:
-        source: the cause.
-        sides: both sessions.
         share: of its plausible sizes that a change has.
     """
 
@@ -61,7 +57,6 @@ class Change:
     share: float = 1.0
 
     def _name(self) -> str:
-        """Of the cause, and of its law where that is not the usual one."""
         usual = self.source.law == self.source.varies_with != "temperature"
         return self.source.name if usual else f"{self.source.name} by {self.source.law}"
 
@@ -169,7 +164,6 @@ class Change:
 
     @cached_property
     def _alike(self) -> bool:
-        """Whether one amplitude for all struts is one of its forms."""
         return any(part.alike for part in parts_of(self._amplitudes, self._sets))
 
     @cached_property
@@ -226,6 +220,5 @@ class Change:
 
 
 def _as_derivative(effect: Effect) -> Effect:
-    """An effect as its own derivative by one number that it is multiplied with."""
     arrays = {field.name: getattr(effect, field.name) for field in fields(effect)}
     return Effect(**{name: None if array is None else np.asarray(array)[..., None] for name, array in arrays.items()})

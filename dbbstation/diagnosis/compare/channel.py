@@ -62,7 +62,6 @@ def channel_of(sides: Sides, sources: Sequence[ErrorSource]) -> Channel:
 
 
 def _changes(sides: Sides, sources: Sequence[ErrorSource]) -> list[Law]:
-    """Error sources that changed, or act in one session."""
     every = {(s.name, s.law): s for s in (*sources_named(KINEMATIC_SOURCES), *sources)}
     named = [s for s in every.values() if s.name not in MEASUREMENT_SOURCES]
     return [Change(s, sides, CHANGE if s.name in GEOMETRY else 1.0).law(NAMED_ODDS) for s in named]

@@ -57,15 +57,14 @@ class RunDifference:
     """One run of B less the same run of A.
 
     Attributes:
-        pair: both recordings.
         smooth_mm: difference up to the highest smooth harmonic, at the common angles, shape (s,) [mm].
         noise_mm: root mean square that noise alone leaves in it [mm].
         found_mm: what the causes that were found do, at the common angles, shape (s,) [mm].
-        sigmas: standard deviations by which that is out.
         centre_mm: by how much the circle's centre moved, x and y [mm].
         centre_sigma_mm: standard deviation of either by noise and what is stated of balls [mm].
         radial_mm: by how much the mean length changed [mm].
-        radial_sigma_mm: standard deviation of that by noise and what is stated of bars, and of balls where the bar is raised [mm].
+        radial_sigma_mm: standard deviation of that by noise and what is stated of bars, and of balls where the bar is raised
+            [mm].
         circularity_mm: greatest less least of the difference without mean and centre [mm].
     """
 
@@ -104,7 +103,6 @@ class Comparison:
     Attributes:
         matching: which runs were put side by side.
         settled: what the comparison of sets of causes came to.
-        findings: what is said of each cause, those that are there first.
         runs: in the order of session A.
         left: tests of the residual.
         trial: what groups of tests say of the findings; without predictions where nothing was found, or there are too few groups.

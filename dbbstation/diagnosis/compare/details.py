@@ -30,14 +30,11 @@ class EffectOfCause:
     """What one cause of the most probable set does to the difference.
 
     Attributes:
-        rms_mm: over all runs [mm].
         share: of the reduction of chi-square by all that was found, what it brings alone.
         taken_up: share of its sum of squares that a new kinematic calibration of B would take up.
         opposite: share of its sum of squares that changes its sign with the direction, over tests that were run in both.
         test: of the run in which it is largest.
-        direction: of that run.
         theta_deg: arc of that run, from and to, over which it is at least half as large as at its peak [deg].
-        peak_mm: greatest value, with its sign [mm].
     """
 
     rms_mm: float

@@ -30,7 +30,6 @@ def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True
     """Hold back groups of tests in turn; nothing is said where nothing was found, or there are fewer than `LEAST_PARTS` groups.
 
     Args:
-        sides: the sessions.
         settled: what the comparison came to.
         hold_out: choose everything anew without each group; False: only how values move without it is asked.
     """

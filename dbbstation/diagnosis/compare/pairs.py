@@ -41,10 +41,8 @@ class Pair:
 
     Attributes:
         a: the run in session A; several where the sessions have different numbers of repeats, which are averaged.
-        b: the run in session B, likewise.
         number: counts the pairs of one test and direction, from 1.
         a_mm: raw length less commanded length in A at the middles of equal sectors from +X, shape (s,) [mm].
-        b_mm: the same in B.
     """
 
     a: tuple[Observation, ...]
@@ -92,8 +90,6 @@ class Matching:
 
     Attributes:
         pairs: in the order of session A.
-        only_a: tests and directions that only A has.
-        only_b: tests and directions that only B has.
         not_comparable: tests of one name and different circles, and in what they differ.
         averaged: tests and directions whose repeats were averaged, and why.
     """
@@ -154,7 +150,6 @@ class Sectors:
     the middle along the run's own smooth curve, which leaves its noise as it is.
 
     Attributes:
-        count: of sectors.
         there: those that have a sample, shape (q,).
         group: number of each sample's sector among these, shape (n,).
         moved: what averages of these sectors, shape (q,), change by on the way to the middles, shape (q, q).

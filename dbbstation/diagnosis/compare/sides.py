@@ -35,7 +35,6 @@ class Sides:
     """Rows of all pairs, pair by pair, in the order of travel of B; motions are finer, each with its own samples.
 
     Attributes:
-        machine: nominal.
         pairs: runs of both sessions.
         runs: of session A, and of session B, per pair; where repeats were averaged, the first of them stands for all.
     """

@@ -59,11 +59,9 @@ class DriveChannel:
     """A channel and what its laws are of.
 
     Attributes:
-        recordings: that it was made of.
         channel: for the comparison.
         scale: sizes, with the waves that a first look found.
         sources: that were compared, by name.
-        of_law: source and form of each law, by the law's name.
         shortest_wave_mm: shortest wave over the position that was looked for; infinite where none was.
     """
 
@@ -88,7 +86,6 @@ def drive_channel(
     """Make the channel of recordings.
 
     Args:
-        recordings: of one drive.
         sources: causes to compare.
         base: parameters that are fitted anew with every hypothesis.
         refused: names of laws that cannot be what these recordings show.
@@ -159,7 +156,6 @@ def _beyond(straight: NDArray[np.float64], patterns: Iterator[Pattern]) -> Itera
 
 
 def _of_files(recordings: Recordings) -> Pattern:
-    """A zero of the force of its own for each recording, or for one of them."""
     samples = np.zeros((len(recordings.force_n), len(recordings.blocks)))
     for k, rows in enumerate(recordings.blocks):
         samples[rows, k] = 1.0
@@ -167,13 +163,11 @@ def _of_files(recordings: Recordings) -> Pattern:
 
 
 def _axes(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Orthonormal columns of what columns can do, some of which may say the same."""
     u, s, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
     return np.asarray(u[:, s > SAME * s[0]], dtype=np.float64)
 
 
 def _variables(recordings: Recordings) -> dict[str, Variable]:
-    """What a force may follow, by name."""
     at = recordings.at
     found = [
         Variable("time", "s", Kind.TIME, recordings.time_s),
@@ -333,7 +327,6 @@ _AT_ONCE = 200
 
 
 def _power(waves: NDArray[np.float64], position: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How strongly a residual follows waves over a position."""
     return np.concatenate(
         [
             np.abs(np.exp(2j * np.pi * np.outer(waves[k : k + _AT_ONCE], position)) @ left)

@@ -29,12 +29,8 @@ class Scale:
     Attributes:
         force_n: root mean square of the force in the band [N].
         speed_m_s: greatest speed [m/s].
-        low_m: least position [m].
-        high_m: greatest position [m].
         mean_m: mean position at the samples compared [m].
-        duration_s: of the longest recording [s].
         cutoff_hz: of the band in which force and model are compared.
-        sample_s: from one recorded sample to the next, of the slowest recording [s].
         reverses: some recording changes its direction of travel.
         both_ways: enough samples are travelled in each direction to say how these differ.
         waves_per_m: waves over the position that the residual of everything smooth follows best, strongest first [1/m].
@@ -66,7 +62,6 @@ class DriveParameter:
 
     Attributes:
         name: unique within the cause; its unit is its last part.
-        unit: as printed.
         plausible: usual size, one standard deviation, in that unit, for the recording at hand.
         meaning: one line with the sign.
         positive: it cannot be negative.
@@ -114,11 +109,7 @@ class DriveSource(ABC):
 
     @abstractmethod
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Forms to compare, none where the recordings cannot show the cause.
-
-        Args:
-            scale: sizes of the recordings.
-        """
+        """Forms to compare, none where the recordings cannot show the cause."""
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
         """Whether values can be this cause at all, whatever they explain.

@@ -37,8 +37,6 @@ class ExplainedDrive:
     """What the comparison came to.
 
     Attributes:
-        drive: channel and its laws.
-        settled: the comparison.
         before: fit of mass and viscous friction alone.
         after: fit of the most probable hypothesis.
         refused: laws that cannot be what the recordings show, and why.

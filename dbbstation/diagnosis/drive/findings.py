@@ -34,7 +34,6 @@ class CausePart:
     Attributes:
         label: which; empty where there is one only.
         t_s: first and last time of a pulse [s]; None where it is none.
-        parameters: of it.
     """
 
     label: str
@@ -44,13 +43,7 @@ class CausePart:
 
 @dataclass(frozen=True)
 class Complement:
-    """The other way to read pulses of one size: the opposite force in the rest of the time, and a constant load.
-
-    Attributes:
-        force_n: in these stretches [N].
-        t_s: first and last time of each [s].
-        pulses: how many pulses are of that size.
-    """
+    """The other way to read pulses of one size: the opposite force in the rest of the time, and a constant load."""
 
     force_n: Value
     t_s: tuple[tuple[float, float], ...]
@@ -62,11 +55,8 @@ class DriveFinding:
     """What is said of one cause.
 
     Attributes:
-        name: of the cause.
-        verdict: what can be said.
         ambiguous_with: causes that would explain the recording about as well in its place.
         concealed: share of its signature's sum of squares that mass and viscous friction take up.
-        signature_rms_n: of its signature [N].
         unconcealed_rms_n: of what mass and viscous friction leave of it [N].
         probability: that it is there, or one that nothing recorded here tells from it.
         gain: log Bayes factor of it beside the others.
@@ -74,7 +64,6 @@ class DriveFinding:
         parts: where it is there more than once (waves, pulses, forms), each with its numbers.
         at_end: names of parameters that lie at the end of the values that are tried.
         complement: stretches of time that explain as much in the place of `parts`.
-        acts: when it is at work.
         persists: it happened once, such as friction that drifts, and held-out parts tell of it, too.
         gains: what it brought in held-out parts [N²]; None: not asked for.
         text: sentences for people.
@@ -104,11 +93,8 @@ class UnexplainedForce:
 
     Attributes:
         text: kind and variable, such as `curve over speed`.
-        variable: that it follows.
-        probability: that it is there.
         rms_n: of it beside mass and viscous friction [N].
         low, high: range of the variable in which it is at least half as large as anywhere; `from` and `to` in JSON.
-        unit: of the variable.
     """
 
     text: str
@@ -125,14 +111,11 @@ class ForceLocation:
     """A stretch of the recording in which a misfit stands out.
 
     Attributes:
-        t_s: start, end [s].
-        position_mm: at start and end [mm].
         direction: `forwards` or `backwards`.
         at_reversal: a reversal or stop lies in it or beside it.
         variable: that it follows; None where nothing does.
         share: of the misfit's sum of squares.
         peak_n: greatest deviation, measured minus model [N].
-        text: in words.
     """
 
     t_s: tuple[float, float]
@@ -152,7 +135,6 @@ class ModelStep:
     Attributes:
         added: cause that this step adds; None for the base.
         relative_force_error: |F - F_model| / |F| on the stretch, fitted without it.
-        fitted_error: the same on what was fitted.
         parameters: values fitted without the stretch, by name.
     """
 
@@ -175,7 +157,6 @@ class HeldBack:
     """How models predict a stretch that was held back.
 
     Attributes:
-        t_s: its first and last time [s].
         relative_force_error: |F - F_model| / |F| there.
         steps: from mass and viscous friction to the last model.
         not_in_model: causes that were fitted beside it and are not in it, since nothing decides on them.
@@ -204,13 +185,10 @@ class UnexplainedForces:
     """The unmodelled residual.
 
     Attributes:
-        rms_n: beyond noise [N].
         probability: of such a rest or a larger one by noise alone.
-        significant: whether that is improbable.
         variable: what organises it; None where nothing does clearly.
         text: one sentence for people.
         effects: without a name that the comparison found, largest first.
-        locations: where it is large.
     """
 
     rms_n: float
@@ -227,7 +205,6 @@ class HeldOutForce:
     """Predictions of parts that were held out, everything chosen anew without each of them.
 
     Attributes:
-        parts: how many were held out.
         reference: root mean square error of the law of mass, viscous and Coulomb friction [N].
         corrected: of everything that was chosen, but for what happens in time [N].
         worse: whether everything together predicts worse than mass and friction alone.
@@ -246,16 +223,8 @@ class RecordedSignals:
     """What was recorded.
 
     Attributes:
-        recordings: how many.
-        samples: in all.
-        samples_compared: within the band.
-        rate_hz: of the samples [Hz].
         cutoff_hz: band in which force and model are compared [Hz].
         shortest_wave_mm: shortest wave over the position that could be seen [mm]; None where none could.
-        t_s: first and last time [s].
-        reversals: in all.
-        greatest_speed_mm_s: greatest speed [mm/s].
-        force_rms_n: of the force [N].
     """
 
     recordings: int
@@ -276,8 +245,6 @@ class FrictionCurve:
 
     Attributes:
         speed_m_s: shape (c,) [m/s].
-        force_n: friction and constant load at that speed [N].
-        uncertainty_n: standard uncertainty [N].
     """
 
     speed_m_s: NDArray[np.float64]
@@ -292,22 +259,15 @@ class DriveFindings:
     Attributes:
         mismatch: the recording differs from mass and viscous friction beyond noise.
         probability: of as much by chance.
-        noise_n: standard deviation of the force's noise [N].
-        noise_correlation_samples: neighbours that count as one.
         misfit_rms_n: of mass and viscous friction beyond noise [N].
-        residual_rms_n: before and after [N].
         held_back: how models predict a stretch that was held back.
         parameters: of the last model, base parameters first.
         parameter_shift: how far what was left out had pulled them.
         friction: Coulomb and viscous friction per direction; empty where not identifiable.
         locations: of the base model's misfit, largest share first.
         sources: causes, best first.
-        unexplained: the residual.
         cancelling: forces that cancel each other; None where none do.
-        cannot_tell: what these recordings cannot tell, a sentence each.
-        held_out: `tested` or `not-tested`.
         held_out_rms_n: errors of held-out parts; None where not tested.
-        signals: what was recorded.
         noticed: in the recordings; `notes` in JSON.
         table: what was compared, sample by sample, by column.
         before: parameters of the base model.

@@ -41,8 +41,6 @@ class DriveFit:
     """A fitted model, base columns first, then amplitudes and slack of each member.
 
     Attributes:
-        drive: what was fitted.
-        members: of the hypothesis.
         samples: all columns, shape (m, k).
         values: shape (k,).
         covariance: shape (k, k).
@@ -142,9 +140,6 @@ def fit(
     """Fit base and members together under the priors of the members.
 
     Args:
-        drive: what is fitted.
-        settled: where the columns of the members are.
-        members: of a hypothesis.
         rows: samples to fit, shape (m,); all if None.
     """
     channel, bank = drive.channel, settled.bank
@@ -156,13 +151,7 @@ def fit(
 
 
 class RowsKept:
-    """Base and members of a hypothesis over the rows that a comparison kept, of which some are fitted at a time.
-
-    Args:
-        drive: what is fitted.
-        settled: where the columns of the members are.
-        members: of the hypothesis.
-    """
+    """Base and members of a hypothesis over the rows that a comparison kept, of which some are fitted at a time."""
 
     def __init__(self, drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> None:
         channel, bank = drive.channel, settled.bank
@@ -307,9 +296,7 @@ def base_values(drive: DriveChannel, settled: Settled, best: DriveFit) -> dict[s
     """Base parameters with what other likely hypotheses make of them in their uncertainty.
 
     Args:
-        drive: what was fitted.
         settled: the comparison.
-        best: fit of its best hypothesis.
     """
     posterior = settled.posterior
     likely: list[tuple[float, Hypothesis]] = [

@@ -30,7 +30,6 @@ def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> HeldOutFor
     Samples as far from a part as the low-pass reaches take no part either: they contain some of its force.
 
     Args:
-        drive: channel with the laws that can be.
         progress: called with what is being done.
     """
     channel = drive.channel

@@ -71,7 +71,6 @@ def identify(
     """Identify a drive and find what a model of mass and viscous friction leaves out.
 
     Args:
-        recordings: of one drive, raw.
         sources: causes to look for.
         cutoff_hz: of the band in which force and model are compared; chosen from the data if None.
         progress: called with what is being done.
@@ -196,7 +195,6 @@ def _biases(before: Mapping[str, DriveValue], after: Mapping[str, DriveValue]) -
 
 
 def _number(value: Value, *, is_known: bool) -> DriveValue:
-    """A value, which is not known where its uncertainty is not."""
     known = value.value if np.isfinite(value.uncertainty) else float("nan")
     return DriveValue(known, value.uncertainty, value.unit, is_known)
 
@@ -207,7 +205,6 @@ def _is_known(viscous: Value, speed_m_s: float, force_n: float) -> bool:
 
 
 def _left_of_base(explained: ExplainedDrive) -> LeftOver:
-    """What the base alone leaves, tested."""
     settled = explained.settled
     alone = replace(settled.posterior, hypotheses=(Hypothesis((), 0.0),))
     return left_over(replace(settled, posterior=alone))
@@ -219,7 +216,6 @@ def _beyond(residual: NDArray[np.float64], sigma: float) -> float:
 
 
 def _rest(explained: ExplainedDrive, verdicts: Verdicts, model_n: NDArray[np.float64]) -> UnexplainedForces:
-    """The unmodelled residual of the force."""
     recordings, settled = explained.drive.recordings, explained.settled
     least = METHOD_SHARE * recordings.scale.force_n
     effects = tuple(effect for effect in verdicts.effects() if effect.rms_n > least)

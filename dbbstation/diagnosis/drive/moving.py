@@ -86,10 +86,8 @@ def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_
 
     Args:
         noise_m: standard deviation of the position's white noise [m].
-        rate_hz: samples per second.
         cutoff_hz: of the comparison.
         allowed_m_s2: standard deviation that it may add [m/s²].
-        most: samples at the most.
     """
     response = impulse_response(rate_hz, cutoff_hz)
     at = np.arange(len(response)) - len(response) // 2
@@ -110,8 +108,6 @@ def edge_noise_m_s2(
     Args:
         weight: of every sample, shape (n,).
         kept: indices of the samples compared, shape (m,).
-        noise_m: standard deviation of the position's white noise [m].
-        rate_hz: samples per second.
         cutoff_hz: of the comparison.
 
     Returns:

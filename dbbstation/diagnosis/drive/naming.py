@@ -23,9 +23,7 @@ def source_of(drive: DriveChannel, patterns: Mapping[str, Pattern], name: str) -
     """Name of the source that a member belongs to; empty where it has none.
 
     Args:
-        drive: that was compared.
         patterns: of the comparison, by name.
-        name: of the member.
     """
     if name in drive.of_law:
         return drive.of_law[name][0].name

@@ -60,7 +60,6 @@ def edges_of(recordings: Recordings, parts: Sequence[CausePart]) -> Edges:
     """Where stretches of time begin and end.
 
     Args:
-        recordings: of the drive.
         parts: that `pulse_parts` found.
     """
     times = np.array([edge for part in parts for edge in part.t_s or ()])
@@ -101,13 +100,7 @@ def _sizes_of(parts: Sequence[CausePart]) -> list[Value]:
 
 
 def complement_of(parts: Sequence[CausePart], first_s: float, last_s: float) -> Complement | None:
-    """The stretches between pulses of one size, with the opposite force; None where there are not two such pulses.
-
-    Args:
-        parts: that `pulse_parts` found.
-        first_s: begin of the recordings [s].
-        last_s: their end [s].
-    """
+    """The stretches between pulses of one size, with the opposite force; None where there are not two such pulses."""
     equal = [part for part in equal_pushes(parts) if part.t_s is not None]
     if len(equal) < 2:  # noqa: PLR2004 - one pulse and the rest of the time say nothing of each other
         return None

@@ -39,12 +39,7 @@ POWER_STRETCHES = 16
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """One drive, recorded once or several times.
-
-    Attributes:
-        names: of the recordings.
-        signals: of each.
-    """
+    """One drive, recorded once or several times."""
 
     names: tuple[str, ...]
     signals: tuple[Signals, ...]

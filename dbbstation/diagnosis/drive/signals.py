@@ -87,15 +87,11 @@ class Signals:
 
     Attributes:
         t_s: shape (n,) [s].
-        measured_m: position as measured [m].
         position_m: of a parabola through as few samples as the noise of the speed allows [m].
         speed_m_s: its slope [m/s].
         acceleration_m_s2: second difference of the low-passed position [m/s²].
-        force_n: as measured [N].
-        rate_hz: samples per second.
         cutoff_hz: of the band in which force and model are compared.
         acceleration_noise_m_s2: root mean square that the position's noise alone puts into the acceleration there.
-        position_noise_m: standard deviation of the measured position [m].
         standing_m_s: speed below which the drive counts as standing [m/s].
         way: direction in which it travels between turning points, +1 or -1, shape (n,).
         weight: of every sample, zero where nothing is known of its force, shape (n,).
@@ -176,12 +172,11 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     """Prepare a recording.
 
     Args:
-        recording: raw.
         cutoff_hz: of the band of the comparison; chosen from the data if None.
 
     Raises:
-        CalibrationError: it is too short, the drive does not move, the force is dead or mostly saturated, or the
-            cut-off does not suit the sampling rate.
+        CalibrationError: it is too short, the drive does not move, the force is dead or mostly saturated, or the cut-off does not
+            suit the sampling rate.
     """
     even = evenly_sampled(recording)
     notes = list(even.notes)

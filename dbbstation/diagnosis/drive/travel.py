@@ -81,7 +81,6 @@ def ways(position_m: NDArray[np.float64], turns: NDArray[np.int64]) -> NDArray[n
 
     Args:
         position_m: shape (n,) [m].
-        turns: samples at which it turns.
     """
     ends = np.concatenate([[0], turns, [len(position_m) - 1]])
     signs = np.sign(np.diff(position_m[ends]))

@@ -169,14 +169,12 @@ class Verdicts:
         )
 
     def _claimed(self, source: str) -> Verdict:
-        """Verdict of what is sure by its probability and its standard deviations."""
         if self._held is None:
             return claim(SURE, OUT, acts(source), None)
         gains = self._held.gains.get(source, Gains(()))
         return claim(SURE, OUT, acts(source), gains, worse=self._held.worse)
 
     def _at_end(self, there: Sequence[CauseFinding]) -> dict[str, str]:
-        """Numbers of laws that lie at the end of what is tried, and what that is."""
         laws = [f.name for f in there if f.name in self._drive.of_law and self._is_member(f)]
         ends = [(name, span) for law in laws for name, span in self._explained.after.at_end(law).items()]
         return {name: f"{low:.3g} to {high:.3g}" for name, (low, high) in ends}
@@ -250,12 +248,10 @@ class Verdicts:
         return finding.name in self._explained.settled.best.names
 
     def _probability(self, names: Sequence[str], own: Sequence[CauseFinding]) -> float:
-        """That any form of a source is there, or one of its class."""
         alone = self._explained.settled.posterior.probability(names) if names else 0.0
         return max([alone, *(f.probability for f in own)]) if own else alone
 
     def _alike(self, source: DriveSource, findings: Sequence[CauseFinding]) -> tuple[str, ...]:
-        """Other sources that would do as well in its place, with values that can be."""
         names = set()
         for finding in findings:
             for other in {*finding.equivalent, *finding.ambiguous_with} - {finding.name}:
@@ -295,7 +291,6 @@ class Verdicts:
         return f"brings too little where it was not fitted: something in {gains.with_gain} of {self._held.parts if self._held else 0} held-out parts"
 
     def _absent(self, source: DriveSource, own: Sequence[CauseFinding]) -> tuple[Verdict, str]:
-        """Verdict on what is not in the model, and why."""
         looked_for = {COGGING: lambda: self._no_cogging(own), TRANSIENT: self._no_transient}
         if why := self._hidden(source, own):
             return Verdict.NOT_TESTABLE, why
@@ -374,14 +369,12 @@ class Verdicts:
         return finding.values if finding.family is None else {}
 
     def _parts(self, finding: CauseFinding) -> list[CausePart]:
-        """Every wave or form by itself."""
         if finding.name in self._drive.of_law:
             return [CausePart(self._drive.of_law[finding.name][1].label, None, self._values(finding))]
         return [CausePart(finding.name, None, dict(finding.values))]
 
 
 def _in_words(complement: Complement) -> str:
-    """What else pulses of one size may be."""
     size = complement.force_n
     return (
         f"{complement.pulses} of them are of one size: {-size.value:+.3g} ± {size.uncertainty:.2g} N in these, or {size.value:+.3g} N in the "

@@ -51,8 +51,6 @@ class Moved:
     """A parameter of the simulator.
 
     Attributes:
-        name: of it.
-        stated: as the model states it.
         before: refitted without any term.
         after: with what was found put in.
         confounded: share of what it does that what was found can do as well, R²; zero where nothing was.
@@ -72,17 +70,13 @@ class SimulatorComparison:
     """What is said of a simulator and its recordings.
 
     Attributes:
-        model: that was compared.
-        base: as it is, refitted.
-        found: what the search ended at.
         findings: of terms that are there or that the recordings cannot exclude, those that are there first.
-        parameters: of the simulator.
         left: tests of the residual.
         levels: whether anything differs, which signals at which ports it follows, which term it is.
         held_out: error of parts that took no part; None where it was not asked for.
         as_simulated: measured less simulated values with the parameters as stated, shape (n,).
-        nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term; not a number
-            where no simulations were left to ask for it.
+        nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term; not a
+            number where no simulations were left to ask for it.
         not_asked: candidates that were not compared in the end, and why.
         separations: what would distinguish terms that these recordings do not.
         stopped: why it ended early; empty where it did not.
@@ -142,8 +136,6 @@ def find(
     """Find what a simulator lacks, and at which of its ports.
 
     Args:
-        model: simulator with its recordings.
-        run: simulates.
         own: physics of the user's own.
         hold_out: choose everything anew without each part; takes most of the time.
         matters: size of an effect that matters, in the unit of the first output; None: what the refitted simulator leaves.
@@ -292,7 +284,6 @@ def _nonlinear(work: SimulationRuns, found: SearchOutcome) -> dict[str, float]:
 
 
 def _parameters(base: Node, found: SearchOutcome) -> tuple[Moved, ...]:
-    """Parameters as stated, refitted, and beside what was found."""
     weigh, sigma = noise_of(found.settled)
     model, fitted = base.work.model, found.node.fitted
     count = len(model.parameters)

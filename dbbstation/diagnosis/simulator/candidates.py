@@ -49,9 +49,7 @@ class Candidate:
     Attributes:
         term: with no amplitude, and the middle of its grid.
         names: of its amplitudes, then of its shape.
-        units: of these.
         grids: of its shape.
-        log_odds: log prior odds.
         positive: which amplitudes cannot be negative.
         tried: sizes at which the answer is taken, of a form that puts something in the place of a signal; empty for the others.
     """
@@ -79,7 +77,6 @@ def candidates(
     """Every form at every port.
 
     Args:
-        ports: of the model.
         signals: at each port by name, `t` among them, of all calls, shape (calls,).
         own: physics of the user's own.
         times: of the rows of the longest run, rising, shape (n,): from these come time constants.
@@ -228,7 +225,6 @@ def _curve(
 
 
 def _per(unit: str, other: str, power: str = "") -> str:
-    """Quotient of units."""
     return f"{unit or '1'}/{f'({other})' if ' ' in other or '/' in other else other}{power}" if other else unit
 
 

@@ -33,7 +33,6 @@ def log_density(
     Where that noise has long tails, rows count by Student's t about the prediction alone.
 
     Args:
-        work: simulations.
         channel: whose kept rows were refitted.
         rows: that are predicted, shape (n,).
         residual: measured less simulated at the refit, scaled, of all rows, shape (n,).

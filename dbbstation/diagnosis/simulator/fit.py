@@ -48,7 +48,6 @@ class SimulatorFit:
     """A refit.
 
     Attributes:
-        state: best values.
         residual: measured less simulated there, shape (n,).
         columns: what one more of each number does to the simulated values, shape (n, m).
         curved: by how much the answers to two doses differ, shape (m,).
@@ -112,12 +111,9 @@ def fit(
     """Fit all numbers of a state to the recordings [Branch, Coleman and Li, SIAM J. Sci. Comput. 21 (1999) 1].
 
     Args:
-        work: simulations.
-        start: to begin with.
         weigh: what makes rows comparable, such as whitening; its rows have the standard deviation `sigma`.
         sigma: of a weighed row; 0: what was known of parameters is weighed against what the start leaves.
         several: begin elsewhere, too.
-        most_steps: at the most.
     """
     begun = work.residuals([start])[0]
     sigma = sigma or rms(weigh(begun)) or 1.0
@@ -233,11 +229,7 @@ def near(
     """Refit to some of the rows, from a fit to all of them: Gauss-Newton steps by the answers there, each simulated anew.
 
     Args:
-        work: simulations.
-        fitted: to all rows.
         weigh: takes all rows to those that are fitted, whitened.
-        sigma: of a weighed row.
-        rounds: steps at the most.
     """
     low, high = bounds_of(work, fitted.state)
     state, residual = fitted.state, fitted.residual

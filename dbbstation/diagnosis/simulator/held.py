@@ -60,11 +60,7 @@ class PredictedPartsError(HeldOutError):
 
 @dataclass(frozen=True)
 class PredictedGains:
-    """What held-out parts of a simulator say of classes.
-
-    Attributes:
-        parts: each part.
-    """
+    """What held-out parts of a simulator say of classes."""
 
     parts: tuple[PredictedPart, ...]
 
@@ -113,7 +109,6 @@ def predicted_parts(
     """Hold parts back in turn; choose terms anew, refit, simulate; one after the other, since simulations may be spent.
 
     Args:
-        nodes: that were visited.
         base: the simulator as it is, refitted.
         found: what all rows came to.
         stated: parameters as the model states them, which are the reference.

@@ -47,9 +47,6 @@ def laws(
     """Candidates as laws about a state, and those that cannot be asked, with the reason.
 
     Args:
-        work: simulations.
-        state: about which.
-        found: candidates that are not in the state.
         size: of the residual, root mean square.
         curved_most: difference between the answers to two doses, over the answer, from which on a candidate cannot be asked.
     """

@@ -21,12 +21,8 @@ class SimulatorParameter:
 
     Attributes:
         name: unique; that of an initial state has the number of its run, from 1, where there are several.
-        key: by which `simulate` is given it.
-        value: to begin with.
         unit: of it; empty where none is stated.
         uncertainty: standard uncertainty to which it was known before; None: nothing was known.
-        low: least value that it can have.
-        high: greatest one.
         run: number of the only run that it is of, from 0; None: of all runs.
     """
 
@@ -51,9 +47,7 @@ class SimulatorPort:
 
     Attributes:
         name: by which `simulate` calls it.
-        unit: of what acts there.
         signals: that are known there, unit by name.
-        about: what it is, in words.
     """
 
     name: str
@@ -67,8 +61,6 @@ class Output:
     """What is measured of the simulated object.
 
     Attributes:
-        name: by which `simulate` returns it.
-        unit: of it.
         filter_s: time constant of the sensor's first-order filter, which the simulated values pass; 0: none [s].
     """
 
@@ -82,7 +74,6 @@ class SimulatorRecording:
     """One recording.
 
     Attributes:
-        name: of it.
         inputs: `t` [s], and inputs by name, shape (n,).
         measured: outputs by name, shape (n,).
     """
@@ -100,11 +91,8 @@ class Model:
     """A simulator with its recordings.
 
     Attributes:
-        name: of it.
         parameters: initial states of each run included.
         ports: where something may act.
-        outputs: that are compared.
-        runs: recordings.
     """
 
     name: str
@@ -124,8 +112,6 @@ class TrialInput:
     """Inputs that nobody recorded yet.
 
     Attributes:
-        run: number of the recording whose times they have.
-        about: what they are, in words.
         inputs: `t` [s], and inputs by name, shape (n,).
     """
 
@@ -140,7 +126,6 @@ class SimulationRequest:
 
     Attributes:
         run: number of the recording whose inputs it takes.
-        parameters: by key.
         terms: what acts at the ports.
         records: whether signals at the ports are wanted.
         trial: inputs that it takes in place of those of the recording; None: it takes these.

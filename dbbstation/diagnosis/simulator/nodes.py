@@ -54,9 +54,6 @@ class Node:
     """A simulator with some terms, refitted.
 
     Attributes:
-        work: simulations.
-        fitted: to all rows.
-        inside: candidates that are put in.
         size: of what the simulator without any term leaves, root mean square: what candidates may explain.
         own: physics of the user's own.
     """
@@ -166,8 +163,6 @@ class Node:
         """Numbers that a comparison about this node gives a candidate.
 
         Args:
-            settled: the comparison.
-            one: the candidate.
             beside: what it stands beside, itself there or not; None: the best hypothesis.
         """
         beside = settled.best.members if beside is None else beside
@@ -200,8 +195,6 @@ class Challenge:
     """Named terms in the place of a curve.
 
     Attributes:
-        curve: its name.
-        names: of the terms.
         log_odds: for the curve, all that both cost being counted.
     """
 
@@ -215,7 +208,6 @@ class Nodes:
     """Nodes that were visited, by the names of their terms.
 
     Attributes:
-        work: simulations.
         own: physics of the user's own.
         progress: called with what is being done.
         begun: from which terms others were refitted already.
@@ -279,8 +271,6 @@ class Nodes:
         """A node with other terms; None where simulations with it run away.
 
         Args:
-            node: that it begins from.
-            more: terms that are not in that.
             settled: comparison about that.
             beside: members of the comparison that are put in, those of `more` among them; None: those of its best hypothesis.
         """
@@ -362,7 +352,6 @@ def _rms(values: NDArray[np.float64]) -> float:
 
 
 def _inside(one: Candidate, numbers: Sequence[float]) -> list[float]:
-    """Numbers to begin with: what cannot be negative is not."""
     found = list(numbers)
     for k, positive in enumerate(one.positive):
         if positive:

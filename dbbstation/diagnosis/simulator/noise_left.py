@@ -24,10 +24,8 @@ def channel_of(work: SimulationRuns, residual: NDArray[np.float64], base: Base, 
     """Channel of all rows of a simulator's recordings.
 
     Args:
-        work: simulations.
         residual: measured less simulated, scaled, shape (n,).
         base: what is fitted anew with every hypothesis.
-        laws: what is compared.
     """
     outputs = work.model.outputs
     return Channel(
@@ -55,7 +53,6 @@ def noise_left(
     """Noise of what a refit leaves, measured beside everything that was fitted.
 
     Args:
-        work: simulations.
         residual: of the refit, shape (n,).
         columns: what one more of each fitted number does, shape (n, m).
         off: what its terms may be off by, each of standard deviation one, shape (n, q); None: nothing.
@@ -82,10 +79,8 @@ def log_probability_of(bank: Bank, residual: NDArray[np.float64], off: NDArray[n
     """Log probability of rows in a noise, with what so many fitted numbers cost [Schwarz's criterion], up to a constant.
 
     Args:
-        bank: noise.
         residual: shape (n,).
         off: what terms may be off by, each of standard deviation one, shape (n, q): it is averaged over.
-        numbers: that were fitted.
     """
     rows = bank.whitened(residual) / bank.noise.innovation
     beside = bank.whitened(off) / bank.noise.innovation

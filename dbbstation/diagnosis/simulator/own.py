@@ -30,6 +30,4 @@ class PortSource(ABC):
 
         Args:
             t: time [s].
-            signals: of the port, by name.
-            parameters: its own, by name.
         """

@@ -23,11 +23,6 @@ class Ports:
     """Ports of one simulation: `ports.NAME(t, signals)` returns what acts there.
 
     Time and signals are numbers, or arrays of all rows where a port acts on what has been simulated, such as a sensor.
-
-    Args:
-        ports: that there are.
-        acting: evaluated terms, by port.
-        records: whether signals are kept.
     """
 
     def __init__(
@@ -40,7 +35,6 @@ class Ports:
             setattr(self, port.name, self._port(port.name, list(acting.get(port.name, ())), records=records))
 
     def __getattr__(self, name: str) -> Callable[..., float]:
-        """Refuse a port that is not there."""
         there = ", ".join(self.__dict__.get("_names", ()))
         raise SimulationFault(f"`ports.{name}` is no port of the model; there are {there or 'none'}")
 

@@ -87,11 +87,9 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
     Terms that linear answers ask for, and that are not worth it once they are refitted, compete no more about the same terms.
 
     Args:
-        nodes: that were visited.
-        base: the simulator as it is.
         compare: everything about a node.
-        refits: refit each node in the noise that is found beside it, until nothing moves; False: where rows are held back, which are
-            refitted from the node each time.
+        refits: refit each node in the noise that is found beside it, until nothing moves; False: where rows are held back, which
+            are refitted from the node each time.
     """
     nodes.challenges.clear()  # those of other rows say nothing here
     node, been, refuted, refitted, stopped = base, {base.names}, dict[str, str](), 0, ""
@@ -194,7 +192,6 @@ def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str
 
 
 def _within_forms_refitted(node: Node, but_for: Collection[str]) -> list[str]:
-    """The same of terms that are put in, as they are refitted."""
     base = node.fitted.columns[:, : len(node.work.model.parameters)]
     terms = {one.name: term for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
 
@@ -209,9 +206,7 @@ def _less(members: Sequence[Candidate], size: Callable[[Sequence[str]], float], 
     """Those of some members that do less, alone or all of them together, than the others at their port may be off by.
 
     Args:
-        members: of a hypothesis.
         size: of what some of them do together, root mean square.
-        names: that are asked about.
     """
     ports = {one.name: one.term.port for one in members}
     off = {one.name: form_uncertainty(one) * size([one.name]) for one in members}
@@ -251,7 +246,6 @@ def moves(node: Node, settled: Settled) -> dict[str, float]:
 
 
 def _said(node: Node, settled: Settled) -> dict[tuple[str, str], tuple[float, float]]:
-    """Value and uncertainty that a comparison about a node has of each number of its terms, by names of both."""
     members = [member for member in settled.best.members if member.cause.name in node.names]
     if not members:
         return {}

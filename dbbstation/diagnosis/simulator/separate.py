@@ -34,13 +34,12 @@ class Separation:
     """What would distinguish two terms.
 
     Attributes:
-        terms: both names.
         part: stretch of the recordings in which they differ most.
         sigmas: standard deviations by which they differ there.
         repeats: of that stretch until they are distinguished.
-        trial: input under which they would differ most; None where the simulator has no inputs, or none of those tried does better.
+        trial: input under which they would differ most; None where the simulator has no inputs, or none of those tried does
+            better.
         trial_sigmas: standard deviations by which they would differ under it, in a recording as long.
-        recorded_sigmas: the same under the inputs as recorded.
     """
 
     terms: tuple[str, str]
@@ -119,7 +118,6 @@ def _tried(nodes: Nodes, found: SearchOutcome, pair: tuple[str, str]) -> tuple[T
 
 
 def _term(found: SearchOutcome, name: str) -> Term:
-    """A term with its numbers: as it was put in, or as it would be."""
     inside = next((term for term in found.state.terms if term.name == name), None)
     if inside is not None:
         return inside

@@ -60,9 +60,7 @@ class Term:
     """What acts at a port.
 
     Attributes:
-        port: name.
         form: how it follows the signals.
-        signals: names.
         amplitudes: shape (p,).
         shape: numbers that the term is not proportional to, such as a time constant, shape (s,).
         fixed: numbers that are not fitted: knots of a curve, period of an angle and order.
@@ -109,7 +107,6 @@ def evaluator(term: Term) -> Evaluate:
 
 
 def _momentary(term: Term) -> Evaluate:
-    """Evaluate a term that follows its signals at once."""
     a = term.amplitudes[0]
     if term.form is TermForm.CONSTANT:
         return lambda _t, _signals: a

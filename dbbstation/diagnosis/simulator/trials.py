@@ -81,10 +81,6 @@ def apart(
     """By how many standard deviations two terms would be distinguished under an input.
 
     Args:
-        work: simulations of the recordings.
-        trial: the input.
-        state: that was found.
-        pair: both terms, with their numbers.
         noise: of each output, that of rows that count as one, in units of its residual, shape (o,).
     """
     model = work.model

@@ -56,7 +56,6 @@ class FittedState:
 
     Attributes:
         values: of the parameters of the model, shape (k,).
-        terms: that are in the model, with their numbers.
     """
 
     values: tuple[float, ...]
@@ -102,7 +101,6 @@ class SimulationRuns:
     """Simulations of a model.
 
     Attributes:
-        model: that is simulated.
         run: simulates; what was simulated before is not simulated again.
         scales: unit of the residual of each output, in that of the output, shape (o,).
         doses: that gave answers of the right size, by number.
@@ -182,8 +180,6 @@ class SimulationRuns:
         """Answers to small doses.
 
         Args:
-            state: about which.
-            directions: what is dosed.
             size: of the residual, root mean square.
         """
         before = self.residuals([state])[0]
@@ -230,9 +226,7 @@ class PerturbedParameter:
     """One number that is dosed: one of the state, or one of a term that is not in it.
 
     Attributes:
-        key: by which its dose is remembered.
         dose: to begin with; its sign is the side.
-        place: among the numbers of the state; of the term where there is one.
         term: that is not in the state yet; None where the number is one of the state.
     """
 

@@ -34,12 +34,10 @@ class Table:
         measured: shape (n,).
         simulated: shape (n,).
         unit: of both; empty where none is known.
-        simulated_name: of the column.
         variables: that the difference may follow.
         derivatives: of the simulated value by parameters, by name of these, shape (n,).
         columns: all numeric columns by name, for physics of one's own, shape (n,).
         blocks: rows of each file or run.
-        names: of the blocks.
         clock: variable that orders the rows; None where nothing does.
         in_row_order: rows stand in the order in which they were measured, though no column says when.
         known: standard uncertainty to which parameters were known before, by name, in their own units.

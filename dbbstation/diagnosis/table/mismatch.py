@@ -56,7 +56,6 @@ class RefittedParameter:
     """A base parameter before and after.
 
     Attributes:
-        name: `offset`, or of the parameter.
         before: with the base alone, by ordinary least squares; its uncertainty allows for neighbours that resemble each other.
         after: with what was found beside it.
         confounded: share of what the parameter does that this can do as well, R².
@@ -82,11 +81,9 @@ class Share:
     """What of the mismatch follows one variable.
 
     Attributes:
-        variable: name.
         rms: of all effects over it, shared ones as well, in the unit of the table.
         share: of the reduction of the weighted sum of squares, what these bring alone.
         lost: what of it is lost without them, since others make up for part of them.
-        terms: how many.
     """
 
     variable: str
@@ -101,19 +98,17 @@ class Mismatch:
     """What is said of a table.
 
     Attributes:
-        table: that was compared.
         settled: what the comparison came to.
-        findings: what is said of each cause, those that are there first.
         shares: of variables, largest first.
         resembles: of smooth curves that are there, which named forms they follow: share of each, R², by name of finding.
-        fitted: base parameters.
         left: tests of the residual.
         levels: whether anything differs, what it follows, which law it is.
         is_worse_here: whether what was found leaves more of the rows than the values as simulated do.
         held_out: error of rows that took no part; None where it was not asked for.
         lacking: physics of the user's own that could not be asked, and why.
         texts: of that which was asked, by name.
-        second_start: log odds of what a search that begins with nothing ends at, over what was found; zero where both are the same.
+        second_start: log odds of what a search that begins with nothing ends at, over what was found; zero where both are the
+            same.
         cancelling: effects that cancel each other; None where they do not.
     """
 
@@ -338,7 +333,6 @@ def _named_forms(pattern: Pattern) -> dict[str, NDArray[np.float64]]:
 
 
 def _followed(effect: NDArray[np.float64], columns: NDArray[np.float64]) -> float:
-    """Share of the variance of an effect that columns and a constant follow."""
     both = np.column_stack([np.ones(len(effect)), columns])
     values, *_ = np.linalg.lstsq(both, effect, rcond=None)
     whole = float(np.sum((effect - effect.mean()) ** 2))

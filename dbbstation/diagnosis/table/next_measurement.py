@@ -28,12 +28,7 @@ MOST = 4
 
 @dataclass(frozen=True)
 class Next:
-    """One thing to measure.
-
-    Attributes:
-        text: what to do, and what it would decide.
-        variables: that it concerns.
-    """
+    """One thing to measure."""
 
     text: str
     variables: tuple[str, ...]
@@ -65,7 +60,6 @@ def _suggested(found: Mismatch) -> Iterator[Next]:
 
 
 def _denser(found: Mismatch) -> Iterator[Next]:
-    """A place where something is left."""
     worst = found.left.worst
     if not found.left.is_noise and worst.name in {v.name for v in found.settled.channel.variables}:
         yield Next(f"Measure more densely in {worst.name}, {worst.where}: something is left there.", (worst.name,))
@@ -86,7 +80,6 @@ WHOLE = 0.95
 
 
 def _other_way(found: Mismatch) -> Iterator[Next]:
-    """Variables that go one way only."""
     table = found.table
     for variable in found.settled.channel.variables if table.is_ordered else ():
         if variable.kind in TRAVELS and variable.name != table.simulated_name:

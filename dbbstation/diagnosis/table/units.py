@@ -15,7 +15,6 @@ class Meaning:
 
     Attributes:
         unit: as printed; empty where none is known.
-        kind: of the variable.
         period: one turn of an angle, in its unit; None for all others.
         driven: whether it results from what is simulated, as a motor's torque does from its motion.
     """

@@ -76,7 +76,6 @@ CONFOUNDED = 0.1
 
 
 def _where(found: Mismatch, finding: CauseFinding) -> str:
-    """Ranges, times and blocks."""
     table = found.table
     if finding.rows:
         return "It is there " + "; ".join(_stretch(found, first, last) for first, last in finding.rows) + "."
@@ -90,7 +89,6 @@ def _where(found: Mismatch, finding: CauseFinding) -> str:
 
 
 def _stretch(found: Mismatch, first: int, last: int) -> str:
-    """A stretch of rows in the words of the clock."""
     table = found.table
     block = next(k for k, rows in enumerate(table.blocks) if rows.start <= first < rows.stop)
     run = f" of {table.names[block]}" if len(table.blocks) > 1 else ""

@@ -1,4 +1,4 @@
-"""Error source: play of the strut drives at reversal."""
+"""Play of the strut drives at reversal."""
 
 from __future__ import annotations
 
@@ -31,15 +31,13 @@ MM_PER_UM = 1e-3
 
 
 class Backlash(SourceWithHistory):
-    """After a reversal a strut stays behind by its play, and goes on only when the drive has travelled through it.
+    """After a reversal a strut lags by its play until the drive has travelled through it.
 
-    With x the commanded travel of a strut and w its play, the strut stands at y, which the drive takes along at
-    either end of the play: y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2. The error y - x is -w/2 while the strut
-    grows and +w/2 while it shrinks, and passes from one to the other over a travel of w. A drive that winds up against
-    friction before it slides has the same ends and may need a longer travel: a law of its own, `_WoundUp`.
+    With commanded travel x and play w, y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2. The error y - x is -w/2 while
+    growing and +w/2 while shrinking. Wind-up against friction has the same ends over a longer travel: `_WoundUp`.
 
-    A run is taken to begin in a movement that was already under way. A negative w is a strut that overshoots at
-    reversal; the effect is that of |w| with its sign turned, so that a fit may pass through zero.
+    A run begins in a movement under way. Negative w is an overshoot, with the sign of |w|'s effect inverted, so that a
+    fit may pass zero.
     """
 
     name = "backlash"
@@ -63,15 +61,14 @@ class Backlash(SourceWithHistory):
     )
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
-        """The one of a drive that winds up."""
+        """The law of wind-up."""
         return (_WoundUp(),)
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Six plays, full width."""
         return of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: it stays behind")
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
-        """Which end of its play each strut leans on.
+        """Return the end of its play that each strut leans on.
 
         Raises:
             ModelError: the motion is no path.
@@ -82,12 +79,11 @@ class Backlash(SourceWithHistory):
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[Effect, PlayState]:
-        """Lag of each strut."""
         lag, _, behind = self._lag(motion, machine, values, state)
         return Effect(strut_mm=lag), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Each strut answers to its own play; analytic but for the samples at which a strut is taken along again.
+        """Each strut answers to its own play; analytic except at pick-up samples.
 
         Raises:
             ModelError: the motion is no path.
@@ -98,7 +94,7 @@ class Backlash(SourceWithHistory):
     def _lag(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
-        """Lag [mm] and its derivative by the width [mm/mm], shapes (n, 6), and the state behind the last row."""
+        """Return lag [mm] and its derivative by width [mm/mm], shapes (n, 6), and the last state."""
         lag, by_width, behind = followed(motion.struts(machine).length_mm, MM_PER_UM * np.abs(values), state)
         return np.where(values < 0.0, -lag, lag), by_width, behind
 
@@ -112,10 +108,10 @@ drive; with 1.1 both grow together, so that the error can be compensated."""
 
 
 class _WoundUp(SourceWithHistory):
-    """The friction of a strut's drive turns round over a travel, not at once: presliding, by the law of Dahl.
+    """Drive friction reverses over a travel: presliding by the law of Dahl.
 
-    With s the direction, x the commanded travel and w the whole width the error is w z, dz = -(s/2 + z) |dx| / l: behind a reversal
-    it is -s w (1/2 - exp(-d / l)), d the travel since then, where the strut had been wound up wholly before.
+    With direction s, travel x and width w the error is w z, dz = -(s/2 + z) |dx| / l. After a reversal of a fully wound
+    strut it is -s w (1/2 - exp(-d / l)), d the travel since.
     """
 
     name, belongs_to, texts = Backlash.name, Backlash.belongs_to, Backlash.texts
@@ -126,22 +122,20 @@ class _WoundUp(SourceWithHistory):
 
     @property
     def law(self) -> str:
-        """Of the two of backlash."""
         return "wind-up"
 
     @property
     def simpler_law(self) -> str:
-        """Play: a wind-up over no travel."""
+        """Play: wind-up without travel."""
         return Backlash().law
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Six widths and one length."""
         widths = of_each_strut("strut_{}_um", "µm", 3.0, "wind-up of strut {}, whole width; positive: it stays behind")
         meaning = "travel of a strut over which 37 % of a turn-round are left, all struts alike"
         return (*widths, Parameter("wind_up_length_mm", "mm", 0.05, meaning, LENGTHS_MM))
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> WoundState:  # noqa: ARG002
-        """Wound up by the movement that each strut is in.
+        """Return struts wound up by their movement.
 
         Raises:
             ModelError: the motion is no path.
@@ -152,12 +146,11 @@ class _WoundUp(SourceWithHistory):
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: WoundState
     ) -> tuple[Effect, WoundState]:
-        """Wind-up of each strut."""
         side, _, behind = wound_up(motion.struts(machine).length_mm, _lengths(values)[0], state)
         return Effect(strut_mm=side * MM_PER_UM * values[:STRUTS]), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By the widths, each strut its own, and by the length.
+        """By each strut's width, and by the length.
 
         Raises:
             ModelError: the motion is no path.
@@ -172,6 +165,6 @@ class _WoundUp(SourceWithHistory):
 
 
 def _lengths(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Length of each strut's wind-up [mm], and where it is the stated one, shape (6,)."""
+    """Return each strut's wind-up length [mm], and where it is the stated one, shape (6,)."""
     least = np.maximum(AHEAD * MM_PER_UM * np.abs(values[:STRUTS]), 1e-9)
     return np.maximum(values[STRUTS], least), values[STRUTS] >= least

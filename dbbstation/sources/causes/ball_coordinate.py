@@ -1,4 +1,4 @@
-"""Error source: one entry of the CMM sheet."""
+"""One entry of the CMM sheet."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 
 class BallCoordinate(LinearSource):
-    """The coordinates of a ball on the CMM sheet are off: shared by all mountings of that ball.
+    """A ball's CMM coordinates are off, for all its mountings.
 
-    The CMM's usual uncertainty and a wrong entry (typing error, wrong bore, wrong holder) are the same cause.
+    The CMM's uncertainty and a wrong entry are the same cause.
     """
 
     name = "ball-coordinate"
@@ -32,17 +32,15 @@ class BallCoordinate(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Three coordinates."""
         return tuple(Parameter(f"{axis}_mm", "mm", 0.001, f"ball actual minus CMM {axis.upper()}") for axis in "xyz")
 
     def shared_by(self, motion: Motion) -> str:
-        """All runs at one entry of the CMM sheet share its error."""
+        """Runs of one CMM entry share its error."""
         return "" if motion.setup is None else motion.setup.ball
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each coordinate its own parameter."""
         return Effect(fixed_ball_mm=np.eye(3))
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
-        """Uncertainty of the CMM in every axis."""
+        """Return the CMM's uncertainty per axis."""
         return None if motion.setup is None else np.full(3, motion.setup.ball_uncertainty_mm)

@@ -1,4 +1,4 @@
-"""Error source: a ball that is not round."""
+"""A ball that is not round."""
 
 from __future__ import annotations
 
@@ -20,13 +20,11 @@ ORDERS = (2, 3, 4, 5)
 
 
 class BallForm(LinearSource):
-    """The surface of the fixed ball stands proud by h where the bar sits on it, and pushes the reading down by h.
+    """The fixed ball stands proud by h under the bar and lowers the reading by h.
 
-    With n the direction from the fixed to the moving ball, h = Re sum (a_k - i b_k) (n_x + i n_y)^k for k = 2 ... 5,
-    which are the sectoral spherical harmonics: a_k cos k theta + b_k sin k theta for a level bar, fading towards the
-    poles as cos^k of the elevation. The ball is taken to stand the same way round in every mounting, as its mark for
-    the seat makes it; the moving ball is the bar's own and seats in the spindle, where a level circle sees it from all
-    sides too, so that the figure found is that of both together.
+    With n from fixed to moving ball, h = Re sum (a_k - i b_k) (n_x + i n_y)^k, k = 2 ... 5, sectoral spherical harmonics:
+    a_k cos k theta + b_k sin k theta for a level bar. The ball's mark gives the same orientation in every mounting. Level
+    circles see the moving ball from all sides too, so both balls' forms are found together.
     """
 
     name = "ball-form"
@@ -46,7 +44,6 @@ class BallForm(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Cosine and sine of each order."""
         return tuple(
             Parameter(
                 f"{wave}_{order}_um",
@@ -60,7 +57,7 @@ class BallForm(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Harmonics of the bar's direction; nothing for poses that nobody measured."""
+        """Harmonics of the bar's direction; zero for unmeasured poses."""
         if motion.setup is None:
             return Effect(reading_mm=np.zeros((len(motion), 2 * len(ORDERS))))
         away = motion.poses[:, :3] - motion.setup.fixed_ball_mm

@@ -1,4 +1,4 @@
-"""Error source: interpolation error of the bar's encoder."""
+"""Interpolation error of the bar's encoder."""
 
 from __future__ import annotations
 
@@ -23,13 +23,10 @@ SIGNAL_PERIODS_UM = (2.0, 4.0, 8.0, 10.0, 16.0, 20.0, 40.0, 80.0, 100.0, 200.0)
 
 
 class BarCyclic(ErrorSource):
-    """The reading is off by a wave along the encoder's scale: a sin(2 pi x / p) + b cos(2 pi x / p), p its signal period.
+    """The reading has a wave along the encoder: a sin(2 pi x / p) + b cos(2 pi x / p), p its signal period.
 
-    The encoder's two signals are not quite alike, and what is interpolated between two of their periods repeats in the
-    next. x is what the bar shows, less the whole millimetre that the run's readings lie about; that it has the error
-    in it changes the wave by parts in a hundred. Phase and amplitude belong to the session: the display is set on the
-    calibrator anew, which moves the zero of x. A run whose readings sweep less than a period shows a part of one wave,
-    which looks like anything else.
+    x is the reading less the run's whole millimetre. Phase and amplitude belong to the session, since the display is set
+    anew. A run that sweeps less than a period shows an ambiguous part of a wave.
     """
 
     name = "bar-cyclic"
@@ -65,12 +62,12 @@ class BarCyclic(ErrorSource):
         )
 
     def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:
-        """Whether half of the runs sweep a signal period: a part of one wave follows the reading's own error."""
+        """Return whether half of the runs sweep a signal period."""
         swept = [np.ptp(m.reading_mm[m.kept]) for m in motions if m.reading_mm is not None]
         return bool(np.median(swept) >= MM_PER_UM * nonlinear[0])
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Wave in the reading.
+        """Return the wave in the reading.
 
         Raises:
             ModelError: the motion has no reading.
@@ -90,9 +87,9 @@ class BarCyclic(ErrorSource):
         return Effect(reading_mm=MM_PER_UM * np.column_stack([sine, cosine, period]))
 
     def _waves(self, motion: Motion, period_um: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Sine and cosine, shape (n, 2) [1], and derivative of the phase by the period, shape (n,) [rad/µm].
+        """Return sine and cosine, shape (n, 2) [1], and the phase's derivative by the period, shape (n,) [rad/µm].
 
-        A period of zero (or less, which a fit may try) makes no wave.
+        A period of at most zero makes no wave.
         """
         self.require(motion)
         reading = reading_without_noise_mm(motion)

@@ -1,4 +1,4 @@
-"""Error source: the bar warms up while it measures."""
+"""The bar warms up while it measures."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ MM_PER_UM = 1e-3
 
 
 class BarDrift(ErrorSource):
-    """The bar's reading drifts as its body takes the temperature of hand, machine and air.
+    """The bar's reading drifts with its body's temperature, by `warm_up`.
 
-    It follows the growth of `warm_up`, counted from the session's first sample, where the drift is zero by definition: what the bar was off then is its
-    offset. Sessions with the same bar share the drift, as they begin with the same handling.
+    It is zero at the session's first sample; what was off then is the bar's offset. Sessions with the same bar share it.
     """
 
     name = "bar-drift"
@@ -44,12 +43,11 @@ class BarDrift(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Drift in the end, time constant, what pauses take back."""
         meaning = "reading minus true distance, from the first sample to the end of warm-up"
         return warm_up_parameters(Parameter("drift_um", "µm", 2.0, meaning), "pause_loss_um", 1800.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Drift of the reading.
+        """Return the drift.
 
         Raises:
             ModelError: the motion has no time.
@@ -58,7 +56,7 @@ class BarDrift(ErrorSource):
         return Effect(reading_mm=MM_PER_UM * grown(motion, values))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the three parameters of the law.
+        """By the law's three parameters.
 
         Raises:
             ModelError: the motion has no time.
@@ -67,7 +65,7 @@ class BarDrift(ErrorSource):
         return Effect(reading_mm=MM_PER_UM * grown_by(motion, values))
 
     def by_temperature(self) -> ErrorSource:
-        """The bar by the thermometer in it."""
+        """The bar by its thermometer."""
         return _ByTemperature()
 
 
@@ -78,5 +76,4 @@ class _ByTemperature(FollowsTemperature, cause=BarDrift):
     growth = Parameter("drift_um_k", "µm/K", 1.6, "drift of the reading for each kelvin that the bar is warmer")
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Drift per unit."""
         return Effect(reading_mm=MM_PER_UM * self.warmer_k(motion))

@@ -1,4 +1,4 @@
-"""Error source: the bar's encoder shows more or less than a millimetre for each millimetre."""
+"""The scale of the bar's encoder."""
 
 from __future__ import annotations
 
@@ -17,12 +17,11 @@ MM_PER_UM = 1e-3
 
 
 class BarGain(LinearSource):
-    """The reading is off in proportion to the way of the encoder from the length at which the bar was calibrated.
+    """The reading errs in proportion to the encoder's way from the calibrated length.
 
-    The way is what was commanded of it. To first order a reading is r = n + J p: n the commanded distance less the calibrated length, J p what
-    geometric errors p add. Times one and a share s that is n + J p' + s n with p' = (1 + s) p: whatever the scale makes of geometric errors are other
-    geometric errors, which no bar can tell from them. What remains is s n. It is zero where every circle is as large as the bar was
-    calibrated, and shows where one bar measures circles of several sizes.
+    The way is the commanded one. To first order r = n + J p, n commanded less calibrated length, p geometric errors.
+    Scaled by 1 + s it is n + J p' + s n with p' = (1 + s) p, indistinguishable geometric errors. What remains is s n,
+    visible only if one bar measures circles of several sizes.
     """
 
     name = "bar-gain"
@@ -41,7 +40,6 @@ class BarGain(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """One share."""
         return (
             Parameter(
                 "gain_um_mm", "µm/mm", 3.0, "reading less true way, for each millimetre from the calibrated length"
@@ -49,7 +47,7 @@ class BarGain(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """The commanded way; zero where the bar's calibrated length or the place of the ball is not known."""
+        """The commanded way; zero without calibrated length or ball place."""
         setup = motion.setup
         if setup is None or setup.bar_length_mm is None or not setup.place_known:
             return Effect(reading_mm=np.zeros((len(motion), 1)))

@@ -1,4 +1,4 @@
-"""Error source: length of the bar."""
+"""Length of the bar."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class BarOffset(LinearSource):
-    """Every reading of a session is longer by a constant than the true distance of the balls."""
+    """All readings of a session exceed the true distance by a constant."""
 
     name = "bar-offset"
     belongs_to = Owner.SESSION
@@ -29,13 +29,11 @@ class BarOffset(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """One length."""
         return (Parameter("offset_mm", "mm", 0.0005, "reading minus true distance"),)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """One for every sample."""
         return Effect(reading_mm=np.ones(1))
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
-        """Uncertainty of the calibrator."""
+        """Return the calibrator's uncertainty."""
         return None if motion.setup is None else np.array([motion.setup.bar_uncertainty_mm])

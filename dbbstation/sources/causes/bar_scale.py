@@ -1,4 +1,4 @@
-"""Error source: the scale of the bar's encoder is bent."""
+"""A bent scale of the bar's encoder."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ REACH_MM = 0.1
 
 
 class BarScale(LinearSource):
-    """The reading is off by the square of its way from the bar's nominal length.
+    """The reading errs by the square of its way from the nominal length.
 
-    The way is counted from the whole millimetre that a run's readings lie about. Where that is not the length at which the bar was
-    set, the square has a part in proportion and a constant besides. What is in proportion to the way is another source, `bar-gain`. A machine whose circles deviate by a few micrometres does not show a bent scale either.
+    The way counts from the run's whole millimetre. A proportional part is `bar-gain`. Deviations of a few micrometres
+    show no bow.
     """
 
     name = "bar-scale"
@@ -44,7 +44,6 @@ class BarScale(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Its bow; a good gauge is straight to half a micrometre over a tenth of a millimetre."""
         return (
             Parameter(
                 "curved_um", "µm", 0.5, "error of the reading 0.1 mm away from the nominal length, on either side"

@@ -1,4 +1,4 @@
-"""Error source: the frame that carries the base joints yields."""
+"""Yielding of the frame under the base joints."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ if TYPE_CHECKING:
 
 
 class BaseCompliance(LinearSource):
-    """Each base joint gives way under the force that its strut puts on it: dQ_i = C F_i, C = diag(h, h, v).
+    """Each base joint yields under its strut's force: dQ_i = C F_i, C = diag(h, h, v).
 
-    The frame is taken as springs under each joint, equal in all horizontal directions, without coupling from joint to
-    joint. Where both compliances are equal this is exactly a strut that is softer by the same amount at every
-    length, so only their difference, or gravity's growth with length, tells frame and struts apart.
+    The frame is a spring under each joint, isotropic horizontally, without coupling. Equal compliances equal softer
+    struts of any length; only their difference, or gravity's growth with length, separates frame and struts.
     """
 
     name = "base-compliance"
@@ -40,7 +39,7 @@ class BaseCompliance(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Two compliances.
+        """Return two compliances.
 
         Raises:
             ModelError: the machine file has no masses.

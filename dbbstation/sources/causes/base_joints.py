@@ -1,4 +1,4 @@
-"""Error source: places of the base joints."""
+"""Places of the base joints."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ USUAL_MM = 0.2
 
 
 class BaseJoints(LinearSource):
-    """A base joint is not where the design has it: dQ_i, i = 1 to 6, three coordinates each [CAL II-C 2]."""
+    """Base joints are off their design places: dQ_i, i = 1 to 6, three coordinates each [CAL II-C 2]."""
 
     name = "base-joints"
     belongs_to = Owner.MACHINE
@@ -50,5 +50,4 @@ class BaseJoints(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each coordinate its own parameter."""
         return Effect(base_joint_mm=np.eye(3 * STRUTS).reshape(STRUTS, 3, 3 * STRUTS))

@@ -1,4 +1,4 @@
-"""Error source: the platform's centre of gravity."""
+"""The platform's centre of gravity."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ if TYPE_CHECKING:
 
 
 class CogShift(LinearSource):
-    """The platform's weight acts beside the point that the machine file states: a moment d x W more [GRAV 3.2].
+    """The weight acts beside the stated point: a moment d x W more [GRAV 3.2].
 
-    The shift d is fixed in the platform's frame. [GRAV] has its part along the axis alone and finds it from motor
-    currents, which show the moment itself; circles show it multiplied by the struts' compliance: the one that the
-    source gravity of the same model has, else the machine file's.
+    d is fixed in the platform. [GRAV] takes only its axial part, from motor currents. Circles show it times the struts'
+    compliance, of the source gravity, else of the machine file.
     """
 
     name = "cog-shift"
@@ -44,7 +43,7 @@ class CogShift(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Three coordinates.
+        """Return three coordinates.
 
         Raises:
             ModelError: the machine file has no masses.
@@ -57,7 +56,7 @@ class CogShift(LinearSource):
         )
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """The moment of the whole shift at once: a model asks for it at each of the places that its weights lead to.
+        """Return the effect of the whole shift at once.
 
         Raises:
             ModelError: the machine file has no masses.
@@ -80,7 +79,7 @@ class CogShift(LinearSource):
     def _of_a_shift(
         self, motion: Motion, machine: Machine, shift_mm: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Stretch of the struts [mm] and their tension [N], shape (n, 6) each, by a shift in the platform's frame, shape (3,)."""
+        """Return stretch [mm] and tension [N] of struts, shape (n, 6) each, by a platform-frame shift, shape (3,)."""
         weight_n = platform_masses(self.name, machine).platform_kg * GRAVITY_M_S2
         struts = motion.struts(machine)
         x, y, _ = (motion.frames(machine).rotation @ shift_mm).T

@@ -1,4 +1,4 @@
-"""Error source: what lies between the load of a strut and the current of its motor."""
+"""Between a strut's load and its motor's current."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PER_MOTOR = ("gain_a_kn", "coulomb_n", "viscous_ns_mm", "load_share_n_kn", "asym
 
 
 def of_motor(motor: int, kind: str) -> str:
-    """Return the name of a parameter of one motor, 1 to 6; `kind` is of `PER_MOTOR`."""
+    """Return the parameter name of one motor, 1 to 6; `kind` is of `PER_MOTOR`."""
     return f"motor_{motor}_{kind}"
 
 
@@ -38,20 +38,15 @@ MOTOR_OF_GAIN = {of_motor(motor, PER_MOTOR[0]): motor for motor in range(1, STRU
 
 
 class DriveFriction(ErrorSource):
-    """A motor holds its strut's load with a current, and friction of its drive helps or hinders it.
+    """A motor's current holds its load, and drive friction helps or hinders it.
 
-    I = k (F - s (F_c + e |F|) - b v - a): F the load, positive where the platform pulls; v the speed and s the direction
-    of the strut, positive where it grows. Friction carries part of the load while the strut is paid out and is added to
-    it while the strut is drawn in. The share e of the load is the loss of the screw, 1 / efficiency - 1 while it works
-    against its load and 1 - efficiency while its load turns it, nearly the same for good screws. a is half of what
-    Coulomb friction is larger one way than the other; an offset of the current's zero looks the same.
+    I = k (F - s (F_c + e |F|) - b v - a): load F, positive if the platform pulls; speed v and direction s, positive while
+    growing. e is the screw's loss, 1 / efficiency - 1 against the load and 1 - efficiency with it. a is half the
+    asymmetry of Coulomb friction, or an offset of the current's zero.
 
-    The load is what the machine file's weights, a centre of gravity that sits elsewhere and weights of struts make of
-    it, at the pose where the machine really is. Gain and weight are known as a product only: the weight is taken from
-    the machine file. After a reversal friction turns over linearly, within TURNED_OVER_MM of travel; what is measured
-    there says nothing of these parameters.
-
-    It changes nothing but currents: bars and poses are predicted without it.
+    The load follows from the machine file's weights, the centre of gravity and struts' weights at the actual pose. Only
+    the product of gain and weight is known; the weight is taken as stated. After a reversal friction turns linearly
+    within TURNED_OVER_MM, where readings mean nothing. Bars and poses do not depend on this source.
     """
 
     name = "drive-friction"
@@ -75,7 +70,7 @@ class DriveFriction(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Five for each motor.
+        """Return five parameters for each motor.
 
         Raises:
             ModelError: the machine file has no masses.
@@ -121,7 +116,7 @@ class DriveFriction(ErrorSource):
         return Effect(current_a=by_parameter.reshape(len(answers), STRUTS, -1))
 
     def current_per_load(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gain, less what friction takes of a load that grows.
+        """Gain, less friction's share of a growing load.
 
         Raises:
             ModelError: the motion has no time; the machine file has no masses.
@@ -134,7 +129,7 @@ class DriveFriction(ErrorSource):
     def _driven(
         self, motion: Motion, machine: Machine
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Load of each strut [N], its direction from -1 to 1, positive where it grows, and its speed [mm/s], (n, 6)."""
+        """Return load [N], direction from -1 to 1, positive while growing, and speed [mm/s] of struts, (n, 6)."""
         if motion.time_s is None:
             self.require(motion)
         time_s, length, place = driven_in_time(motion, machine)
@@ -145,32 +140,32 @@ class DriveFriction(ErrorSource):
 
 
 def directions(length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Direction in which friction acts on struts, from -1 (shrinking) to 1 (growing), shape (n, 6).
+    """Return the direction of friction, from -1 (shrinking) to 1 (growing), shape (n, 6).
 
     Args:
-        length_mm: driven, in time order, shape (n, 6) [mm].
+        length_mm: driven, in time order, shape (n, 6).
     """
     lag, _, _ = followed(length_mm, np.full(length_mm.shape[1], TURNED_OVER_MM), leaning(length_mm))
     return -2.0 / TURNED_OVER_MM * lag
 
 
 def driven_directions(motion: Motion, machine: Machine) -> NDArray[np.float64]:
-    """Direction of friction along a motion, shape (n, 6).
+    """Return the direction of friction along a motion, shape (n, 6).
 
-    Between -1 and 1, within TURNED_OVER_MM after a reversal, a reading says nothing of a drive's friction.
+    Readings between -1 and 1, within TURNED_OVER_MM of a reversal, show no friction.
     """
     return directions(motion.struts(machine).length_mm)
 
 
 def _by_motor(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Parameters by kind and motor, shape (5, 6)."""
+    """Return parameters by kind and motor, shape (5, 6)."""
     return values.reshape(STRUTS, len(PER_MOTOR)).T
 
 
 def _carried(
     driven: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What the current carries of the load, shape (n, 6) [N], and each friction per parameter, shape (n, 6, 4)."""
+    """Return the load carried by current, shape (n, 6) [N], and frictions per parameter, shape (n, 6, 4)."""
     load, direction, speed = driven
     frictions = np.stack([direction, speed, direction * np.abs(load) / N_PER_KN, np.ones_like(load)], axis=-1)
     return load - np.einsum("nik,ki->ni", frictions, _by_motor(values)[1:]), frictions

@@ -1,4 +1,4 @@
-"""Error source: struts stretched and compressed by the platform's weight."""
+"""Struts stretched and compressed by the platform's weight."""
 
 from __future__ import annotations
 
@@ -17,15 +17,13 @@ if TYPE_CHECKING:
 
 
 class Gravity(LinearSource):
-    """Struts under the platform's weight are longer or shorter than driven: dL_i = c(L_i) T_i [GRAV eq 1, 6, 7, 8].
+    """Struts change length under the platform's weight: dL_i = c(L_i) T_i [GRAV eq 1, 6, 7, 8].
 
-    The tensions T follow from the equilibrium of the platform at the pose and the joints given. A model gives those that
-    the machine really has: that it hangs a little lower and joints sit a little elsewhere changes the forces by parts in
-    a thousand, and close to poses where the struts hardly hold it by parts in a hundred (A = -25 degrees, Y = 100 mm).
-    Tensions are signed: the same strut is pulled at one side of a tilted circle and pushed at the other.
-    The compliance c(L) = c_1000 (1 - s + s L / 1000 mm) is one number for all struts; the share s that grows with
-    length is the machine file's. Circles show the product of compliance and weight only: a platform 1 % heavier than
-    the machine file says reads as struts 1 % softer.
+    Tensions T follow from equilibrium at the given pose and joints. The actual ones differ by parts in a thousand, near
+    loose poses (A = -25 degrees, Y = 100 mm) by parts in a hundred. Tensions are signed.
+
+    c(L) = c_1000 (1 - s + s L / 1000 mm) is common to all struts; the share s is the machine file's. Circles show only
+    compliance times weight: 1 % more weight reads as 1 % softer struts.
     """
 
     name = "gravity"
@@ -47,7 +45,7 @@ class Gravity(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """One compliance; its usual size is the design's where the machine file has it.
+        """Return one compliance, of the design's size if stated.
 
         Raises:
             ModelError: the machine file has no masses.
@@ -71,7 +69,7 @@ class Gravity(LinearSource):
         return Effect(strut_mm=stretch_mm(struts, unit, tension)[:, :, None])
 
     def found_compliance(self, machine: Machine, values: NDArray[np.float64]) -> Compliance | None:
-        """Return the fitted compliance; none while it is zero, where a fit begins."""
+        """Return the fitted compliance; None while zero."""
         if values[0] == 0.0:
             return None
         return replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N * float(values[0]))

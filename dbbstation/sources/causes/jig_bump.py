@@ -1,4 +1,4 @@
-"""Error source: the jig plate was bumped once during the session."""
+"""A bump of the jig plate during the session."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ MOST_RUNS = 120
 
 
 class JigBump(ErrorSource):
-    """From one run of the session on, all balls on the table stand elsewhere, by the same shift.
+    """From one run on, all balls on the table are shifted alike.
 
-    A bump between two tests looks like balls that were put up badly from then on; many of them in one direction are less probable than one
-    bump. A bump between the directions of one test shows in that test at once.
+    Many badly seated balls in one direction are less probable than one bump. A bump between a test's directions shows at
+    once.
     """
 
     name = "jig-bump"
@@ -43,7 +43,6 @@ class JigBump(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """The shift, and the number of runs before it."""
         return (
             *(
                 Parameter(f"{axis}_um", "µm", 5.0, f"shift of all balls along {axis.upper()}, machine frame")
@@ -60,12 +59,12 @@ class JigBump(ErrorSource):
         )
 
     def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:
-        """Whether there are runs before and after it."""
+        """Return whether runs lie before and after it."""
         after = [_is_after(motion, nonlinear[0]) for motion in motions]
         return any(after) and not all(after)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Shift of the ball.
+        """Return the ball's shift.
 
         Raises:
             ModelError: the motion has no time.
@@ -74,7 +73,7 @@ class JigBump(ErrorSource):
         return Effect(fixed_ball_mm=MM_PER_UM * values[:3] * float(_is_after(motion, values[3])))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the shift; the number of runs before it is none that a fit could move.
+        """By the shift; the number of runs before it is not fitted.
 
         Raises:
             ModelError: the motion has no time.
@@ -84,12 +83,12 @@ class JigBump(ErrorSource):
 
 
 def _is_after(motion: Motion, runs: float) -> bool:
-    """Whether so many runs of the session came before the motion; a fit gives the number to within rounding only."""
+    """Return whether a motion comes after so many runs, to within rounding."""
     return _number(motion) > runs - 0.5
 
 
 def _number(motion: Motion) -> int:
-    """Number of the run in its session, from 0; 0 where nothing is known of the session."""
+    """Return the run's number in its session, from 0; 0 if unknown."""
     if motion.setup is None or motion.time_s is None or not motion.setup.moving_s:
         return 0
     begins = [begin for begin, _ in motion.setup.moving_s]

@@ -1,4 +1,4 @@
-"""Error source: the jig plate is bent by its clamps."""
+"""The jig plate bent by its clamps."""
 
 from __future__ import annotations
 
@@ -20,14 +20,12 @@ REACH_MM = 100.0
 
 
 class JigDistortion(ErrorSource):
-    """The plate is bent by clamping: its height changes by w(x, y), and its holders lean with its slope.
+    """Clamping changes the plate's height by w(x, y), and holders lean with its slope.
 
-    With r = 100 mm, w = a (x² + y²)/r² + b (x² - y²)/r² + c 2 x y/r²: every plate bent evenly, so that its curvatures are
-    the same all over, which is what moments along its edges do to a thin plate. Normals stay normal to the plate's
-    middle surface (Kirchhoff): a ball h above that surface moves by (-h dw/dx, -h dw/dy, w). With h = z + d, where d is
-    how deep the middle surface lies under the origin of the jig's frame, holders lean and the surface that carries them
-    is stretched or squeezed at once. Zero at the jig's origin: shift and tilt of the whole plate define the machine's
-    coordinates. x and y run along the machine's axes, from the origin of the jig.
+    With r = 100 mm, w = a (x² + y²)/r² + b (x² - y²)/r² + c 2 x y/r²: constant curvatures, as moments along the edges
+    make (Kirchhoff). A ball h above the middle surface moves by (-h dw/dx, -h dw/dy, w), h = z + d with d the depth of
+    that surface below the jig's origin. Zero at the origin, since the plate's shift and tilt define the machine's
+    coordinates. x and y are the machine's axes.
     """
 
     name = "jig-distortion"
@@ -46,7 +44,6 @@ class JigDistortion(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Bow, saddle and twist, and how deep the middle of the plate lies."""
         return (
             Parameter("bow_um", "µm", 5.0, "height of the plate 100 mm from its origin all round, minus CMM"),
             Parameter("saddle_um", "µm", 5.0, "further height at 100 mm along X, as much less along Y"),
@@ -61,20 +58,18 @@ class JigDistortion(ErrorSource):
         )
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Shift of the ball."""
         place, lean = _bends(motion)
         return Effect(fixed_ball_mm=(place + values[3] * lean) @ values[:3])
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the three heights and by the depth."""
         place, lean = _bends(motion)
         return Effect(fixed_ball_mm=np.column_stack([place + values[3] * lean, lean @ values[:3]]))
 
 
 def _bends(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Shift of the ball per bow, saddle and twist with the middle surface at the jig's origin, and per mm of depth.
+    """Return the ball's shift per bow, saddle and twist at d = 0, and per mm of depth.
 
-    Shapes (3, 3), [mm/µm] and [1/µm]; zero for a ball that stands in no bore.
+    Shapes (3, 3), [mm/µm] and [1/µm]; zero for a ball in no bore.
     """
     setup = motion.setup
     if setup is None or setup.plate is None:

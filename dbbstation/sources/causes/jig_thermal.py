@@ -1,4 +1,4 @@
-"""Error source: the jig plate is warmer than it was on the CMM."""
+"""The jig plate warmer than on the CMM."""
 
 from __future__ import annotations
 
@@ -19,12 +19,10 @@ MM_PER_UM_M = 1e-6
 
 
 class JigThermal(LinearSource):
-    """Balls move away from the plate's origin as plate, holders and risers grow: db = a T (b - b_0).
+    """Balls move from the plate's origin as it grows: db = a T (b - b_0).
 
-    T is how much warmer the plate is than it was when its balls were measured, a the jig file's expansion. Plate and
-    holders are taken as evenly warm and of the same material. They grow about the origin of the jig's frame; growth
-    about any other point is the same and a shift of the whole plate, and where the plate stands as a whole defines
-    the machine's coordinates. A ball that stands in no bore stays where it is.
+    T is the warming since the CMM, a the jig file's expansion, for plate and holders alike. Another centre of growth only
+    shifts the plate, which defines the coordinates. A ball in no bore stays.
     """
 
     name = "jig-thermal"
@@ -43,11 +41,9 @@ class JigThermal(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """One temperature difference."""
         return (Parameter("warmer_k", "K", 2.0, "temperature of the plate on the machine minus that on the CMM"),)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Shift of the ball per kelvin."""
         setup = motion.setup
         if setup is None or setup.plate is None:
             return Effect(fixed_ball_mm=np.zeros((3, 1)))

@@ -1,4 +1,4 @@
-"""Error source: friction in the base joints."""
+"""Friction in the base joints."""
 
 from __future__ import annotations
 
@@ -42,19 +42,15 @@ tests' virtual machine that wind up over 40, 160 and 600 µrad at most 16, 16 an
 
 
 class JointFriction(SourceWithHistory):
-    """A base joint resists being turned, so that its strut drags at the platform, and all six struts stretch for it.
+    """A base joint resists turning, so its strut drags the platform and all six struts stretch.
 
-    The joint has two axes, as a universal joint has: e1 fixed in the base, level and square to the line from base
-    joint to platform joint as it lies when the platform stands upright in the middle, and e2 square to e1 and to the
-    strut. Machines with other axes have the same steps at other places. About either axis the moment is M z_a: z is -1
-    while the angle grows and +1 while it falls, and changes over a small wind-up (stop operator, the complement of
-    play). A strut that is free to turn at the platform hands a moment on as a force across itself: by virtual work
-    f = M (z_1 dq_1/dp + z_2 dq_2/dp), with p the platform joint and q the joint's angles. Tensions follow from the
-    platform's equilibrium, J^T T = [sum f, sum (R P) x f], and lengths from the struts' compliance, for which the
-    machine file's value stands here; circles show the product of friction and compliance only.
+    A universal joint has e1, fixed in the base, level and square to base joint - platform joint in the middle, and e2
+    square to e1 and strut. The moment about an axis is M z_a, z from -1 (growing angle) to +1 over a small wind-up (stop
+    operator). By virtual work f = M (z_1 dq_1/dp + z_2 dq_2/dp), p the platform joint, q the angles. Tensions follow from
+    J^T T = [sum f, sum (R P) x f], lengths from the machine file's compliance; circles show only friction times
+    compliance.
 
-    The platform's joints, with three axes, turn by nearly the same angles on a circle at constant tilt; what they add
-    is found with the base joints'.
+    Platform joints turn by nearly the same angles, so their friction is found with the base joints'.
     """
 
     name = "joint-friction"
@@ -78,12 +74,11 @@ class JointFriction(SourceWithHistory):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Friction of six joints."""
         meaning = f"force that swings strut {{}}, 1 m from its base joint; {for_such_struts(machine)}"
         return of_each_strut("strut_{}_n", "N", 10.0, meaning, positive=True)
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
-        """Which way each joint swings about its two axes.
+        """Return each joint's direction of swing about its axes.
 
         Raises:
             ModelError: the motion is no path.
@@ -94,7 +89,7 @@ class JointFriction(SourceWithHistory):
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[Effect, PlayState]:
-        """Stretch of all struts.
+        """Return the stretch of all struts.
 
         Raises:
             KinematicsError: a pose where the struts cannot hold the platform.
@@ -105,10 +100,9 @@ class JointFriction(SourceWithHistory):
         return Effect(strut_mm=stretch_mm(struts, strut_compliance(machine), tension)), behind
 
     def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Friction of a joint's outer axis alone, of either axis as the strut leans over, and other angles of wind-up.
+        """Return effects of the outer axis alone, of either axis as the strut leans over, and of other wind-up angles.
 
-        The two bearings of a cross are not alike, and what they carry changes with the strut's inclination. How far a joint winds up
-        shows where it hardly swings over a part of a circle.
+        The two bearings differ, and their load changes with inclination. Wind-up shows only where a joint hardly swings.
         """
         struts, axes = motion.struts(machine), outer_axes(machine.hexapod)
         joints = joint_angles(struts, axes)
@@ -147,7 +141,7 @@ class JointFriction(SourceWithHistory):
 
 
 def outer_axes(hexapod: Hexapod) -> NDArray[np.float64]:
-    """Axes of the base joints that are fixed in the base, unit vectors of the machine frame, shape (6, 3)."""
+    """Return the base-fixed axes of base joints, unit vectors, machine frame, shape (6, 3)."""
     across = hexapod.platform_joints_mm[:, :2] - hexapod.base_joints_mm[:, :2]
     across[np.linalg.norm(across, axis=1) == 0.0] = [0.0, 1.0]  # a strut that is plumb there: any level axis is as good
     axes = np.column_stack([-across[:, 1], across[:, 0], np.zeros(STRUTS)])
@@ -157,11 +151,11 @@ def outer_axes(hexapod: Hexapod) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class JointAngles:
-    """How the base joints stand, and which forces on the platform's joints a moment about their axes is.
+    """Angles of base joints, and forces of moments about their axes.
 
     Attributes:
-        angle_rad: about the outer axes of the six joints, then about their inner ones, shape (n, 12) [rad].
-        by_first: derivative of the angle about the outer axis by the platform joint, shape (n, 6, 3) [rad/mm].
+        angle_rad: outer axes of six joints, then inner ones, shape (n, 12).
+        by_first: outer angle by platform joint, shape (n, 6, 3) [rad/mm].
     """
 
     angle_rad: NDArray[np.float64]
@@ -170,11 +164,10 @@ class JointAngles:
 
 
 def joint_angles(struts: Struts, axes: NDArray[np.float64]) -> JointAngles:
-    """How the base joints stand.
+    """Return the joints' angles along a path.
 
     Args:
-        struts: along a path.
-        axes: outer axes of the base joints, shape (6, 3) [1].
+        axes: outer, shape (6, 3) [1].
     """
     unit = struts.unit
     aside = np.einsum("nij,ij->ni", unit, axes)  # sine of the second angle
@@ -194,12 +187,12 @@ def joint_angles(struts: Struts, axes: NDArray[np.float64]) -> JointAngles:
 def friction_drag(
     struts: Struts, axes: NDArray[np.float64], state: PlayState | None = None
 ) -> tuple[NDArray[np.float64], PlayState]:
-    """Forces on the platform's joints where each base joint has a friction of 1 N m about each axis, (n, 6, 3) [N].
+    """Return forces on platform joints for 1 N m of friction about each base axis, (n, 6, 3) [N].
 
     Args:
-        struts: along a path, in time order.
-        axes: outer axes of the base joints, shape (6, 3) [1].
-        state: of both axes of the joints before the first row; None where the path begins there.
+        struts: in time order.
+        axes: outer, shape (6, 3) [1].
+        state: of all axes before the first row; None at the path's begin.
 
     Returns:
         The forces, and the state behind the last row.
@@ -211,10 +204,10 @@ def friction_drag(
 
 
 def drags(joints: JointAngles, acting: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Forces on the platform's joints for 1 N m about the outer axes and about the inner ones, of which a share acts, (n, 6, 3) [N].
+    """Return forces on platform joints for acting shares of 1 N m, (n, 6, 3) [N].
 
     Args:
-        acting: of the outer axes, then of the inner ones, shape (n, 12).
+        acting: outer, then inner axes, shape (n, 12).
     """
     return (
         LEVER_MM * acting[:, :STRUTS, None] * joints.by_first,
@@ -225,10 +218,10 @@ def drags(joints: JointAngles, acting: NDArray[np.float64]) -> tuple[NDArray[np.
 def resistance(
     angle_rad: NDArray[np.float64], state: PlayState, wind_up_rad: float = WIND_UP_RAD
 ) -> tuple[NDArray[np.float64], PlayState]:
-    """Share of a joint's friction that acts, against its movement, from -1 to 1, shape as the angles (n, m).
+    """Return the acting share of friction against motion, -1 to 1, shape (n, m).
 
     Args:
-        angle_rad: in time order [rad].
+        angle_rad: in time order, shape (n, m).
 
     Returns:
         The shares, and the state behind the last row.

@@ -1,4 +1,4 @@
-"""Error source: joints that are no points."""
+"""Joints that are no points."""
 
 from __future__ import annotations
 
@@ -65,7 +65,6 @@ class JointRunout(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Three offsets for each joint of each strut, and two across the strut for that of the platform."""
         swings = dict(zip(WAYS, ("up and down", "sideways", "both ways at once"), strict=True))
         towards = "offset of the axes of its {} joint, as the strut swings {}; positive: towards the strut"
         across = "offset of the strut's end across it, which goes round the first axis of its platform joint: {} part"
@@ -84,12 +83,11 @@ class JointRunout(LinearSource):
         return tuple(found)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Each strut's own offsets alone: of the derivative five sixths are zeros."""
+        """Return the effect of each strut's offsets; most of the derivative is zero."""
         lengths = motion.once(self.name, machine, lambda: _per_offset(motion, machine))
         return Effect(strut_mm=MM_PER_UM * np.einsum("nkp,kp->nk", lengths, values.reshape(STRUTS, -1)))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each strut answers to the offsets of its own two joints."""
         lengths = motion.once(self.name, machine, lambda: _per_offset(motion, machine))
         own = np.zeros((len(motion), STRUTS, STRUTS, lengths.shape[2]))
         each = np.arange(STRUTS)
@@ -98,7 +96,7 @@ class JointRunout(LinearSource):
 
 
 def _per_offset(motion: Motion, machine: Machine) -> NDArray[np.float64]:
-    """Change of each strut's length per offset of its own joints, in the order of its parameters, shape (n, 6, 8) [1]."""
+    """Return each strut's length change per own offset, in parameter order, shape (n, 6, 8) [1]."""
     frames = motion.frames(machine)
     unit, rest = motion.struts(machine).unit, inverse(machine.hexapod, middle(machine)).unit[0]
     across = _across(rest)
@@ -108,7 +106,7 @@ def _per_offset(motion: Motion, machine: Machine) -> NDArray[np.float64]:
 
 
 def _across(rest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Directions v and h across struts of the directions `rest`, shape (6, 3); shape (6, 2, 3) [1]."""
+    """Return directions v and h across `rest`, shape (6, 3); shape (6, 2, 3) [1]."""
     level = np.cross(rest, [0.0, 0.0, 1.0])
     size = np.linalg.norm(level, axis=1, keepdims=True)
     # A strut that hangs plumb has no vertical plane of its own: take that of X.
@@ -117,6 +115,6 @@ def _across(rest: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _forms(swing: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Half of v², half of h² and v h of swings (v, h), shape (n, 6, 2); shape (n, 6, 3) [1]."""
+    """Return v²/2, h²/2 and v h of swings (v, h), shape (n, 6, 2); shape (n, 6, 3) [1]."""
     v, h = swing[..., 0], swing[..., 1]
     return np.stack([v**2 / 2.0, h**2 / 2.0, v * h], axis=-1)

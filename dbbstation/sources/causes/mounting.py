@@ -1,4 +1,4 @@
-"""Error source: how a holder came to sit when it was put up."""
+"""The seat of a holder in one mounting."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 
 class Mounting(LinearSource):
-    """The ball stands off its place by a different amount each time its holder is put up [CAL III-B].
+    """The ball is off its place differently in each mounting [CAL III-B].
 
-    The usual scatter and a badly seated holder are the same cause with a usual and an outlying size.
+    Usual scatter and a bad seat are one cause of different size.
     """
 
     name = "mounting"
@@ -32,13 +32,11 @@ class Mounting(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Three coordinates."""
         return tuple(Parameter(f"{axis}_mm", "mm", 0.002, f"ball actual minus CMM {axis.upper()}") for axis in "xyz")
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each coordinate its own parameter."""
         return Effect(fixed_ball_mm=np.eye(3))
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
-        """Repeatability of the holder in every axis."""
+        """Return the holder's repeatability per axis."""
         return None if motion.setup is None else np.zeros(3) + motion.setup.mounting_repeatability_mm

@@ -1,4 +1,4 @@
-"""Error source: places of the platform joints."""
+"""Places of the platform joints."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 class PlatformJoints(LinearSource):
-    """A platform joint is not where the design has it: dP_i, i = 1 to 6, three coordinates each.
+    """Platform joints are off their design places: dP_i, i = 1 to 6, three coordinates each.
 
-    [CAL II-C] leaves them out: with strut lengths and base joints fitted, circles with the spindle upright show
-    nothing of them, and tilted ones only how far the tilt turns the same shift away from a base joint's.
+    [CAL II-C] omits them: with lengths and base joints fitted, upright circles show nothing of them, tilted ones only the
+    rotation of the shift relative to a base joint's.
     """
 
     name = "platform-joints"
@@ -53,5 +53,4 @@ class PlatformJoints(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each coordinate its own parameter."""
         return Effect(platform_joint_mm=np.eye(3 * STRUTS).reshape(STRUTS, 3, 3 * STRUTS))

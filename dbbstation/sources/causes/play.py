@@ -1,4 +1,4 @@
-"""Error source: play of the strut drives that the load closes."""
+"""Play of strut drives that the load closes."""
 
 from __future__ import annotations
 
@@ -35,17 +35,14 @@ FRICTION_N = (0.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 
 
 class Play(SourceWithHistory):
-    """What has play in a strut lies where the load puts it; only where friction holds the load does it stay behind.
+    """The load closes a strut's play; only friction that holds the load makes it lag.
 
-    With w the play, T the tension that the drive holds and R the friction of what lies behind the play, a strut that is
-    pulled by more than R is longer by w/2, one that is pushed by more than R is shorter by w/2, wherever the drive
-    goes: the load keeps the play closed and a reversal does nothing. Where |T| < R friction holds the strut, the drive
-    takes it along at either end of the play, and it is `backlash`. Tensions are those of the nominal machine at the
-    commanded poses, with the weights of strut and motor where the machine file has them.
+    With play w, tension T and friction R behind the play: pulled by more than R, the strut is longer by w/2; pushed by
+    more, shorter by w/2, and reversals do nothing. For |T| < R it is `backlash`. Tensions are nominal at commanded poses,
+    with the machine file's weights.
 
-    A run is taken to begin in a movement that was already under way. A negative w is the mirror image, so that a fit
-    may pass through zero. The friction is looked for among stated values; between them the error does not change but
-    at single samples, so a fit leaves it where it starts.
+    A run begins in a movement under way. Negative w is the mirror image. The friction is searched among stated values,
+    since the error changes with it only at single samples.
     """
 
     name = "play"
@@ -71,7 +68,7 @@ class Play(SourceWithHistory):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Six plays, full width, and one friction.
+        """Return six plays, full width, and one friction.
 
         Raises:
             ModelError: the machine file has no masses.
@@ -82,7 +79,7 @@ class Play(SourceWithHistory):
         return (*plays, Parameter("friction_n", "N", 100.0, meaning, FRICTION_N))
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
-        """Which end of its play each strut leans on where friction holds it.
+        """Return the end of its play that each friction-held strut leans on.
 
         Raises:
             ModelError: the motion is no path.
@@ -93,7 +90,7 @@ class Play(SourceWithHistory):
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[Effect, PlayState]:
-        """Where each strut lies in its play.
+        """Return the strut's place in its play.
 
         Raises:
             ModelError: the machine file has no masses.
@@ -103,7 +100,7 @@ class Play(SourceWithHistory):
         return Effect(strut_mm=place), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Each strut answers to its own play; the friction changes nothing but the samples at which a strut lets go.
+        """Each strut answers to its own play, not to the friction.
 
         Raises:
             ModelError: the motion is no path, or the machine file has no masses.
@@ -116,7 +113,7 @@ class Play(SourceWithHistory):
     def _places(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
-        """Error of each strut [mm], its derivative by the width [mm/mm], shapes (n, 6), and the state behind the last row."""
+        """Return errors [mm] and derivatives by width [mm/mm], shapes (n, 6), and the last state."""
         masses = platform_masses(self.name, machine)
         frames, struts = motion.frames(machine), motion.struts(machine)
         load = platform_weight(frames, masses)
@@ -140,9 +137,9 @@ def settled(
 
     Args:
         travel: x, in time order, shape (n, m).
-        tension: positive where the load pulls, shape (n, m).
+        tension: positive if the load pulls, shape (n, m).
         width: not negative, shape (m,).
-        friction: tension up to which a column is held.
+        friction: holds a column up to this tension.
 
     Returns:
         Error y - x and its derivative by the width, shapes (n, m), and the state behind the last row.

@@ -1,4 +1,4 @@
-"""Error source: struts that stick when they turn round."""
+"""Struts that stick at reversal."""
 
 from __future__ import annotations
 
@@ -38,22 +38,18 @@ seven sessions, not at all; with 1.2 and 1.1 it was found in all of them."""
 
 
 class ReversalSpike(ErrorSource):
-    """A strut sticks when it turns round, and is drawn back: -s a (1 - exp(-d / c|a|)) exp(-sqrt(d / l)).
+    """A reversing strut sticks and is drawn back: -s a (1 - exp(-d / c|a|)) exp(-sqrt(d / l)).
 
-    With d the way since the turning point and s the sign of the new movement. The position loop makes up for friction
-    exponentially in time; behind a turning point the way grows with the square of time, d = A t^2 / 2, so that
-    exp(-t / T) is exp(-sqrt(d / l)) with l = A T^2 / 2. The way needs no clock and holds for programs; at another feed
-    l is another, as the square of the feed.
+    d is the way since the turning point, s the new sign. The position loop compensates friction with exp(-t / T); with d
+    = A t^2 / 2 that is exp(-sqrt(d / l)), l = A T^2 / 2, which needs no clock. At another feed l changes with the square
+    of the feed.
 
-    The rise is there because no strut stays behind by more than its drive has moved. One that sticks does not move at all, and
-    its error grows as fast as the travel: c = 1. With c = `RISE` it moves by a tenth of the travel at first, so that the sum of both always
-    grows and the error can be compensated. At a = 0 the error is proportional to a. Where the rise is as long as
-    the fading, c|a| near l, much of a spike is cut off.
+    The rise exists because no strut lags more than its drive has moved: c = 1 is full sticking. With c = `RISE` the sum
+    of travel and error grows and can be compensated. At a = 0 the error is proportional to a.
 
-    Before the first turning point of a run there is no spike. Where a path is straight from row to row, as a program's is, a
-    strut turns at the outermost row; along a smooth one between the rows (`laws.turning`). The rest of a spike where
-    the strut turns again fades over c|a| as well, so that the error goes on from its place; and a strut that has not come back by
-    a micrometre when it goes on as before has not turned.
+    There is no spike before a run's first turning point. A straight path turns at the outermost row, a smooth one between
+    rows (`laws.turning`). A remaining spike fades over c|a| at the next turn. Turns back by less than a micrometre do not
+    count.
     """
 
     name = "reversal-spike"
@@ -80,13 +76,12 @@ class ReversalSpike(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Six heights and one decay length."""
         heights = of_each_strut("strut_{}_um", "µm", 2.0, "height of the spike of strut {}; positive: it stays behind")
         meaning = "travel of a strut over which its spike falls to 37 %, all struts alike"
         return (*heights, Parameter("decay_mm", "mm", 0.02, meaning, DECAY_MM))
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Spikes of each strut.
+        """Return each strut's spikes.
 
         Raises:
             ModelError: the motion is no path.
@@ -94,7 +89,7 @@ class ReversalSpike(ErrorSource):
         return Effect(strut_mm=self._along(motion, machine, values)[0])
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:  # noqa: ARG002
-        """No strut has turned.
+        """Return the state of unturned struts.
 
         Raises:
             ModelError: the motion is no path.
@@ -105,12 +100,11 @@ class ReversalSpike(ErrorSource):
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: NDArray[np.float64]
     ) -> tuple[Effect, NDArray[np.float64]]:
-        """Spikes of each strut along a stretch of a program."""
         spike, _, _, behind = _straight(motion.struts(machine).length_mm, values, state)
         return Effect(strut_mm=spike), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By the heights, each strut its own, and by the decay length.
+        """By each strut's height, and by the decay length.
 
         Raises:
             ModelError: the motion is no path.
@@ -122,7 +116,7 @@ class ReversalSpike(ErrorSource):
     def _along(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Spikes of a whole run [mm], their derivatives by the height [1] and by the decay length [1], shapes (n, 6)."""
+        """Return a run's spikes [mm] and derivatives by height [1] and decay length [1], shapes (n, 6)."""
         self.require(motion)
         travel = motion.struts(machine).length_mm
         if motion.straight:
@@ -133,14 +127,14 @@ class ReversalSpike(ErrorSource):
 
 
 def _sizes(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Heights, shape (6,), and decay length [mm]."""
+    """Return heights, shape (6,), and decay length [mm]."""
     return MM_PER_UM * values[:STRUTS], float(values[STRUTS])
 
 
 def _straight(
     travel: NDArray[np.float64], values: NDArray[np.float64], state: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Spikes [mm], their derivatives by the height [1] and by the decay length [1], shapes (n, 6), and the state behind."""
+    """Return spikes [mm], derivatives by height [1] and decay length [1], shapes (n, 6), and the last state."""
     spike, by_height, by_length = (np.empty_like(travel) for _ in range(3))
     behind = state.copy()
     _go_on(np.ascontiguousarray(travel), *_sizes(values), TURNED_MM, behind, spike, by_height, by_length)
@@ -165,10 +159,9 @@ _NOTHING.flags.writeable = False
 
 @inlined
 def _spike(way: float, sign: float, height: float, length: float) -> tuple[float, float, float]:
-    """Spike [mm] a way behind the turning point, and its derivatives by height [1] and decay length [1].
+    """Return the spike [mm] a way behind the turning point, and derivatives by height and decay length [1].
 
-    What rises over no way has risen; a strut that has not turned has no sign, and no spike. A decay length of zero, which a
-    fit may try, is its limit, a spike without width.
+    A strut that has not turned has sign 0. Decay length zero gives a spike without width.
     """
     if length <= 0.0:
         return 0.0, 0.0, 0.0
@@ -190,7 +183,7 @@ def _smooth(
     by_height: NDArray[np.float64],
     by_length: NDArray[np.float64],
 ) -> None:
-    """Spikes at signed ways since the turning points, shape (n, 6) [mm]."""
+    """Return spikes at signed ways since turning, shape (n, 6) [mm]."""
     count, columns = since.shape
     for k in range(count):
         for i in range(columns):
@@ -202,7 +195,7 @@ def _smooth(
 def _behind(
     way: float, sign: float, height: float, length: float, left: NDArray[np.float64]
 ) -> tuple[float, float, float]:
-    """The spike and the rest of the one before, shape (3,), which fades over c|a|."""
+    """Return the spike and the previous one's rest, shape (3,), fading over c|a|."""
     spike, by_height, by_length = _spike(way, sign, height, length)
     if left[0] == 0.0 or height == 0.0:
         return spike, by_height, by_length
@@ -223,7 +216,7 @@ def _go_on(  # noqa: C901 - what is remembered decides in one pass
     by_height: NDArray[np.float64],
     by_length: NDArray[np.float64],
 ) -> None:
-    """Spikes along a stretch that is straight from row to row; `memory`, shape (6, 13), is that behind it when done."""
+    """Continue spikes along a straight stretch; `memory`, shape (6, 13), is updated."""
     count, columns = travel.shape
     for i in range(columns):
         m = memory[i]

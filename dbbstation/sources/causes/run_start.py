@@ -1,4 +1,4 @@
-"""Error source: where along its circle a run's turn begins, found from the edges of its feed-in and feed-out."""
+"""Where a run's turn begins, found from feed-in and feed-out."""
 
 from __future__ import annotations
 
@@ -27,11 +27,10 @@ SAME_DEG = 1e-9
 
 
 class RunStart(ErrorSource):
-    """Every angle of one run is too small by d: the machine had gone on by d along its circle.
+    """All angles of one run are too small by d: the machine was ahead by d along its circle.
 
-    All six struts stood where the command had them at phi + d. About a ball in the circle's centre an exact machine
-    shows nothing of it; on a real one it turns the figure of its errors. Every run has its own d, with the size that
-    its sampling allows, so that it is a random effect of the fit and never a name: `time-skew` is what all runs share.
+    About a ball in the centre an exact machine shows nothing; an actual one's figure is turned. Each run has its own d,
+    sized by its sampling, so it is a random effect; `time-skew` is the common part.
     """
 
     name = "run-start"
@@ -50,7 +49,6 @@ class RunStart(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """One angle per run."""
         return (Parameter("late_deg", "deg", USUAL_DEG, "angle along the travel by which the turn began earlier"),)
 
     def shared_by(self, motion: Motion) -> str:
@@ -58,23 +56,21 @@ class RunStart(ErrorSource):
         return "" if motion.setup is None else motion.setup.run
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
-        """What the sampling of the run's edges leaves open [deg]; zero where angles were recorded."""
+        """Return what edge sampling leaves open [deg]; zero with recorded angles."""
         return np.array([0.0 if motion.setup is None else motion.setup.start_uncertainty_deg])
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """How far the struts had gone on."""
         along, spline, there = self._along(motion, machine)
         gone: NDArray[np.float64] = spline(along + float(values[0])) - there
         return Effect(strut_mm=gone)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Strut lengths per degree of travel where the machine stood."""
         along, spline, _ = self._along(motion, machine)
         slope: NDArray[np.float64] = spline(along + float(values[0]), 1)
         return Effect(strut_mm=slope[:, :, None])
 
     def _along(self, motion: Motion, machine: Machine) -> _Travelled:
-        """Angle travelled at each row, shape (n,) [deg], commanded strut lengths over it [mm] and those at the rows, shape (n, 6)."""
+        """Return travelled angle, shape (n,) [deg], commanded lengths over it [mm], and those at the rows, shape (n, 6)."""
         self.require(motion)
         return motion.once("travelled", machine, lambda: _along(motion, motion.struts(machine).length_mm))
 
@@ -93,7 +89,7 @@ def _along(motion: Motion, length: NDArray[np.float64]) -> _Travelled:
 
 
 def _travelled_deg(motion: Motion) -> NDArray[np.float64]:
-    """Angle travelled about the fixed ball at each row, shape (n,) [deg]; zero where there is none, and where nothing moves."""
+    """Return the angle travelled about the fixed ball, shape (n,) [deg]; zero without ball or motion."""
     if motion.setup is None:
         return np.zeros(len(motion))
     away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]

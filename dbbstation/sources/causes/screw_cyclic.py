@@ -1,4 +1,4 @@
-"""Error source: what repeats with every turn of a strut's screw."""
+"""Errors that repeat with each turn of a strut's screw."""
 
 from __future__ import annotations
 
@@ -19,11 +19,10 @@ MM_PER_UM = 1e-3
 
 
 class ScrewCyclic(LinearSource):
-    """A strut's error goes once up and down with every turn of its screw: dL = a sin(2 pi L / p) + b cos(2 pi L / p).
+    """A strut's error waves once per screw turn: dL = a sin(2 pi L / p) + b cos(2 pi L / p).
 
-    p is the lead. A wave that is no pure sine has a second harmonic, and a screw that is bent swings the more the farther it is driven out:
-    laws of their own, `_TwoHarmonics` and `_AlongTheScrew`. The phase is counted from a length of zero between the joints, at which no screw ever stands: only
-    the amplitude, the root of a² + b², says something of the screw.
+    p is the lead. A second harmonic, and an amplitude that grows as a bent screw extends, are own laws: `_TwoHarmonics`,
+    `_AlongTheScrew`. The phase counts from length zero, so only the amplitude is meaningful.
     """
 
     name = "screw-cyclic"
@@ -48,7 +47,7 @@ class ScrewCyclic(LinearSource):
         return (_TwoHarmonics(), _AlongTheScrew())
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Sine and cosine of each strut, the first harmonic of all struts before the second.
+        """Return sine and cosine of each strut, first harmonics first.
 
         Raises:
             ModelError: the machine file has no screw lead.
@@ -68,7 +67,7 @@ class ScrewCyclic(LinearSource):
         )
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
-        """The lead over the highest harmonic.
+        """Return the lead over the highest harmonic.
 
         Raises:
             ModelError: the machine file has no screw lead.
@@ -84,7 +83,7 @@ class ScrewCyclic(LinearSource):
         return Effect(strut_mm=self.waves_mm(motion, machine))
 
     def waves_mm(self, motion: Motion, machine: Machine) -> NDArray[np.float64]:
-        """Error of each strut by each amplitude, shape (n, 6, p) [mm/µm].
+        """Return each strut's error by amplitude, shape (n, 6, p) [mm/µm].
 
         Raises:
             ModelError: the machine file has no screw lead.
@@ -102,7 +101,7 @@ USUAL_UM = 2.0
 
 
 class _TwoHarmonics(ScrewCyclic):
-    """A wave of each turn of the screw that is no pure sine."""
+    """A wave with second harmonic."""
 
     harmonics = (1, 2)
 
@@ -112,7 +111,6 @@ class _TwoHarmonics(ScrewCyclic):
 
     @property
     def law(self) -> str:
-        """Of the two of a screw's cyclic error."""
         return "two harmonics"
 
 
@@ -122,14 +120,13 @@ travel [percent/m]."""
 
 
 class _AlongTheScrew(ErrorSource):
-    """A wave of each turn, with its second harmonic, whose amplitude changes in proportion along the screw, alike on all struts."""
+    """Two harmonics whose amplitude changes along the screw, alike on all struts."""
 
     name, belongs_to, texts = ScrewCyclic.name, ScrewCyclic.belongs_to, ScrewCyclic.texts
     varies_with, form_uncertainty = ScrewCyclic.varies_with, ScrewCyclic.form_uncertainty
 
     @property
     def law(self) -> str:
-        """Of the three of a screw's cyclic error."""
         return "along the screw"
 
     @property
@@ -138,7 +135,7 @@ class _AlongTheScrew(ErrorSource):
         return _TwoHarmonics().law
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Two harmonics of each strut, and one change along the screw.
+        """Return two harmonics of each strut, and one change along the screw.
 
         Raises:
             ModelError: the machine file has no screw lead.
@@ -148,7 +145,7 @@ class _AlongTheScrew(ErrorSource):
         return (*_TwoHarmonics().parameters(machine), growth)
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:
-        """That of the second harmonic.
+        """Return the second harmonic's period.
 
         Raises:
             ModelError: the machine file has no screw lead.
@@ -156,7 +153,7 @@ class _AlongTheScrew(ErrorSource):
         return _TwoHarmonics().shortest_period_mm(machine, values)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Error of each strut.
+        """Return each strut's error.
 
         Raises:
             ModelError: the machine file has no screw lead.
@@ -165,7 +162,7 @@ class _AlongTheScrew(ErrorSource):
         return Effect(strut_mm=(waves @ values[:-1]) * (1.0 + values[-1] * _out(motion, machine)))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By the amplitudes, each strut its own, and by the change.
+        """By each strut's amplitudes, and by the change.
 
         Raises:
             ModelError: the machine file has no screw lead.
@@ -178,5 +175,5 @@ class _AlongTheScrew(ErrorSource):
 
 
 def _out(motion: Motion, machine: Machine) -> NDArray[np.float64]:
-    """How far each strut is driven out beyond the middle of its travel, shape (n, 6) [100 m]: one percent of what is there, per metre."""
+    """Return each strut's extension beyond mid-travel, shape (n, 6) [100 m]: one percent per metre."""
     return 1e-5 * (motion.struts(machine).length_mm - sum(machine.travel.strut_mm) / 2.0)

@@ -1,4 +1,4 @@
-"""Error source: lead of the struts' screws."""
+"""Lead of the struts' screws."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ MM_PER_UM_M = 1e-6
 
 
 class ScrewLead(LinearSource):
-    """A strut travels a little more than its controller counts, in proportion to the travel: dL_i = e_i (L_i - L_0).
+    """A strut travels more than counted, in proportion: dL_i = e_i (L_i - L_0).
 
-    L_0 is the middle of the strut's travel in the machine file, where the error is zero by definition: what a strut
-    is off there belongs to its reference length. 10 µm/m are 1 µm over 100 mm.
+    L_0 is mid-travel; the error there is the reference length's. 10 µm/m are 1 µm over 100 mm.
     """
 
     name = "screw-lead"
@@ -43,16 +42,15 @@ class ScrewLead(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Six lead errors; the usual one is that of a screw of tolerance grade 3, 12 µm over 300 mm [ISO 3408-3]."""
+        """Return six lead errors; usual size: tolerance grade 3, 12 µm over 300 mm [ISO 3408-3]."""
         zero = f"strut {{}} travels more than counted; zero at {_middle_mm(machine):g} mm"
         return of_each_strut("strut_{}_um_m", "µm/m", 40.0, zero)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each strut answers to its own lead."""
         travel = motion.struts(machine).length_mm - _middle_mm(machine)
         return Effect(strut_mm=MM_PER_UM_M * travel[:, :, None] * np.eye(STRUTS))
 
 
 def _middle_mm(machine: Machine) -> float:
-    """Length at which the error is zero [mm]."""
+    """Return the length without error [mm]."""
     return sum(machine.travel.strut_mm) / 2.0

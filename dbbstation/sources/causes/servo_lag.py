@@ -1,4 +1,4 @@
-"""Error source: struts that follow their command late, each by a time of its own."""
+"""Struts that follow their command late."""
 
 from __future__ import annotations
 
@@ -22,22 +22,15 @@ S_PER_MS = 1e-3
 
 
 class ServoLag(ErrorSource):
-    """A strut follows its command as a position loop of the gain 1/tau does: tau_i dy_i/dt = x_i - y_i.
+    """A strut follows its command as a position loop of gain 1/tau: tau_i dy_i/dt = x_i - y_i.
 
-    With x the commanded and y the driven length, the error is y - x = -tau dx/dt + tau² d²x/dt² - ..., a lag by tau
-    and, from its square, a path that is cut short. The run is taken to begin in a movement that was already under way.
+    The error is y - x = -tau dx/dt + tau² d²x/dt² - ..., a lag and a shortened path. A run begins in a movement under
+    way. Negative tau leads, as feed-forward does. Along a straight program the loop is solved from rows (`laws.loop`),
+    and a leading strut by -tau dx/dt.
 
-    A negative tau is a strut ahead of its command, as feed-forward makes it: the same equation, which then leads back
-    from what is still to come. The error and its derivative go through zero without a kink, so that a fit may too.
-
-    Along a program, which is straight from row to row, the loop is solved from its rows alone (`laws.loop`): what is still to
-    come is not asked, and a strut ahead of its command is so by -tau dx/dt.
-
-    A lag that all struts have in common is a delay of the whole machine, to first order the same as `time-skew`, and
-    a circle about a ball in its centre does not show it but by its shrinkage, (v tau)² / 2R: 0.2 µm at 1000 mm/min,
-    150 mm and 15 ms. Where the turn is found in the recording by feed-in and feed-out, these come late as well, and
-    the delay leaves no trace at all. Differences between struts are what circles see: a fit holds the mean of the six
-    times at zero and says so, and each of them is found less that mean.
+    A common lag equals `time-skew` to first order. About a ball in the centre it shows only as shrinkage, (v tau)² / 2R:
+    0.2 µm at 1000 mm/min, 150 mm and 15 ms; with detected feed-in it leaves no trace. A fit therefore holds the mean of
+    the six times at zero and reports it.
     """
 
     name = "servo-lag"
@@ -64,11 +57,10 @@ class ServoLag(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Six times."""
         return of_each_strut("strut_{}_ms", "ms", 1.0, "time by which strut {} is late; negative: it is ahead")
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Lag of each strut.
+        """Return each strut's lag.
 
         Raises:
             ModelError: the motion is no path or has no time.
@@ -76,7 +68,7 @@ class ServoLag(ErrorSource):
         return Effect(strut_mm=self._lag(motion, machine, values)[0])
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> LoopState:  # noqa: ARG002
-        """The struts stand still.
+        """Return standing struts.
 
         Raises:
             ModelError: the motion is no path or has no time.
@@ -87,7 +79,6 @@ class ServoLag(ErrorSource):
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: LoopState
     ) -> tuple[Effect, LoopState]:
-        """Lag of each strut along a stretch of a program."""
         length, time_s = motion.struts(machine).length_mm, np.asarray(motion.time_s)
         lag, _, behind = driven(length, time_s, S_PER_MS * values, state)
         return Effect(strut_mm=lag), behind
@@ -95,7 +86,7 @@ class ServoLag(ErrorSource):
     def undone(
         self, motion: Motion, reached: Motion, machine: Machine, values: NDArray[np.float64], state: LoopState
     ) -> NDArray[np.float64]:
-        """From the speed of what is reached."""
+        """By the reached speed."""
         commanded, wanted = motion.struts(machine).length_mm, reached.struts(machine).length_mm
         return undone(commanded, wanted, np.asarray(motion.time_s), S_PER_MS * values, state)
 
@@ -111,7 +102,7 @@ class ServoLag(ErrorSource):
     def _lag(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Error of each strut [mm] and its derivative by its time constant [mm/s], shapes (n, 6)."""
+        """Return errors [mm] and derivatives by time constant [mm/s], shapes (n, 6)."""
         self.require(motion)
         if motion.straight:
             length = motion.struts(machine).length_mm
@@ -129,12 +120,12 @@ class ServoLag(ErrorSource):
 def followed(
     speed: NDArray[np.float64], step_s: NDArray[np.float64], constant_s: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Errors e of first-order loops, tau de/dt = -e - tau dx/dt, and their derivatives by tau, shapes (m, k).
+    """Return errors e of loops, tau de/dt = -e - tau dx/dt, and derivatives by tau, shapes (m, k).
 
     Args:
         speed: dx/dt, linear in between, shape (m, k) [mm/s].
-        step_s: time from row to row, shape (m - 1,) [s].
-        constant_s: tau, not negative, shape (k,) [s].
+        step_s: from row to row, shape (m - 1,).
+        constant_s: tau, not negative, shape (k,).
     """
     lag, by_constant = np.zeros_like(speed), np.zeros_like(speed)
     _follow(np.ascontiguousarray(speed), np.ascontiguousarray(step_s), constant_s, lag, by_constant)
@@ -153,9 +144,9 @@ def _follow(
     lag: NDArray[np.float64],
     by_constant: NDArray[np.float64],
 ) -> None:
-    """Solve each column from row to row, exactly for speeds that are linear between rows.
+    """Solve each column exactly for speeds linear between rows.
 
-    Then e = -tau dx/dt + tau² d²x/dt² is a solution, and what the error differs from it by fades with exp(-t / tau).
+    e = -tau dx/dt + tau² d²x/dt² is a solution; the difference fades with exp(-t / tau).
     """
     rows, columns = speed.shape
     for i in range(columns):

@@ -1,4 +1,4 @@
-"""Error source: the spindle grows as it warms up."""
+"""Growth of the warming spindle."""
 
 from __future__ import annotations
 
@@ -26,12 +26,10 @@ _OUT_OF_THE_SPINDLE = np.array([0.0, 0.0, -1.0])
 
 
 class SpindleGrowth(ErrorSource):
-    """The tool tip moves out of the spindle along its axis by the growth g(t) of `warm_up`, and by what it had grown before.
+    """The tool tip moves along the spindle by g(t) of `warm_up`, plus earlier growth.
 
-    What struts and frame had grown before the first sample is part of their lengths and places; a spindle has no such
-    parameter. It had grown by a share b of what is still to come, or has yet to shrink by all of it (b = -1) where it was
-    warm and cools. A bar level with its ball does not see it while the spindle is upright; tilted circles are shifted by
-    (g + b a) sin(tilt).
+    It had grown by a share b of what is still to come; b = -1 for a warm spindle that cools. Upright level circles do not
+    see it; tilted ones are shifted by (g + b a) sin(tilt).
     """
 
     name = "spindle-growth"
@@ -54,14 +52,13 @@ class SpindleGrowth(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Growth in the end, time constant, what pauses take back, and how much of the growth had been before."""
         growth = Parameter("growth_um", "µm", 10.0, "way of the tool tip out of the spindle, from the first sample on")
         before = "growth before the first sample, of that after it; -100 where a warm spindle cools"
         begun = Parameter("begun_percent", "percent", 40.0, before, BEGUN_PERCENT, newer=True)
         return (*warm_up_parameters(growth, "pause_loss_um", 1800.0), begun)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Shift of the tool tip.
+        """Return the tool tip's shift.
 
         Raises:
             ModelError: the motion has no time.
@@ -72,7 +69,7 @@ class SpindleGrowth(ErrorSource):
         return Effect(tool_tip_mm=MM_PER_UM * out_um[:, None] * _OUT_OF_THE_SPINDLE)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the three parameters of the law, and by what had been before.
+        """By the law's three parameters, and by earlier growth.
 
         Raises:
             ModelError: the motion has no time.
@@ -90,7 +87,7 @@ class SpindleGrowth(ErrorSource):
 
 
 class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):
-    """The tool tip moves out of the spindle by c (T - T_0); no column of a recording is a thermometer of its own."""
+    """The tip moves by c (T - T_0); there is no spindle thermometer."""
 
     thermometers = (MACHINE,)
     growth = Parameter(
@@ -98,5 +95,4 @@ class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):
     )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Shift of the tool tip per unit."""
         return Effect(tool_tip_mm=(MM_PER_UM * self.warmer_k(motion) * _OUT_OF_THE_SPINDLE)[..., None])

@@ -1,4 +1,4 @@
-"""Error source: struts that sag under their own weight are shorter from joint to joint."""
+"""Struts shortened by sagging under their own weight."""
 
 from __future__ import annotations
 
@@ -53,13 +53,11 @@ class StrutBending(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """One shortening, all six struts alike."""
         return (
             Parameter("shortening_um", "µm", USUAL_UM, "shortening of a level strut of 1000 mm under its own weight"),
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Shortening of each strut."""
         struts = motion.struts(machine)
         across_squared = 1.0 - (struts.unit @ DOWN) ** 2
         return Effect(strut_mm=-MM_PER_UM * (across_squared * (struts.length_mm / 1000.0) ** 5)[:, :, None])

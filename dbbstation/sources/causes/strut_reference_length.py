@@ -1,4 +1,4 @@
-"""Error source: reference lengths of the struts."""
+"""Reference lengths of the struts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class StrutReferenceLength(LinearSource):
-    """A strut is longer by a constant than its encoder says: dL_i, i = 1 to 6 [CAL II-C 1]."""
+    """A strut is longer than its encoder says by a constant: dL_i, i = 1 to 6 [CAL II-C 1]."""
 
     name = "strut-reference-length"
     belongs_to = Owner.MACHINE
@@ -32,9 +32,7 @@ class StrutReferenceLength(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Six length errors."""
         return of_each_strut("strut_{}_mm", "mm", 0.2, "strut {} actual minus driven length")
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each strut its own parameter."""
         return Effect(strut_mm=np.eye(STRUTS))

@@ -1,4 +1,4 @@
-"""Error source: struts and motors that have a weight of their own."""
+"""Weights of struts and motors."""
 
 from __future__ import annotations
 
@@ -22,13 +22,11 @@ USUAL = StrutMasses(strut_kg=25.0, motor_kg=20.0, motor_length_mm=0.0)
 
 
 class StrutWeight(LinearSource):
-    """Struts hang between base and platform, pull at it across their axes and stretch under themselves [GRAV eq 2, 3].
+    """Struts hang between base and platform, pull across their axes and stretch [GRAV eq 2, 3].
 
-    A strut's weight is carried by both its joints; what the platform carries of it changes the forces in all six
-    struts. The weights of strut, motor and screw are parameters, all six struts alike; the lengths that say where
-    they act stand in the machine file, and a part whose length is not known there is not asked for. The stretch is
-    proportional to the struts' compliance: the one that the source gravity of the same model has, else the machine
-    file's. The motors hold what moves with the strut as well.
+    Both joints carry a strut's weight; the platform's part changes all forces. Masses of strut, motor and screw are
+    common to all struts; their lengths are the machine file's, and parts without length are left out. Stretch uses the
+    compliance of the source gravity, else of the machine file. Motors hold what moves with the strut.
     """
 
     name = "strut-weight"
@@ -53,7 +51,6 @@ class StrutWeight(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Mass of the strut; of motor and screw where the machine file has their lengths."""
         stated = machine.strut_masses or USUAL
         counted = for_such_struts(machine)
         meanings = {

@@ -1,4 +1,4 @@
-"""Error source: the base plate grows as it warms up."""
+"""Growth of the warming base plate."""
 
 from __future__ import annotations
 
@@ -20,11 +20,10 @@ MM_PER_UM_M = 1e-6
 
 
 class ThermalFrame(ErrorSource):
-    """The base joints move away from the centre of the base plate: dQ_i = Q_i g(t).
+    """Base joints move from the plate's centre: dQ_i = Q_i g(t), g of `warm_up`.
 
-    g is the growth of `warm_up`. The plate is taken as evenly warm and held at its centre, the origin of the machine frame; one that is held elsewhere
-    shifts as a whole as well, which is a matter of where the jig stands. Counted from the session's first sample,
-    where the growth is zero by definition, as thermal-struts is.
+    The plate is evenly warm and held at the machine frame's origin; another fixed point only shifts it. Growth counts
+    from the session's first sample.
     """
 
     name = "thermal-frame"
@@ -47,12 +46,11 @@ class ThermalFrame(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Growth in the end, time constant, what pauses take back."""
         meaning = "growth of the base from the first sample to the end of warm-up"
         return warm_up_parameters(Parameter("growth_um_m", "µm/m", 15.0, meaning), "pause_loss_um_m", 7200.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Shift of each base joint.
+        """Return each base joint's shift.
 
         Raises:
             ModelError: the motion has no time.
@@ -61,7 +59,7 @@ class ThermalFrame(ErrorSource):
         return Effect(base_joint_mm=grown(motion, values)[:, None, None] * _per_growth_mm(machine))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By the three parameters of the law.
+        """By the law's three parameters.
 
         Raises:
             ModelError: the motion has no time.
@@ -71,7 +69,7 @@ class ThermalFrame(ErrorSource):
         return Effect(base_joint_mm=_per_growth_mm(machine)[:, :, None] * law[:, None, None, :])
 
     def by_temperature(self) -> ErrorSource:
-        """The base plate by the thermometer on it."""
+        """The base plate by its thermometer."""
         return _ByTemperature()
 
 
@@ -84,10 +82,9 @@ class _ByTemperature(FollowsTemperature, cause=ThermalFrame):
     )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Shift of each base joint per unit."""
         return Effect(base_joint_mm=(self.warmer_k(motion)[:, :, None] * _per_growth_mm(machine))[..., None])
 
 
 def _per_growth_mm(machine: Machine) -> NDArray[np.float64]:
-    """Shift of each base joint per µm/m, shape (6, 3) [mm]."""
+    """Return each base joint's shift per µm/m, shape (6, 3) [mm]."""
     return MM_PER_UM_M * machine.hexapod.base_joints_mm

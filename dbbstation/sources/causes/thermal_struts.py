@@ -1,4 +1,4 @@
-"""Error source: struts that grow as they warm up."""
+"""Growth of warming struts."""
 
 from __future__ import annotations
 
@@ -21,12 +21,10 @@ MM_PER_UM_M = 1e-6
 
 
 class ThermalStruts(ErrorSource):
-    """All struts grow alike, each in proportion to its length: dL_i = L_i g(t), g the growth of `warm_up`.
+    """All struts grow in proportion to length: dL_i = L_i g(t), g of `warm_up`.
 
-    Counted from the session's first sample, where the growth is zero by definition: it is what the struts still had
-    to grow then, not their growth since the machine was switched on, and what they had grown before is part of their
-    reference lengths. A cold and a warm start are therefore two different values, and a session predicted with this
-    source starts as those did that it was fitted to.
+    Growth counts from the session's first sample; earlier growth is in the reference lengths. Cold and warm starts
+    therefore have different values, and a prediction starts as the fitted sessions did.
     """
 
     name = "thermal-struts"
@@ -49,12 +47,11 @@ class ThermalStruts(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Growth in the end, time constant, what pauses take back."""
         meaning = "growth of all struts from the first sample to the end of warm-up"
         return warm_up_parameters(Parameter("growth_um_m", "µm/m", 30.0, meaning), "pause_loss_um_m", 3600.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Growth of each strut.
+        """Return each strut's growth.
 
         Raises:
             ModelError: the motion has no time.
@@ -63,7 +60,7 @@ class ThermalStruts(ErrorSource):
         return Effect(strut_mm=grown(motion, values)[:, None] * per_growth)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By the three parameters of the law.
+        """By the law's three parameters.
 
         Raises:
             ModelError: the motion has no time.
@@ -72,7 +69,7 @@ class ThermalStruts(ErrorSource):
         return Effect(strut_mm=per_growth[:, :, None] * grown_by(motion, values)[:, None, :])
 
     def by_temperature(self) -> ErrorSource:
-        """Struts that follow the thermometers on them."""
+        """Struts by their thermometers."""
         return _ByTemperature()
 
     def _per_growth_mm(self, motion: Motion, machine: Machine) -> NDArray[np.float64]:
@@ -81,16 +78,15 @@ class ThermalStruts(ErrorSource):
 
 
 class _ByTemperature(FollowsTemperature, cause=ThermalStruts):
-    """dL_i = L_i c (T_i - T_i0): each strut by its own thermometer, or all by the machine's."""
+    """dL_i = L_i c (T_i - T_i0), by each strut's thermometer or the machine's."""
 
     thermometers = (tuple(f"strut{k + 1}" for k in range(STRUTS)), MACHINE)
     growth = Parameter("growth_um_m_k", "µm/(m K)", STEEL_UM_M_K, "growth of a strut for each kelvin that it is warmer")
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Growth of each strut per unit."""
         return Effect(strut_mm=(self.warmer_k(motion) * _per_growth_mm(motion, machine))[:, :, None])
 
 
 def _per_growth_mm(motion: Motion, machine: Machine) -> NDArray[np.float64]:
-    """Growth of every strut per µm/m, shape (n, 6) [mm]."""
+    """Return each strut's growth per µm/m, shape (n, 6) [mm]."""
     return MM_PER_UM_M * motion.struts(machine).length_mm

@@ -1,4 +1,4 @@
-"""Error source: readings and commanded poses that do not belong to the same time."""
+"""Readings and commanded poses of different times."""
 
 from __future__ import annotations
 
@@ -22,17 +22,14 @@ USUAL_MS = 10.0
 
 
 class TimeSkew(ErrorSource):
-    """A reading was taken later by a time d than the pose that it is compared with: the machine had gone on by then.
+    """A reading is late by d against its pose: all struts had gone on, by x(t + d) - x(t), from cubic splines.
 
-    All six struts stood where the command had them at t + d: their error is x(t + d) - x(t), found between the rows by
-    cubic splines. The fixed ball stands still, so nothing else changes; what other sources do at t + d instead of t
-    differs by their own slope times d and is left out (parts in a thousand at 10 ms and 1000 mm/min).
+    The fixed ball stands still; changes of other sources over d are omitted (parts in a thousand at 10 ms and 1000
+    mm/min). A wrong start of the turn by an angle a is a time a / omega. It turns the figure against the travel, opposite
+    in both directions.
 
-    A start of the turn that was found too early or too late along the travel is the same: an angle a is a time
-    a / omega. It turns the circle's figure against the travel, one way clockwise and the other way counter-clockwise.
-    About a ball in the circle's centre an exact machine shows nothing of it; what it turns is the error of the real
-    one, so that it is small: 10 ms turn 0.1 mm of centre offset into 0.1 µm. Common `servo-lag` is the same with
-    the sign turned, but for its shrinkage, and stands in the model as this.
+    About a ball in the centre an exact machine shows nothing: 10 ms turn 0.1 mm of centre offset into 0.1 µm. Common
+    `servo-lag` is the same with inverted sign but for shrinkage, and is modelled as this.
     """
 
     name = "time-skew"
@@ -55,13 +52,12 @@ class TimeSkew(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """One time."""
         return (
             Parameter("late_ms", "ms", USUAL_MS, "time by which readings were taken after the poses they stand at"),
         )
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """How far the struts had gone on.
+        """Return the struts' advance.
 
         Raises:
             ModelError: the motion is no path or has no time.
@@ -70,7 +66,7 @@ class TimeSkew(ErrorSource):
         return Effect(strut_mm=gone)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Speed of the struts when the reading was taken.
+        """Speed of struts at the reading.
 
         Raises:
             ModelError: the motion is no path or has no time.
@@ -79,17 +75,16 @@ class TimeSkew(ErrorSource):
         return Effect(strut_mm=S_PER_MS * speed[:, :, None])
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:  # noqa: ARG002
-        """Its usual size [ms], so that the fit takes it for a random effect.
+        """Return its usual size [ms] as a random effect.
 
-        Nobody states it, but a fit holds a direction that exact circles do not see, and a skew shows on the machine's
-        own errors only.
+        Exact circles do not see it, and a fit would otherwise hold it.
         """
         return np.array([USUAL_MS])
 
     def _gone_on(
         self, motion: Motion, machine: Machine, late_s: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Way of each strut in that time [mm] and its speed at the end of it [mm/s], shapes (n, 6)."""
+        """Return the way in that time [mm] and the speed at its end [mm/s], shapes (n, 6)."""
         self.require(motion)
         time_s, length, place = driven_in_time(motion, machine)
         if len(time_s) == 1:

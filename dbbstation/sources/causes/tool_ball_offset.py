@@ -1,4 +1,4 @@
-"""Error source: the moving ball is not at the tool tip."""
+"""The moving ball off the tool tip."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ if TYPE_CHECKING:
 
 
 class ToolBallOffset(LinearSource):
-    """The centre of the ball in the spindle is off the programmed tool tip by the same vector over a session.
+    """The spindle's ball is off the programmed tip by one vector per session.
 
-    In every reading this is exactly all six platform joints shifted the other way, dP_i = -o: no recording of a bar
-    tells the two apart. They differ in what comes after: the ball is taken out again, the joints stay.
+    In readings it equals all platform joints shifted by dP_i = -o. Only the ball is removed afterwards.
     """
 
     name = "tool-ball-offset"
@@ -38,12 +37,10 @@ class ToolBallOffset(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Three coordinates."""
         return tuple(
             Parameter(f"{axis}_mm", "mm", 0.02, f"ball actual minus programmed tool tip, platform {axis}")
             for axis in "xyz"
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each coordinate its own parameter."""
         return Effect(tool_tip_mm=np.eye(3))

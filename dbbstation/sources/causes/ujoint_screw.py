@@ -1,4 +1,4 @@
-"""Error source: universal joints that turn the screws."""
+"""Universal joints that turn the screws."""
 
 from __future__ import annotations
 
@@ -24,13 +24,10 @@ ALONG = 0.05
 
 
 class UjointScrew(LinearSource):
-    """The lower part of a strut turns against the upper one as its joints swing, and the screw makes travel of it.
+    """As joints swing, strut parts turn against each other, and the screw makes travel of it.
 
-    Each part of a strut hangs in a universal joint: it can swing, but not turn about the strut. The second axis of a
-    joint lies across the strut and across the joint's first axis a, along a x u. The angle psi about u from the base
-    joint's second axis to the platform joint's is the angle by which nut and screw have turned against each other
-    without the motor: dL = p psi / (2 pi), p the lead, psi counted from the machine's middle pose without tilt, where
-    what is left belongs to the reference length. Ball joints let the strut turn freely and say nothing of psi.
+    A universal joint's second axis lies along a x u, with first axis a and strut u. psi is the angle about u between both
+    second axes: dL = p psi / (2 pi), lead p, psi from the untilted middle pose. Ball joints turn freely.
     """
 
     name = "ujoint-screw"
@@ -53,7 +50,7 @@ class UjointScrew(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """One lead; its usual size is that of the screws.
+        """Return one lead, of the screws' size.
 
         Raises:
             ModelError: the machine file has no joint axes, or no screw lead.
@@ -63,7 +60,7 @@ class UjointScrew(LinearSource):
         return (Parameter("lead_mm", "mm", screw_lead_mm(self.name, machine), meaning),)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Turns of the screws, which are the travel per lead.
+        """Turns of the screws.
 
         Raises:
             ModelError: the machine file has no joint axes, or one that lies along its strut.
@@ -78,7 +75,7 @@ class UjointScrew(LinearSource):
 
 
 def _second_axes(axes: JointAxes, struts: Struts, frames: Frames) -> NDArray[np.complex128]:
-    """Angle psi of each strut as a complex number of length one, shape (n, 6)."""
+    """Return psi of each strut as a unit complex number, shape (n, 6)."""
     unit = struts.unit
     platform = np.einsum("nij,kj->nki", frames.rotation, axes.platform / _length(axes.platform))
     base = np.broadcast_to(axes.base / _length(axes.base), unit.shape)
@@ -102,7 +99,7 @@ def _length(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _axes(machine: Machine) -> JointAxes:
-    """Axes of the machine's universal joints.
+    """Return the axes of the machine's universal joints.
 
     Raises:
         ModelError: the machine file has none; names the key.

@@ -1,1 +1,1 @@
-"""Laws that several causes share: warming up, thermometers, play, speed of struts, screws, weights."""
+"""Laws shared by causes: warm-up, thermometers, play, speed, screws, weights."""

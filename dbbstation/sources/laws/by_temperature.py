@@ -36,7 +36,7 @@ MACHINE = ("machine",)
 
 
 class FollowsTemperature(LinearSource):
-    """A cause that grows with time, in the form that follows thermometers. It has the name and the texts of the cause."""
+    """A cause by thermometers instead of time, with the cause's name and texts."""
 
     needs = frozenset({Need.POSE, Need.TIME, Need.TEMPERATURE})
     varies_with = "temperature"
@@ -56,49 +56,47 @@ class FollowsTemperature(LinearSource):
         """By the growth per kelvin, from `warmer_k`."""
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Growth per kelvin."""
         return (self.growth,)
 
     def require(self, motion: Motion) -> None:
         """Refuse a motion without its thermometers.
 
         Raises:
-            ModelError: names the source and the columns that would do.
+            ModelError: names the source and suitable columns.
         """
         super().require(motion)
         self._columns(motion)
 
     @property
     def has_history(self) -> bool:
-        """Growth counts from the first row, where no session says otherwise."""
+        """Growth counts from the first row without a session."""
         return True
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Motion:  # noqa: ARG002
-        """The first row, from which growth counts."""
+        """Return the first row, the zero of growth."""
         return motion.stretch(slice(0, 1))
 
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: Motion
     ) -> tuple[Effect, Motion]:
-        """Effect along a stretch, counted from the first row of the run."""
         return self.effect(motion.after(state), machine, values).last(len(motion)), state
 
     def warmer_k(self, motion: Motion) -> NDArray[np.float64]:
-        """How much warmer than when the session began, shape (n, 1) or, of struts, (n, 6) [K]."""
+        """Return the warming since the session's begin, shape (n, 1), or (n, 6) for struts [K]."""
         self.require(motion)
         logged = [logged_degc(motion, name) for name in self._columns(motion)]
         return np.column_stack([degc - first for degc, first in logged])
 
     def moves(self, motion: Motion) -> bool:
-        """Whether its thermometers moved by so much over the session that something can follow them."""
+        """Return whether its thermometers moved enough to be followed."""
         shown = [motion.setup.thermometers[name].degc for name in self._columns(motion)] if motion.setup else []
         return any(np.ptp(degc) > FOLLOWED_K for degc in shown)
 
     def _columns(self, motion: Motion) -> tuple[str, ...]:
-        """Thermometers to follow, the same in all runs of a session.
+        """Return its thermometers, equal in all runs of a session.
 
         Raises:
-            ModelError: names those that are missing.
+            ModelError: names missing ones.
         """
         logged = known_thermometers(motion)
         for columns in self.thermometers:
@@ -113,7 +111,7 @@ class FollowsTemperature(LinearSource):
 
 
 def following_thermometers(sources: Sequence[ErrorSource], motions: Iterable[Motion]) -> tuple[ErrorSource, ...]:
-    """Sources, those that grow with time in the form that follows thermometers where all runs have what that needs."""
+    """Return sources, by thermometers if all runs have them."""
     return tuple(_logged(source, motions) or source for source in sources)
 
 
@@ -125,7 +123,7 @@ def _logged(source: ErrorSource, motions: Iterable[Motion]) -> ErrorSource | Non
 
 
 def not_given(source: ErrorSource, motions: Iterable[Motion]) -> str:
-    """Return what a source lacks in motions, thermometers that move among it; empty where it can be looked for."""
+    """Return what motions lack for a source, moving thermometers included; may be empty."""
     try:
         for motion in motions:
             source.require(motion)
@@ -137,17 +135,16 @@ def not_given(source: ErrorSource, motions: Iterable[Motion]) -> str:
 
 
 def known_thermometers(motion: Motion) -> set[str]:
-    """Thermometers whose temperatures are known in a motion, by their columns without the unit."""
+    """Return thermometers with known temperatures, by column without unit."""
     if motion.setup is not None and motion.setup.thermometers:
         return set(motion.setup.thermometers)
     return set(motion.temperature_degc)
 
 
 def logged_degc(motion: Motion, name: str) -> tuple[NDArray[np.float64], float]:
-    """What a thermometer showed, shape (n,), and what it showed when the session began [degC].
+    """Return a thermometer's readings, shape (n,), and its start value [degC].
 
-    As the session's curve: parts of a machine change slowly, and thermometers are coarse. A motion of no session has its own
-    values, from its own beginning on.
+    The session's smooth curve is used; a motion without session counts from its own begin.
     """
     if motion.setup is None or not motion.setup.thermometers or motion.time_s is None:
         own = motion.temperature_degc[name]

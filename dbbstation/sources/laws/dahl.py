@@ -1,8 +1,6 @@
-"""What winds up elastically against friction before it slides: the law of Dahl, and what it remembers.
+"""Elastic wind-up against friction: the law of Dahl with its memory.
 
 [Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1 (1968), eq 1 with exponent 1]
-
-The kernel is part of a source; the compiler keeps its code on disk under this file.
 """
 
 from __future__ import annotations
@@ -21,12 +19,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class WoundState:
-    """How far each of m columns is wound up.
+    """Wind-up of m columns.
 
     Attributes:
-        travel: where it was, in the unit of the travel, shape (m,); NaN before the first row.
-        side: wind-up as a share of its whole width, from -1/2 to 1/2, shape (m,).
-        by_length: derivative of that by the column's length, shape (m,).
+        travel: last place, in its unit, shape (m,); NaN before the first row.
+        side: share of the whole width, -1/2 to 1/2, shape (m,).
+        by_length: derivative of that by length, shape (m,).
     """
 
     travel: NDArray[np.float64]
@@ -35,10 +33,10 @@ class WoundState:
 
 
 def wound(travel: NDArray[np.float64]) -> WoundState:
-    """Return the state before a run that begins in a movement which was already under way.
+    """Return the state before a run that begins in motion.
 
     Args:
-        travel: of the run, or of its beginning, shape (n, m).
+        travel: of the run or its begin, shape (n, m).
     """
     start = leaning(travel)
     return WoundState(start.place, start.side, np.zeros_like(start.side))
@@ -47,11 +45,11 @@ def wound(travel: NDArray[np.float64]) -> WoundState:
 def wound_up(
     travel: NDArray[np.float64], length: NDArray[np.float64], state: WoundState
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], WoundState]:
-    """Wind-up z of each column: dz = -(s/2 + z) |dx| / l, s the sign of dx.
+    """Return wind-up z: dz = -(s/2 + z) |dx| / l, s the sign of dx.
 
     Args:
         travel: x, in time order, shape (n, m).
-        length: l, over which a wind-up falls to 37 % of what it has still to go, positive, shape (m,).
+        length: l, positive: 37 % of the rest remains after it, shape (m,).
 
     Returns:
         z and its derivative by l, shapes (n, m), and the state behind the last row.

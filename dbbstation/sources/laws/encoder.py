@@ -1,4 +1,4 @@
-"""The place of the bar's encoder: what the bar shows, without the noise in it."""
+"""The place of the bar's encoder, without noise."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ CUBIC = 3
 
 
 def reading_without_noise_mm(motion: Motion) -> NDArray[np.float64]:
-    """What the bar showed, less most of its noise, shape (n,) [mm].
+    """Return the reading less most of its noise, shape (n,) [mm].
 
-    An error taken at readings with their noise in them resembles that noise, and would be found where there is none.
+    An error at noisy readings would resemble noise and be found wrongly.
     """
     return motion.once("reading without noise", None, lambda: _smoothed(motion))
 

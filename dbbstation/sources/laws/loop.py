@@ -30,12 +30,12 @@ INPUT, INPUT_SPEED, OUTPUT, OUTPUT_SPEED, BY_CONSTANT, SPEED_BY_CONSTANT = range
 
 @dataclass(frozen=True, eq=False)
 class LoopState:
-    """What six loops remember.
+    """Memory of six loops.
 
     Attributes:
-        rows: steps so far: 0 before the first row, 2 once there is a speed.
-        memory: commanded and driven length [mm], their mean speeds over the last step [mm/s], and the derivatives of the driven
-            length and its speed by the time constant, each shape (6,): shape (6, 6).
+        rows: steps so far: 0 before the first row, 2 with a speed.
+        memory: commanded and driven length [mm], mean speeds of the last step [mm/s], and derivatives of driven length and speed
+            by time constant, shape (6, 6).
     """
 
     rows: int
@@ -51,12 +51,12 @@ STANDING = LoopState(0, 0.0, 0.0, np.zeros((6, STRUTS)))
 def driven(
     length_mm: NDArray[np.float64], time_s: NDArray[np.float64], constant_s: NDArray[np.float64], state: LoopState
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], LoopState]:
-    """Errors y - x of loops along a stretch of a program.
+    """Return errors y - x [mm], derivatives by tau [mm/s], shapes (n, 6), and the last state.
 
     Args:
-        length_mm: commanded, in time order, shape (n, 6) [mm].
-        time_s: of the rows, shape (n,); rows within `SHORTEST_S` are one, and have one error [s].
-        constant_s: tau, shape (6,); a negative one is a strut ahead by -tau dx/dt [s].
+        length_mm: commanded, in time order, shape (n, 6).
+        time_s: shape (n,); rows within `SHORTEST_S` are one.
+        constant_s: tau, shape (6,); a negative one leads by -tau dx/dt.
 
     Returns:
         Errors [mm] and their derivatives by tau [mm/s], shapes (n, 6), and the state behind the last row.
@@ -75,13 +75,13 @@ def undone(
     constant_s: NDArray[np.float64],
     state: LoopState,
 ) -> NDArray[np.float64]:
-    """Errors y - x of loops that reach y along a stretch, shape (n, 6) [mm].
+    """Return errors y - x of loops that reach y, shape (n, 6) [mm].
 
     Args:
-        length_mm: a command that nearly leads there, which says where the path bends, shape (n, 6) [mm].
-        reached_mm: y, shape (n, 6) [mm].
-        time_s: of the rows, shape (n,) [s].
-        constant_s: tau, shape (6,) [s].
+        length_mm: a command near the solution, which shows bends, shape (n, 6).
+        reached_mm: y, shape (n, 6).
+        time_s: shape (n,).
+        constant_s: tau, shape (6,).
     """
     error = np.empty_like(length_mm)
     clock = np.array([state.rows, state.time_s, state.step_s])
@@ -92,7 +92,7 @@ def undone(
 
 @inlined
 def _even(length: NDArray[np.float64], memory: NDArray[np.float64], h: float, clock: NDArray[np.float64]) -> float:
-    """How much of the change of speed counts, w h / (h + h')."""
+    """Return the counted share of the speed change, w h / (h + h')."""
     both = new = old = 0.0
     for i in range(len(length)):
         speed = (length[i] - memory[INPUT, i]) / h

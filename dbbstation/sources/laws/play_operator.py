@@ -1,7 +1,4 @@
-"""What has play, or winds up and slides: the play operator, and what it remembers.
-
-The kernel is part of several sources; the compiler keeps its code on disk under this file.
-"""
+"""The play operator with its memory, shared by several sources."""
 
 from __future__ import annotations
 
@@ -18,12 +15,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PlayState:
-    """Where each of m columns lies in its play.
+    """Place of m columns in their play.
 
     Attributes:
-        place: y, in the unit of the travel, shape (m,); NaN before the first row.
-        side: derivative of y - x by the width, from -1/2 to 1/2, shape (m,); before the first row the end of the play that
-            the drive leans on.
+        place: y, in the travel's unit, shape (m,); NaN before the first row.
+        side: derivative of y - x by width, -1/2 to 1/2, shape (m,); initially the leaning end.
     """
 
     place: NDArray[np.float64]
@@ -31,12 +27,12 @@ class PlayState:
 
 
 def leaning(travel: NDArray[np.float64]) -> PlayState:
-    """Return the state before a run that begins in a movement which was already under way.
+    """Return the state before a run that begins in motion.
 
-    -1/2 behind a column that grows at first, +1/2 behind one that shrinks, 0 for one that never moves.
+    -1/2 for a growing column, +1/2 for a shrinking one, 0 for none.
 
     Args:
-        travel: of the run, or of its beginning, shape (n, m).
+        travel: of the run or its begin, shape (n, m).
     """
     side = np.zeros(travel.shape[1])
     _lean(np.ascontiguousarray(travel), side)
@@ -46,7 +42,7 @@ def leaning(travel: NDArray[np.float64]) -> PlayState:
 def followed(
     travel: NDArray[np.float64], width: NDArray[np.float64], state: PlayState
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
-    """Play operator of each column: y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2.
+    """Return the play operator: y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2.
 
     Args:
         travel: x, in time order, shape (n, m).

@@ -1,4 +1,4 @@
-"""How quickly struts move along a motion, for sources that act in time."""
+"""Speeds of struts along a motion."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def driven_in_time(
     """Commanded strut lengths at rising times.
 
     Args:
-        motion: a path with times, in time order.
+        motion: a path with times.
 
     Returns:
         Times, shape (m,) [s], lengths then, shape (m, 6) [mm], and for each row of the motion its place among them,
@@ -39,7 +39,7 @@ def driven_in_time(
 
 
 def speed_mm_s(time_s: NDArray[np.float64], length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Speed at rising times by differences of second order, shape (m, 6) [mm/s]; zero where there is one row only."""
+    """Return second-order speeds at rising times, shape (m, 6) [mm/s]; zero for one row."""
     rows = len(time_s)
     if rows == 1:
         return np.zeros_like(length_mm)

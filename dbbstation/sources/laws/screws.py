@@ -1,4 +1,4 @@
-"""What the sources that a strut's screw causes take from the machine file."""
+"""Screw data of the machine file."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 def screw_lead_mm(source: str, machine: Machine) -> float:
-    """Travel of a strut per turn of its screw [mm].
+    """Return a strut's travel per screw turn [mm].
 
     Raises:
-        ModelError: the machine file has none; names the source and the key.
+        ModelError: the machine file has none; names source and key.
     """
     if machine.screw_lead_mm is None:
         raise ModelError(

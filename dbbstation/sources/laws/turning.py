@@ -1,4 +1,4 @@
-"""Where a strut turned round, along a smooth path that is known at rows only."""
+"""Turning points of struts along a smooth path of rows."""
 
 from __future__ import annotations
 
@@ -16,12 +16,10 @@ TURNED_MM = 1e-3
 
 
 def since_turning(travel: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Signed way of each column since it last turned round, shape (n, m).
+    """Return each column's signed way since its last turn, shape (n, m); zero before the first.
 
-    The turning point lies between rows, in general: it is the vertex of the parabola through the outermost row and its
-    two neighbours, over the way of all columns together, so that rows need not be even. Zero before the first one.
-    Where the path has a corner or comes straight back, as a single column always does, the outermost row is the turning
-    point.
+    The turning point is the vertex of the parabola through the outermost row and its neighbours, over the way of all
+    columns. At corners and straight returns it is the outermost row.
     """
     since = np.zeros_like(travel)
     _since(np.ascontiguousarray(travel), TURNED_MM, since)
@@ -30,7 +28,7 @@ def since_turning(travel: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @inlined
 def _parabola(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, float, float, float]:
-    """Parabola of a column through row k and its neighbours, over the way of all columns from row to row.
+    """Return the parabola through row k and its neighbours, over the way of all columns.
 
     Returns:
         Slope at row k, half of minus the second derivative, both of `side` times the column, way from the row before
@@ -52,11 +50,9 @@ def _parabola(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple
 
 @inlined
 def _vertex(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, bool]:
-    """Turning point of a column whose outermost row is k, on the high (1.0) or low (-1.0) side, and whether k is behind.
+    """Return the turning point on the high (1.0) or low (-1.0) side, and whether row k is behind it.
 
-    Of two rows almost equally far out each has its parabola. Were the turning point taken from one of them alone, it
-    would jump as the other becomes the outermost, and a compensation that moves them could go to and fro for ever;
-    hence no less than the neighbour's parabola in the middle between both.
+    It is at least the neighbouring parabola midway, lest it jump between nearly equal rows and a compensation oscillate.
     """
     slope, bend, before, after = _parabola(travel, i, k, side)
     if bend <= 0.0:

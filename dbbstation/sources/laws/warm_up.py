@@ -39,10 +39,10 @@ ORIGIN = "linear expansion of a body of one time constant (Newton's law of cooli
 
 
 def warm_up_parameters(growth: Parameter, pause_loss: str, usual_s: float) -> tuple[Parameter, ...]:
-    """Parameters of the law: the growth given, its time constant, and what a pause takes back.
+    """Return the law's parameters: growth, time constant, pause loss.
 
     Args:
-        growth: what is still to grow at the first sample.
+        growth: still to come at the first sample.
     """
     meaning = "what a pause without end would take back; pauses count from ten minutes on"
     return (
@@ -55,10 +55,10 @@ def warm_up_parameters(growth: Parameter, pause_loss: str, usual_s: float) -> tu
 
 
 def grown(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Growth at every sample, shape (n,), in the unit of its parameters.
+    """Return growth at every sample, shape (n,), in its parameters' unit.
 
     Args:
-        values: of `warm_up_parameters`, shape (3,).
+        values: shape (3,).
     """
     growth, constant_s, loss = values
     law: NDArray[np.float64] = growth * warmed(_time_s(motion), constant_s) - loss * _paused(motion, constant_s, warmed)
@@ -66,7 +66,7 @@ def grown(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def grown_by(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derivatives of `grown` by its three parameters, shape (n, 3)."""
+    """Return derivatives of `grown` by its parameters, shape (n, 3)."""
     growth, constant_s, loss = values
     time_s = _time_s(motion)
     by_constant = growth * warmed_by_constant(time_s, constant_s)
@@ -75,12 +75,12 @@ def grown_by(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def warmed(time_s: NDArray[np.float64], constant_s: float) -> NDArray[np.float64]:
-    """Share of a warm-up that has happened, 1 - exp(-t / tau), shape (n,) [1].
+    """Return the completed share of a warm-up, 1 - exp(-t / tau), shape (n,) [1].
 
-    Before t = 0 nothing has happened; a constant of zero (or less, which a fit may try) is its limit, a step at t = 0.
+    It is zero before t = 0; a constant of at most zero gives a step.
 
     Args:
-        time_s: since the heat came, shape (n,) [s].
+        time_s: since heating began, shape (n,).
     """
     since = np.maximum(time_s, 0.0)
     if constant_s <= 0.0:
@@ -89,7 +89,7 @@ def warmed(time_s: NDArray[np.float64], constant_s: float) -> NDArray[np.float64
 
 
 def warmed_by_constant(time_s: NDArray[np.float64], constant_s: float) -> NDArray[np.float64]:
-    """Derivative of `warmed` by the time constant, -t / tau² exp(-t / tau), shape (n,) [1/s]."""
+    """Return the derivative of `warmed` by the constant, -t / tau² exp(-t / tau), shape (n,) [1/s]."""
     if constant_s <= 0.0:
         return np.zeros(len(time_s))
     ratio = np.maximum(time_s, 0.0) / constant_s
@@ -97,7 +97,7 @@ def warmed_by_constant(time_s: NDArray[np.float64], constant_s: float) -> NDArra
 
 
 def pauses_s(motion: Motion) -> list[tuple[float, float]]:
-    """Beginning and end of every pause of the motion's session [s]."""
+    """Return begin and end of the session's pauses [s]."""
     return [] if motion.setup is None else _pauses_between(motion.setup.moving_s)
 
 
@@ -111,7 +111,7 @@ def _pauses_between(moving_s: tuple[tuple[float, float], ...]) -> list[tuple[flo
 def _paused(
     motion: Motion, constant_s: float, law: Callable[[NDArray[np.float64], float], NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """What pauses do to a body, shape (n,): each is a step down at its beginning and one up at its end."""
+    """Return the effect of pauses, shape (n,): a step down at each begin and up at its end."""
     time_s = _time_s(motion)
     steps = [law(time_s - begin, constant_s) - law(time_s - end, constant_s) for begin, end in pauses_s(motion)]
     return sum(steps, np.zeros(len(time_s)))

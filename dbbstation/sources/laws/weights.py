@@ -1,4 +1,4 @@
-"""What the sources that gravity causes take from the machine file, and what they assume where it is silent."""
+"""Weights of the machine file, with defaults."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ USUAL_UM_KN = 10.0
 
 
 def strut_compliance(machine: Machine) -> Compliance:
-    """Compliance of the struts as the machine file states it, else the usual one."""
+    """Return the machine file's compliance of struts, else the usual one."""
     return machine.compliance or Compliance(at_1000mm_mm_per_n=USUAL_UM_KN * MM_PER_N)
 
 
 def for_such_struts(machine: Machine) -> str:
-    """Say which compliance a parameter is counted with that circles show only multiplied by it."""
+    """Return a note on the compliance assumed for a parameter."""
     usual = f"{strut_compliance(machine).at_1000mm_mm_per_n / MM_PER_N:.3g} µm/kN at 1000 mm"
     return f"counted with the compliance of gravity, or {usual} without it"
 
 
 def platform_masses(source: str, machine: Machine) -> Masses:
-    """Masses of the platform.
+    """Return the platform's masses.
 
     Raises:
-        ModelError: the machine file has none; names the source and the key.
+        ModelError: the machine file has none; names source and key.
     """
     if machine.masses is None:
         raise ModelError(
@@ -53,11 +53,11 @@ def platform_masses(source: str, machine: Machine) -> Masses:
 
 
 def stated_tensions(source: str, machine: Machine, frames: Frames, struts: Struts) -> NDArray[np.float64]:
-    """Tensions of the struts under the weights that the machine file states, at platform joints, shape (n, 6) [N].
+    """Return tensions under the machine file's weights, at platform joints, shape (n, 6) [N].
 
     Args:
-        source: who asks, for the message.
-        machine: with masses, and with strut masses where these count.
+        source: for the message.
+        machine: with masses, and strut masses if they count.
 
     Raises:
         ModelError: the machine file has no masses.
@@ -70,12 +70,12 @@ def stated_tensions(source: str, machine: Machine, frames: Frames, struts: Strut
 
 
 def stated_loads(source: str, machine: Machine, frames: Frames, hexapod: Hexapod) -> NDArray[np.float64]:
-    """What the motors hold under the weights that the machine file states, shape (n, 6) [N].
+    """Return motor loads under the machine file's weights, shape (n, 6) [N].
 
     Args:
-        source: who asks, for the message.
-        machine: with masses, and with strut masses where these count.
-        hexapod: joints, nominal or actual.
+        source: for the message.
+        machine: with masses, and strut masses if they count.
+        hexapod: nominal or actual joints.
 
     Raises:
         ModelError: the machine file has no masses.

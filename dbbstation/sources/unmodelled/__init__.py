@@ -1,1 +1,1 @@
-"""Error sources without a cause: curves of a strut error over length or force, and waves along the screw."""
+"""Error sources without cause: curves over length or force, and waves."""

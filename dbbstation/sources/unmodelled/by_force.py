@@ -1,4 +1,4 @@
-"""Error source without a cause: a strut error that follows the force in the strut."""
+"""A strut error without cause that follows the strut's force."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ POINTS = 25
 
 
 class UnexplainedByForce(LinearSource):
-    """A strut is off by a piecewise linear function of the force that the platform's weight puts on it.
+    """A strut is off by a piecewise linear function of its force by the platform's weight.
 
-    Forces are those of the platform's equilibrium at the commanded pose; beyond its weight either way the error stays
-    the same. A diagnosis finds the curve and calls it unexplained; it never names this source.
+    Forces are by equilibrium at the commanded pose; the error is constant beyond the weight. A diagnosis calls the curve
+    unexplained and never names this source.
     """
 
     name = "unexplained-by-force"
@@ -36,7 +36,7 @@ class UnexplainedByForce(LinearSource):
     texts = texts("axial force", "actual minus driven length = sum over points k of v_ik hat_k(T_i)")
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Values at the points, strut by strut.
+        """Return values at the points, by strut.
 
         Raises:
             ModelError: the machine file has no masses.
@@ -44,7 +44,7 @@ class UnexplainedByForce(LinearSource):
         return values_at(_points_n(self.name, machine), "N")
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each strut answers to its own values on both sides of its force.
+        """Each strut answers to the two values about its force.
 
         Raises:
             ModelError: the machine file has no masses.

@@ -1,4 +1,4 @@
-"""Error source without a cause: a strut error that follows the strut's length."""
+"""A strut error without cause that follows the strut's length."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ POINTS = 25
 
 
 class UnexplainedByLength(LinearSource):
-    """A strut is off by a piecewise linear function of its length, with points from end to end of its travel.
+    """A strut is off by a piecewise linear function of its length over its travel.
 
-    Constant and slope of it cannot be told from reference lengths and joints; the tolerance of the values shares them
-    out. A diagnosis finds the curve and calls it unexplained; it never names this source.
+    Constant and slope are shared with reference lengths and joints by tolerance. A diagnosis calls the curve unexplained
+    and never names this source.
     """
 
     name = "unexplained-by-length"
@@ -33,15 +33,13 @@ class UnexplainedByLength(LinearSource):
     texts = texts("length", "actual minus driven length = sum over points k of v_ik hat_k(L_i)")
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Values at the points, strut by strut."""
         return values_at(_points_mm(machine), "mm")
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
-        """A point up and its neighbours down."""
+        """One point up and its neighbours down."""
         return float(2.0 * np.diff(_points_mm(machine))[0])
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each strut answers to its own values on both sides of its length."""
         return piecewise_linear(_points_mm(machine), motion.struts(machine).length_mm)
 
 

@@ -1,4 +1,4 @@
-"""What unmodelled effects have in common: piecewise linear curves of six struts with fixed points."""
+"""Piecewise linear curves of six struts with fixed points."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PLAUSIBLE_UM = 2.0 * TOLERANCE_UM
 
 
 def values_at(points: NDArray[np.float64], unit: str) -> tuple[Parameter, ...]:
-    """One value for each strut at each point, strut by strut."""
+    """Return one value for each strut at each point, by strut."""
     return tuple(
         Parameter(
             f"strut_{i + 1}_at_{number}_um",
@@ -39,11 +39,11 @@ def values_at(points: NDArray[np.float64], unit: str) -> tuple[Parameter, ...]:
 
 
 def piecewise_linear(points: NDArray[np.float64], values: NDArray[np.float64]) -> Effect:
-    """Derivative by the value at each point, at values of shape (n, 6); constant beyond the ends.
+    """Return the derivative by the points' values, at values of shape (n, 6); constant beyond the ends.
 
     Args:
         points: evenly spaced, shape (p,).
-        values: of the variable, in the points' unit, shape (n, 6).
+        values: in the points' unit, shape (n, 6).
     """
     count = len(points)
     place = np.clip((values - points[0]) / (points[1] - points[0]), 0.0, count - 1.0)
@@ -53,7 +53,7 @@ def piecewise_linear(points: NDArray[np.float64], values: NDArray[np.float64]) -
 
 
 def texts(variable: str, equation: str) -> Texts:
-    """What can be said of an error that only its variable is known of."""
+    """Return texts of an error known only by its variable."""
     return Texts(
         what=f"An error of the struts that follows their {variable}; its cause is unknown.",
         shows=f"What a diagnosis leaves without a name repeats at the same {variable}, in every test and direction.",

@@ -1,4 +1,4 @@
-"""Error source without a cause: a strut error that repeats along the strut's length."""
+"""A strut error without cause that repeats along the length."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ PERIODS_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
 
 
 class UnexplainedWave(ErrorSource):
-    """A strut is off by a wave of its length: dL_i = a_i sin(2 pi (L_i - L_0) / p_i) + b_i cos(2 pi (L_i - L_0) / p_i).
+    """A strut has a wave: dL_i = a_i sin(2 pi (L_i - L_0) / p_i) + b_i cos(2 pi (L_i - L_0) / p_i).
 
-    L_0 is the middle of the travel. The period p is no lead that the machine file knows; where it is the screw's, the
-    source `screw-cyclic` has the cause. A diagnosis finds the wave and calls it unexplained; it never names this source.
+    L_0 is mid-travel. The period p is no known lead; for the screw's, `screw-cyclic` is the cause. A diagnosis calls it
+    unexplained and never names this source.
     """
 
     name = "unexplained-wave"
@@ -33,7 +33,6 @@ class UnexplainedWave(ErrorSource):
     texts = texts("length", "dL_i = a_i sin(2 pi (L_i - L_0) / p_i) + b_i cos(2 pi (L_i - L_0) / p_i)")
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Sine, cosine and period of each strut."""
         middle = f"counted from {sum(machine.travel.strut_mm) / 2.0:g} mm, cause unknown"
         found: list[Parameter] = []
         for i in range(STRUTS):
@@ -46,19 +45,17 @@ class UnexplainedWave(ErrorSource):
         return tuple(found)
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
-        """That of the shortest wave."""
+        """Return the shortest wave's period."""
         by_strut = values.reshape(STRUTS, 3)
         there = (by_strut[:, :2] != 0.0).any(axis=1) & (by_strut[:, 2] != 0.0)
         return float(np.abs(by_strut[there, 2]).min(initial=SMOOTH_MM))
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Wave of each strut."""
         by_strut = values.reshape(STRUTS, 3)
         waves, _ = _waves(motion, machine, by_strut[:, 2])
         return Effect(strut_mm=MM_PER_UM * np.sum(waves * by_strut[:, :2], axis=-1))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Each strut answers to its own wave."""
         by_strut = values.reshape(STRUTS, 3)
         waves, turned_rad = _waves(motion, machine, by_strut[:, 2])
         sine, cosine = waves[:, :, 0], waves[:, :, 1]
@@ -72,7 +69,7 @@ class UnexplainedWave(ErrorSource):
 def _waves(
     motion: Motion, machine: Machine, period_mm: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sine and cosine of each strut, shape (n, 6, 2), and the angle in them, shape (n, 6) [rad]; 0 for no period."""
+    """Return sine and cosine of each strut, shape (n, 6, 2), and their angle, shape (n, 6) [rad]; 0 for no period."""
     travel = motion.struts(machine).length_mm - sum(machine.travel.strut_mm) / 2.0
     turned_rad = 2.0 * np.pi * travel / np.where(period_mm == 0.0, np.inf, period_mm)
     return np.stack([np.sin(turned_rad), np.cos(turned_rad)], axis=-1), turned_rad

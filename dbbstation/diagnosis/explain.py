@@ -242,20 +242,21 @@ def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:
 def _idle_laws(fit: Calibration, channel: CircleChannel) -> set[tuple[str, str]]:
     """Laws of a joint fit, by cause, whose nonlinear parameters the runs do not determine, and which contain a simpler law.
 
-    Such a parameter is at an end of its range or as uncertain as before, or the fit does not settle with it.
+    Such a parameter is at an end of its range or as uncertain as before. Where the fit does not settle and no parameter is, all
+    such laws are asked to be simpler.
     """
     sigma, prior = np.sqrt(fit.solution.variance), fit.layout.known.prior
-    found = set()
+    idle, all_of_them = set(), set()
     for term in fit.layout.terms:
         source = term.source
         simpler = source.simpler_law
         if simpler is None or (source.name, simpler) not in channel.sources:
             continue
+        all_of_them.add((source.name, source.law))
         shapes = fit.layout.columns_of(source.name)[1]
-        idle = np.isin(shapes, fit.at_limit) | (sigma[shapes] > IDLE * prior[shapes])
-        if idle.any() or not fit.settled:
-            found.add((source.name, source.law))
-    return found
+        if (np.isin(shapes, fit.at_limit) | (sigma[shapes] > IDLE * prior[shapes])).any():
+            idle.add((source.name, source.law))
+    return idle if idle or fit.settled else all_of_them
 
 
 def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> SettledCircles:

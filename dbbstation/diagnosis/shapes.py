@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dbbstation.inference.forms import Form, LinearSplines, Lobes, Plane, Proportional, SignForm, Spring, Walk, Wave
+from dbbstation.inference.forms import Behind, Form, LinearSplines, Lobes, Plane, Proportional, SignForm, Spring, Walk, Wave
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
 from dbbstation.sources.contract import Effect
 from dbbstation.sources.laws.by_temperature import FOLLOWED_K, known_thermometers, logged_degc
+from dbbstation.sources.laws.turning import since_turning
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,6 +49,10 @@ WAYS_DEG = tuple(30.0 * k for k in range(12))
 """Where the place may be that pulls. Its height, its distance and where on the platform it pulls are not searched: the nearest
 form leaves 14 to 40 % of what joints do not conceal of a hose (rms, seven hoses of 0.7 to 2 m; docs/decisions.md, 20)."""
 
+STICKING_MM = (0.01, 0.02, 0.04)
+"""Travel over which friction that turns round sticks, in one jerk or several: presliding and stick-slip take micrometres to tens of
+them [Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, sec. 2.2] [mm]."""
+
 AWAY_MM = 1000.0
 """How far it is from the Z axis: beyond the machine's frame."""
 
@@ -58,6 +63,7 @@ UNITS = {
     "strut-speed": "mm/s",
     "strut-acceleration": "mm/s²",
     "time since its reversal": "s",
+    "travel since its reversal": "mm",
     "time": "s",
     "strut-temperature": "degC",
     "machine-temperature": "degC",
@@ -81,6 +87,7 @@ OF_STRUTS = (
     "strut-speed",
     "strut-acceleration",
     "time since its reversal",
+    "travel since its reversal",
     "strut-temperature",
 )
 """Those that each strut has its own of."""
@@ -213,6 +220,7 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
     found = {"strut-length": struts.length_mm}
     if motion.is_path:
         found["strut-speed-sign"] = np.sign(np.gradient(struts.length_mm, axis=0))
+        found["travel since its reversal"] = since_turning(struts.length_mm)
     if machine.masses is not None:
         found["strut-force"] = strut_tensions(struts, platform_weight(motion.frames(machine), machine.masses))
     if motion.time_s is not None:
@@ -348,6 +356,11 @@ def shapes(extent: Ranges) -> list[Shape]:
     if "strut-speed-sign" in extent.low:
         found += [
             Shape("strut-length", "", strut, SIGNED, _usual("strut-length", extent, strut))
+            for strut in range(1, STRUTS + 1)
+        ]
+        found += [
+            Shape("travel since its reversal", "", strut, EVERY, Behind(length_mm), tried=float(len(STICKING_MM)))
+            for length_mm in STICKING_MM
             for strut in range(1, STRUTS + 1)
         ]
     for name in ("time", *warmed):

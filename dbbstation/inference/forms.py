@@ -23,6 +23,9 @@ POINTS_PER_WIDTH = 3
 
 WIDTHS = 4.0
 
+BEHIND_POINTS = 4
+"""Of a curve behind a reversal, between the turn and its end: a circle has two or three samples on that way."""
+
 
 class Form(ABC):
     """One family of curves over a variable; p amplitudes."""
@@ -383,3 +386,33 @@ class Ringing(Form):
         del low
         last = min(high, RINGS_FOR * self.decay)
         return np.linspace(1e-6, last, max(int(POINTS_PER_WAVE * last / self.period), 2) + 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Behind(Form):
+    """What stays behind when the direction turns: any curve of the way since then, which has the sign of the new direction.
+
+    Straight between its points, nothing at the turn itself and from `length` on.
+    """
+
+    length: float
+
+    @property
+    def count(self) -> int:
+        """One amplitude per point."""
+        return BEHIND_POINTS
+
+    def text(self, unit: str) -> str:
+        """Over which way."""
+        return f"over {self.length:.3g} {unit}"
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Against the new direction; zero before the first reversal."""
+        place = np.abs(values) / self.length * (BEHIND_POINTS + 1)
+        hats = np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(1, BEHIND_POINTS + 1)))
+        return -np.sign(values)[..., None] * hats
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Its own, and both ends."""
+        del low, high
+        return np.linspace(0.0, self.length, BEHIND_POINTS + 2)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.blocks import Block, Columns
-    from dbbstation.inference.model_comparison import Cause
+    from dbbstation.inference.model_comparison import Cause, Member
 
 SHARE = 0.7
 """Of the groups of blocks that each draw keeps."""
@@ -36,6 +36,8 @@ def selection_frequency(
     causes: Sequence[Cause],
     noise: float,
     rng: np.random.Generator,
+    begin: Sequence[Member] = (),
+    most_members: int | None = None,
 ) -> dict[str, float]:
     """Share of draws in which each cause belongs to the most probable hypothesis.
 
@@ -49,6 +51,8 @@ def selection_frequency(
         known: priors and scales of the base columns.
         held: directions of the base that are kept at zero.
         noise: standard deviation of one measurement.
+        begin: members that every search begins with, beside none.
+        most_members: causes of a hypothesis at the most; None: no limit.
     """
     base = len(known.prior)
     columns = (
@@ -69,7 +73,7 @@ def selection_frequency(
         drawn = every.without(reduce(add, out)) if out else every
         left = np.where(np.isin(group_of, [*kept]), target, 0.0)
         comparison = BesideBase(drawn, known, held, noise).comparison(left)
-        for name in search(comparison, causes, likely=CLOSE).best.names:
+        for name in search(comparison, causes, [begin], most_members=most_members, likely=CLOSE).best.names:
             times[name] += 1
     return {name: count / DRAWS for name, count in times.items()}
 

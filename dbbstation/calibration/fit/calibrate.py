@@ -202,10 +202,10 @@ def calibrate(
         share = _share(layout, step, before, share)
         x = x + share * step
         before = step
-        beyond = np.flatnonzero((x < limits[0]) | (x > limits[1]))
+        beyond = np.setdiff1d(np.flatnonzero((x < limits[0]) | (x > limits[1])), at_limit)
+        x = np.clip(x, *limits)
         if len(beyond):
             # The others are then fitted beside the end of its range, where it stays.
-            x = np.clip(x, *limits)
             layout, at_limit = layout.held_at(x, beyond), np.concatenate([at_limit, beyond])
         settled = change < 1.0 and not len(beyond)
         if settled:

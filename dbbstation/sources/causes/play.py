@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import erf
 
 from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
@@ -12,6 +13,7 @@ from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensi
 from dbbstation.sources.contract import (
     SMOOTH_MM,
     Effect,
+    ErrorSource,
     Motion,
     Need,
     Owner,
@@ -32,6 +34,9 @@ MM_PER_UM = 1e-3
 
 FRICTION_N = (0.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 """Frictions worth trying, from none to more than a strut carries in upright circles [N]."""
+
+SHAKING_N = (25.0, 50.0, 100.0, 200.0, 400.0)
+"""Shaking forces worth trying, from a twentieth of what a strut carries to as much as that [N]."""
 
 
 class Play(SourceWithHistory):
@@ -62,10 +67,15 @@ class Play(SourceWithHistory):
         cure="Preload or exchange the part; until then balance the platform so that the struts' forces keep their sign "
         "in the work.",
         equation="actual minus driven length = +w/2 where T > R, -w/2 where T < -R; between, y_k - x_k with y_k = "
-        "min(max(y_k-1, x_k - w/2), x_k + w/2)",
+        "min(max(y_k-1, x_k - w/2), x_k + w/2); or, where drives shake the strut with a force N, w/2 erf(T / (sqrt(2) N))",
         origin="play closed by the load, held by Coulomb's friction; T from the platform's equilibrium "
-        "[GRAV eq 1, 6], whose signs turn in 12 of the 15 circles of [CAL Table II] on the reference machine",
+        "[GRAV eq 1, 6], whose signs turn in 12 of the 15 circles of [CAL Table II] on the reference machine; shaken: a relay with "
+        "Gaussian dither (Gelb and Vander Velde, Multiple-Input Describing Functions, 1968)",
     )
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        """The one of a strut that is shaken."""
+        return (_Shaken(),)
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         """Return six plays, full width, and one friction.
@@ -114,16 +124,85 @@ class Play(SourceWithHistory):
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
         """Return errors [mm] and derivatives by width [mm/mm], shapes (n, 6), and the last state."""
-        masses = platform_masses(self.name, machine)
-        frames, struts = motion.frames(machine), motion.struts(machine)
-        load = platform_weight(frames, masses)
-        if machine.strut_masses is not None:
-            load += transverse_load(struts, transverse_pull(struts, machine.strut_masses))
-        tension = motor_loads(struts, strut_tensions(struts, load), machine.strut_masses)
-        width = MM_PER_UM * values[:STRUTS]
+        tension, width = _tensions(motion, machine), MM_PER_UM * values[:STRUTS]
         friction = max(float(values[STRUTS]), 0.0)
-        place, by_width, behind = settled(struts.length_mm, tension, np.abs(width), friction, state)
+        place, by_width, behind = settled(motion.struts(machine).length_mm, tension, np.abs(width), friction, state)
         return np.where(width < 0.0, -place, place), by_width, behind
+
+
+class _Shaken(ErrorSource):
+    """Play of a strut that its drive shakes: it crosses little by little while the load changes from pull to push.
+
+    The force in the strut is the load's T and that of the shaking, which is Gaussian with standard deviation N. The strut lies at
+    one end of its play or at the other as the sum pulls or pushes; on the average it is longer by w/2 erf(T / (sqrt(2) N)).
+    """
+
+    name, belongs_to, texts = Play.name, Play.belongs_to, Play.texts
+    detail_mm = Play.detail_mm
+    needs = frozenset({Need.POSE})
+    varies_with, form_uncertainty = Play.varies_with, Play.form_uncertainty
+
+    @property
+    def law(self) -> str:
+        """Of the two of play."""
+        return "shaken"
+
+    @property
+    def simpler_law(self) -> str:
+        """Play that nothing shakes."""
+        return Play().law
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Six plays, full width, and one shaking force.
+
+        Raises:
+            ModelError: the machine file has no masses.
+        """
+        plays = Play().parameters(machine)[:STRUTS]
+        meaning = "standard deviation of the force that shakes a strut across its play, all struts alike"
+        return (*plays, Parameter("shaking_n", "N", 100.0, meaning, SHAKING_N))
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Where each strut lies in its play, on the average.
+
+        Raises:
+            ModelError: the machine file has no masses.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        share = erf(_tensions(motion, machine) / _spread_n(values))
+        return Effect(strut_mm=0.5 * MM_PER_UM * values[:STRUTS] * share)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """By the plays, each strut its own, and by the shaking force.
+
+        Raises:
+            ModelError: the machine file has no masses.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        ratio = _tensions(motion, machine) / _spread_n(values)
+        by_play = 0.5 * MM_PER_UM * erf(ratio)[:, :, None] * np.eye(STRUTS)
+        steep = -np.sqrt(2.0) / _spread_n(values) * 2.0 / np.sqrt(np.pi) * ratio * np.exp(-np.square(ratio))
+        by_force = 0.5 * MM_PER_UM * values[:STRUTS] * steep
+        return Effect(strut_mm=np.concatenate([by_play, by_force[:, :, None]], axis=2))
+
+
+LEAST_N = 1.0
+"""Shaking force below which the play is crossed at once, for any load that a sample has [N]."""
+
+
+def _spread_n(values: NDArray[np.float64]) -> float:
+    """Root of two times the shaking force [N]."""
+    return float(np.sqrt(2.0) * max(values[STRUTS], LEAST_N))
+
+
+def _tensions(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    """Forces that the drives hold, positive where the load pulls, shape (n, 6) [N]."""
+    masses = platform_masses(Play.name, machine)
+    frames, struts = motion.frames(machine), motion.struts(machine)
+    load = platform_weight(frames, masses)
+    if machine.strut_masses is not None:
+        load += transverse_load(struts, transverse_pull(struts, machine.strut_masses))
+    return motor_loads(struts, strut_tensions(struts, load), machine.strut_masses)
 
 
 def settled(

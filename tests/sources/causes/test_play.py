@@ -179,3 +179,26 @@ def test_a_machine_without_masses_and_single_poses_are_refused(reference, rng):
         PLAY.effect(motion, bare, np.ones(7))
     with pytest.raises(ModelError, match="play needs path"):
         PLAY.effect(replace(motion, is_path=False), reference, np.ones(7))
+
+
+def test_a_shaken_strut_lies_where_its_shaken_forces_put_it_on_the_average(reference, rng):
+    """Against drawn forces: at either end of the play as load and shaking together pull or push; without shaking, `PLAY`."""
+    shaken, motion = PLAY.other_laws()[0], random_run(rng, 40)
+    um, stiff = np.array([3.0, 5.0, -2.0, 4.0, 8.0, 1.0]), replace(reference, strut_masses=None)
+    stiff = replace(stiff, compliance=Compliance(1e-6, growing_share=0.0))
+    tension_n = 1e6 * Gravity().effect(motion, stiff, np.ones(1)).strut_mm
+    drawn = np.sign(tension_n + 120.0 * rng.standard_normal((20_000, 1, 1))).mean(axis=0)
+    found = 1e3 * shaken.effect(motion, stiff, np.append(um, 120.0)).strut_mm
+    assert np.abs(found / (um / 2) - drawn).max() < 5.0 / np.sqrt(20_000)
+    still = 1e3 * shaken.effect(motion, stiff, np.append(um, 0.0)).strut_mm
+    clear = np.abs(tension_n) > 5.0
+    assert np.allclose(still[clear], 1e3 * PLAY.effect(motion, stiff, np.append(um, 0.0)).strut_mm[clear], atol=1e-5)
+
+
+def test_a_shaken_play_answers_to_its_widths_and_to_the_shaking(reference, rng):
+    shaken, motion = PLAY.other_laws()[0], random_run(rng, 60)
+    values = np.array([3.0, 5.0, -2.0, 4.0, 8.0, 1.0, 150.0])
+    slopes = shaken.derivative(motion, reference, values).strut_mm
+    for k, step in enumerate(np.diag([0.1] * 6 + [0.5])):
+        ends = (shaken.effect(motion, reference, values + sign * step).strut_mm for sign in (1.0, -1.0))
+        assert slopes[:, :, k] == pytest.approx((next(ends) - next(ends)) / (2.0 * step[k]), rel=1e-4, abs=1e-9)

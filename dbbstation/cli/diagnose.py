@@ -141,9 +141,16 @@ def _print(result: DiagnosisFigures) -> None:
     echo(result.unexplained.text)
     if result.unexplained.curve:
         _print_curve(result.unexplained.curve)
+    _print_limits(result)
+    _print_next_tests(result)
+
+
+def _print_limits(result: DiagnosisFigures) -> None:
+    """Print what ended at a limit, and whether a second search came to another answer."""
+    for limit in result.limits:
+        echo(limit.text)
     if result.second_start_agrees is False:
         echo("A second search came to another set of causes: several explain these recordings, take it with care.")
-    _print_next_tests(result)
 
 
 def _print_mismatch(result: DiagnosisFigures) -> None:

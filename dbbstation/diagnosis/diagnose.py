@@ -15,6 +15,8 @@ from dbbstation.diagnosis.chosen_anew import without_tests
 from dbbstation.diagnosis.explain import explain, without
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained, Verdict
 from dbbstation.diagnosis.left_out import found_again, predicted, widened_by_tests
+from dbbstation.diagnosis.left_where import where_left
+from dbbstation.diagnosis.limits import limits_of
 from dbbstation.diagnosis.locate import locations_of
 from dbbstation.diagnosis.next_test import next_tests
 from dbbstation.diagnosis.shapes import Follows
@@ -37,7 +39,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.harmonics import Misfit
-    from dbbstation.inference.remainder import Remainder
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource, Motion
@@ -76,12 +77,14 @@ def diagnose(
     progress("verdicts")
     explained, findings = judged(explained)
     progress("held-out tests")
-    anew = without_tests(explained) if hold_out else None
+    stopped = explained.settled.stopped
+    anew = without_tests(explained) if hold_out and not stopped else None
     explained = _widened(explained)
     findings = judge(explained, anew)
     settled, before, outliers = explained.settled, explained.before, explained.outliers
     after, members = settled.after, settled.members
-    again = found_again(explained, [f.name for f in sorted(findings, key=lambda f: -f.gain)[:RIVALS]])
+    rivals = [f.name for f in sorted(findings, key=lambda f: -f.gain)[:RIVALS]]
+    again = {} if stopped else found_again(explained, rivals)
     findings = tuple(replace(f, stability=again.get(f.name)) for f in findings)
     rest = _unexplained(explained, settled.left)
     found = [explained.channel.source_of(m.cause.name, m.variant) for m in members]
@@ -103,9 +106,10 @@ def diagnose(
         sources=findings,
         unexplained=with_exact_wave(rest, after),
         shifts=shifts_between(before, after),
-        second_start_agrees=settled.second_start_agrees(),
+        second_start_agrees=None if stopped else settled.second_start_agrees(),
         cancelling=_cancelling(explained),
-        next_tests=next_tests(explained, findings, elsewhere),
+        next_tests=() if stopped else next_tests(explained, findings, elsewhere),
+        limits=limits_of(settled),
     )
 
 
@@ -166,7 +170,7 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
             text = (
                 f"What is left is what the formula of {', '.join(rough)} may be off by: the machine follows it roughly."
             )
-        rms_um, where = _where(settled.after.observations, found)
+        rms_um, where = where_left(settled.after.observations, found)
         return Unexplained(max(1e3 * left.rms, rms_um), None, None, 0.0, f"{text} {where}")
     member = max(effects, key=lambda m: settled.best.log_factor(m.cause.name))
     curve = curve_of(explained.channel, settled, member)
@@ -185,18 +189,6 @@ def _quick(settled: SettledCircles) -> Unexplained:
     if found is None or found.probability >= SIGNIFICANT:
         return Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise.")
     return Unexplained(found.beyond_um, found.strut, Follows("time", "since a reversal"), 0.0, found.text)
-
-
-def _where(observations: Sequence[Observation], found: Remainder) -> tuple[float, str]:
-    """Size [µm] and place, in a sentence, of the largest part of the residual."""
-    worst = min((found.harmonic, found.run, found.pulse), key=lambda one: one.probability)
-    size_um = 1e3 * worst.rms
-    if worst is found.harmonic:
-        return size_um, f"Most of it comes {worst.place} times per turn, {size_um:.2g} µm rms over all runs."
-    run = f"test {observations[worst.place].test} {observations[worst.place].raw.circle.direction}"
-    if worst is found.run:
-        return size_um, f"Most of it is in {run}, {size_um:.2g} µm rms."
-    return size_um, f"Most of it is in {run} about {np.degrees(found.pulse_phase_rad):.0f} degrees, {size_um:.2g} µm."
 
 
 def rough_formulas(settled: SettledCircles) -> list[str]:

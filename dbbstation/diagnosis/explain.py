@@ -69,7 +69,7 @@ def explain(
     fit = partial(calibrate, machine)
     before, outliers = calibrate_robust(fit, runs, balls=False)
     explained = _with_set_up(fit, before, outliers, sources, progress)
-    if explained.settled.members and outliers:
+    if explained.settled.members and outliers and not explained.settled.stopped:
         belonging, staying = in_place_after_all(explained.settled.after, runs, outliers)
         if len(staying) < len(outliers):
             del explained  # its columns fill as much memory as the next ones will
@@ -96,11 +96,11 @@ def _with_set_up(
     while True:
         progress("candidates")
         channel = CircleChannel(before, sources)
-        settled = _settle(channel, progress)
+        settled = _Settling(channel, progress).run()
         explained = Explained(before, outliers, channel, misfit_of(before, settled.noise), settled)
         off = [m for m in settled.best.members if m.cause.setup]
         off = [m for m in off if settled.posterior.probability([m.cause.name]) >= SURE]
-        if not off or len(outliers) >= MOST:
+        if not off or len(outliers) >= MOST or settled.stopped:
             return explained
         worst = max(off, key=lambda m: settled.best.log_factor(m.cause.name))
         step = set_free(fit, before, worst.cause.name, worst.variant.label)
@@ -110,75 +110,106 @@ def _with_set_up(
         del channel, settled, explained  # their columns fill as much memory as the next ones will
 
 
-def _settle(channel: CircleChannel, progress: Callable[[str], None]) -> SettledCircles:
+class _Settling:
     """Compare; lay out likely causes at their best values and compare again; fit jointly; until nothing changes.
 
     The most probable hypothesis and its rivals are laid out with tangents and slack before anything is added to them: what
     a grid or a formula leaves of a large effect would call for causes that are not there.
     """
-    unmodelled = Unmodelled(channel)
-    fit, noise_mm, scatter = channel.calibration, misfit_of(channel.calibration).noise, 1.0
-    unmodelled.look(fit, (), noise_mm)
-    fitted: frozenset[tuple[str, str]] = frozenset()
-    laid_out: set[tuple[str, str]] = set()
-    tried: set[frozenset[tuple[str, str]]] = set()
-    seeds: dict[frozenset[str], tuple[Member, ...]] = {}
-    refused: dict[str, str] = {}
-    given_up: set[tuple[str, str]] = set()
-    likely = CLOSE  # the most probable set alone is wanted, until nothing changes
-    for left in reversed(range(MOST_ROUNDS)):
+
+    def __init__(self, channel: CircleChannel, progress: Callable[[str], None]) -> None:
+        self._channel, self._progress = channel, progress
+        self._unmodelled = Unmodelled(channel)
+        self._fit, self._noise_mm, self._scatter = channel.calibration, misfit_of(channel.calibration).noise, 1.0
+        self._fitted: frozenset[tuple[str, str]] = frozenset()
+        self._laid_out: set[tuple[str, str]] = set()
+        self._tried: set[frozenset[tuple[str, str]]] = set()
+        self._seeds: dict[frozenset[str], tuple[Member, ...]] = {}
+        self._refused: dict[str, str] = {}
+        self._given_up: set[tuple[str, str]] = set()
+        self._likely = CLOSE  # the most probable set alone is wanted, until nothing changes
+
+    def run(self) -> SettledCircles:
+        """Rounds until nothing changes; who interrupts them gets what the last one came to.
+
+        Raises:
+            KeyboardInterrupt: in the first round.
+        """
+        self._unmodelled.look(self._fit, (), self._noise_mm)
+        stopped, settled = False, self._compared()
+        try:
+            for left in reversed(range(MOST_ROUNDS - 1)):
+                if self._is_done(settled):
+                    break
+                self._likely = self._likely if left else LIKELY
+                settled = self._compared()
+        except KeyboardInterrupt:
+            # Columns that the round before had may have been given back: about the last fit the sets are compared once more.
+            stopped, settled = True, self._compared()
+        return replace(_fitted_as_named(self._channel, settled), stopped=stopped)
+
+    def _compared(self) -> SettledCircles:
+        """Compare sets of causes about the last fit."""
+        channel, unmodelled = self._channel, self._unmodelled
         channel.give_back()
-        target = channel.target(fit)
-        noise = channel.noise(target, unmodelled.causes, noise_mm)
-        noise_mm = float(np.sqrt(noise.power[0]))
-        beside = channel.beside_base(noise_mm, scatter)
-        comparison = beside.comparison(target)
-        causes = _listed(channel, unmodelled, comparison, refused, given_up)
-        likely = likely if left else LIKELY
-        posterior = search(comparison, causes, seeds.values(), most_members=MOST_MEMBERS, likely=likely)
-        best = _steady(posterior, fitted)
-        seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[:SEEDS])}
-        settled = SettledCircles(
-            fit,
+        target = channel.target(self._fit)
+        noise = channel.noise(target, unmodelled.causes, self._noise_mm)
+        self._noise_mm = float(np.sqrt(noise.power[0]))
+        self._beside = channel.beside_base(self._noise_mm, self._scatter)
+        comparison = self._beside.comparison(target)
+        causes = _listed(channel, unmodelled, comparison, self._refused, self._given_up)
+        posterior = search(comparison, causes, self._seeds.values(), most_members=MOST_MEMBERS, likely=self._likely)
+        best = _steady(posterior, self._fitted)
+        self._seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[:SEEDS])}
+        return SettledCircles(
+            self._fit,
             posterior,
             best,
             comparison,
             causes,
             unmodelled,
             noise,
-            misfit_of(fit, noise),
-            refused,
-            scatter=scatter,
+            misfit_of(self._fit, noise),
+            self._refused,
+            scatter=self._scatter,
         )
-        usual = _usual_scatter(fit) if any(m.cause.setup for m in best.members) else scatter
-        rough = [(m, r) for m, r in _with_rivals(settled) if (r.cause.name, r.variant.law) not in laid_out]
-        for member, rival in rough:
-            laid_out.add((rival.cause.name, rival.variant.law))
-            _lay_out(channel, beside, best, member, rival, fit, target)
+
+    def _is_done(self, settled: SettledCircles) -> bool:
+        """Lay out, widen or fit what a comparison calls for; True where it calls for nothing."""
+        if self._is_laid_out_better(settled):
+            return False
         named = frozenset((m.cause.name, m.variant.law) for m in settled.members)
-        if rough or usual > scatter:
-            scatter = max(usual, scatter)
-            continue
-        if named == fitted or named in tried:
-            if likely == LIKELY:
-                break
-            likely = LIKELY
-            continue
-        tried.add(named)
-        progress("joint fit with " + (", ".join(sorted(name for name, _ in named)) or "nothing more"))
-        joint = _joint(channel, comparison, best)
+        if named == self._fitted or named in self._tried:
+            done, self._likely = self._likely == LIKELY, LIKELY
+            return done
+        self._tried.add(named)
+        self._progress("joint fit with " + (", ".join(sorted(name for name, _ in named)) or "nothing more"))
+        joint = _joint(self._channel, settled.comparison, settled.best)
         if joint is None:
-            break
-        impossible, idle = _negative(joint, channel), _idle_laws(joint, channel)
+            return True
+        impossible, idle = _negative(joint, self._channel), _idle_laws(joint, self._channel)
         if impossible or idle:
-            refused |= impossible
-            given_up |= idle
-            continue
-        if not fitted:
-            unmodelled.look(joint, settled.members, noise_mm)
-        fit, fitted = joint, named
-        _refine(channel, fit, named)
-    return _fitted_as_named(channel, settled)
+            self._refused |= impossible
+            self._given_up |= idle
+            return False
+        if not self._fitted:
+            self._unmodelled.look(joint, settled.members, self._noise_mm)
+        self._fit, self._fitted = joint, named
+        _refine(self._channel, joint, named)
+        return False
+
+    def _is_laid_out_better(self, settled: SettledCircles) -> bool:
+        """Lay out members and their rivals that were not yet, and let balls scatter as they do; False where nothing is to be done."""
+        usual = _usual_scatter(self._fit) if any(m.cause.setup for m in settled.best.members) else self._scatter
+        rough = [(m, r) for m, r in _with_rivals(settled) if (r.cause.name, r.variant.law) not in self._laid_out]
+        if rough:
+            target = self._channel.target(self._fit)
+            for member, rival in rough:
+                self._laid_out.add((rival.cause.name, rival.variant.law))
+                _lay_out(self._channel, self._beside, settled.best, member, rival, self._fit, target)
+        wider = usual > self._scatter
+        self._scatter = max(usual, self._scatter)
+        return bool(rough) or wider
 
 
 def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:

@@ -37,6 +37,7 @@ class SettledCircles:
         left: misfit of the joint fit.
         refused: causes that cannot be what these recordings show, and why.
         scatter: how many times as much as stated balls scatter.
+        stopped: somebody interrupted the comparison; this is what it had come to.
     """
 
     after: Calibration
@@ -49,6 +50,7 @@ class SettledCircles:
     left: Misfit
     refused: Mapping[str, str] = field(default_factory=dict)
     scatter: float = 1.0
+    stopped: bool = False
 
     def second_start_agrees(self) -> bool:
         """Whether a search that begins with nothing, about the same fit, comes to the same most probable set of causes."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.held_out import HeldOut
+    from dbbstation.inference.limit_reached import LimitReached
 
 __all__ = [
     "Curve",
@@ -227,9 +228,10 @@ class Diagnosis:
         outliers: balls and runs that do not belong, kept from pulling the fits.
         workspace: how far the earlier calibration was off elsewhere; None where nothing was found.
         locations: largest share first.
-        second_start_agrees: a second search came to the same set of causes; None where the comparison ended at its limit.
+        second_start_agrees: a second search came to the same set of causes; None where somebody stopped the comparison.
         next_tests: best first, each beside those before it; empty where nothing is to be asked.
         cancelling: effects of named causes on the readings that cancel each other [mm]; None where none do.
+        limits: what ended at a limit: the search, parameters, the joint fit.
     """
 
     mismatch: bool
@@ -248,3 +250,4 @@ class Diagnosis:
     second_start_agrees: bool | None
     next_tests: tuple[NextTest, ...]
     cancelling: Cancelling | None = None
+    limits: tuple[LimitReached, ...] = ()

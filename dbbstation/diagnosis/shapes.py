@@ -12,7 +12,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dbbstation.inference.forms import Behind, Form, LinearSplines, Lobes, Plane, Proportional, SignForm, Spring, Walk, Wave
+from dbbstation.inference.forms import (
+    Behind,
+    Form,
+    LinearSplines,
+    Lobes,
+    Plane,
+    Proportional,
+    SignForm,
+    Spring,
+    Walk,
+    Wave,
+)
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
 from dbbstation.sources.contract import Effect

@@ -12,6 +12,7 @@ from dbbstation.calibration.outliers.outlier import Outlier
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.limit_reached import LimitReached
 from dbbstation.inference.verdict import Gains
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.effects import CauseContribution
@@ -235,6 +236,7 @@ class DiagnosisFigures(Framed):
         cancelling: cancelling effects of named causes; None without any.
         second_start_agrees: whether a second search agrees; None without one.
         next_test: None: no proposal.
+        limits: search, parameters and joint fit that ended at a limit.
     """
 
     mismatch: bool
@@ -257,6 +259,7 @@ class DiagnosisFigures(Framed):
     second_start_agrees: bool | None
     next_test: ProposedTest | None
     further_tests: tuple[ProposedTest, ...]
+    limits: tuple[LimitReached, ...] = ()
 
     @property
     def identified(self) -> tuple[CauseResult, ...]:

@@ -73,6 +73,7 @@ class DiagnosisAnswer:
     sources: tuple[CauseAnswer, ...]
     unexplained: TextAnswer
     next_test: TextAnswer | None
+    limits: tuple[TextAnswer, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,7 @@ def _diagnosed(answer: DiagnosisAnswer) -> Iterator[str]:
         if names:
             yield texts.CAUSES.format(verdict=words, names=", ".join(names))
     yield answer.unexplained.text
+    yield from (limit.text for limit in answer.limits)
     if answer.next_test is not None:
         yield texts.MEASURE_NEXT.format(text=answer.next_test.text)
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis import explain
 from dbbstation.diagnosis.channel import CircleChannel
+from dbbstation.diagnosis.limits import limits_of_fit
 from dbbstation.diagnosis.shapes import ranges, samples_of, shapes
 from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.inference.hypotheses import search
@@ -63,9 +66,10 @@ def test_a_bar_that_wanders_is_a_wander_and_no_cause(tmp_path, candidates):
 )
 def test_what_is_certain_is_said_whatever_ends_at_a_limit(recordings, monkeypatch, session, cause, law, values):
     """Sessions of another program: values put in as its README states them, and no round of the comparison ends with less."""
-    rounds = []
+    rounds, told = [], []
 
     def recorded(comparison, causes, seeds=(), **options):
+        told.append({cause.name for cause in causes})
         rounds.append((comparison, search(comparison, causes, seeds, **options)))
         return rounds[-1][1]
 
@@ -77,6 +81,11 @@ def test_what_is_certain_is_said_whatever_ends_at_a_limit(recordings, monkeypatc
     assert law in {term.source.law for term in found.after.layout.terms}
     named = [{m.cause.name for m in posterior.best.members if m.cause.named} for _, posterior in rounds]
     assert all(cause in names for names in named)
+    for k, (_, posterior) in enumerate(rounds):
+        # What a round before had is looked at again on the target of this one: the best of it is no less probable.
+        for _, before in rounds[:k]:
+            listed = frozenset(before.best.names & told[k])
+            assert posterior.weights[listed] <= posterior.best.log_posterior + 1e-9
     assert found.held_out[1].rms < found.held_out[0].rms
     if values is None:
         assert 1e3 * found.held_out[1].rms <= 2.6
@@ -140,3 +149,75 @@ def test_a_curve_that_all_struts_follow_has_the_points_of_one_variable(tmp_path)
         assert points[-1] == pytest.approx(max(values.max() for values in every))
         # One at its own point and zero at the others.
         assert shape.form.columns(points) == pytest.approx(np.eye(len(points)))
+
+
+@pytest.fixture(scope="module")
+def backlash(tmp_path_factory):
+    """A session with hard backlash of 4 µm in all struts."""
+    folder = tmp_path_factory.mktemp("limits") / "s"
+    record(folder, seed=3, mechanisms=[KINEMATICS, Backlash((4.0,) * 6)], rate_hz=5.0)
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("at", [2, 3])
+def test_who_interrupts_the_comparison_gets_what_it_had_found(backlash, monkeypatch, at):
+    """Ctrl-C in a joint fit, or in the round behind it: the cause with its values, and that somebody stopped it."""
+    count = 0
+
+    def interrupted(comparison, causes, seeds=(), **options):
+        nonlocal count
+        count += 1
+        if count == at:
+            raise KeyboardInterrupt
+        return search(comparison, causes, seeds, **options)
+
+    monkeypatch.setattr(explain, "search", interrupted)
+    found = diagnose_sessions([backlash], None, (), lambda _: None).diagnosis
+    assert found.limits[0].what == "stopped"
+    assert found.chosen_anew is None
+    (best,) = [source for source in found.sources if source.name == "backlash"]
+    assert best.probability > 0.95
+    for strut in range(1, 7):
+        one = best.parameters[f"strut_{strut}_um"]
+        assert abs(one.value - 4.0) <= 3.0 * one.uncertainty
+
+
+@pytest.mark.slow
+def test_who_interrupts_before_anything_is_found_gets_nothing(backlash, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(explain, "search", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        diagnose_sessions([backlash], None, (), lambda _: None)
+
+
+@pytest.mark.slow
+def test_a_search_at_its_limit_says_what_its_sets_leave(backlash, monkeypatch):
+    """No set may have a member: the search says so, with size and place of what is left."""
+    monkeypatch.setattr(explain, "MOST_MEMBERS", 0)
+    found = diagnose_sessions([backlash], None, (), lambda _: None).diagnosis
+    (limit,) = found.limits
+    assert limit.what == "search"
+    assert f"{1e3 * found.left.rms:.2g} µm rms" in limit.text
+    assert "µm rms" in limit.text.partition("beyond noise. ")[2]
+
+
+def test_a_parameter_at_an_end_and_a_fit_that_moves_are_said(tmp_path):
+    """Hard play fitted by a wind-up: its length ends at the least that there is."""
+    record(tmp_path / "s", seed=3, mechanisms=[KINEMATICS, Backlash((4.0,) * 6)], rate_hz=5.0)
+    recorded = load_sessions([tmp_path / "s"])
+    law = next(other for other in sources_named(["backlash"])[0].other_laws() if other.law == "wind-up")
+    start = {"backlash": np.array([4.0] * 6 + [0.01])}
+    fit = calibrate(recorded.machine, recorded.observations, [*default_sources(), law], start, amplitudes_within=3.0)
+    column = int(fit.layout.columns_of("backlash")[1][0])
+    low, high = law.parameters(recorded.machine)[-1].limits
+    assert limits_of_fit(fit) == ()
+    for value, end in ((low, "lower"), (high, "upper")):
+        x = fit.x.copy()
+        x[column] = value
+        (at_end, moves) = limits_of_fit(replace(fit, x=x, at_limit=(column,), settled=False))
+        assert (at_end.what, at_end.name) == ("parameter", "backlash wind_up_length_mm")
+        assert f"{end} end of its range, {value:.4g} mm" in at_end.text
+        assert moves.what == "fit"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.inference.forms import Walk
+from dbbstation.inference.forms import Behind, Walk
 
 
 def test_a_walk_has_the_covariance_of_a_random_walk():
@@ -13,3 +13,13 @@ def test_a_walk_has_the_covariance_of_a_random_walk():
     at = np.array([0.0, 3.0, 4.0, 10.0])
     columns = Walk(at, 2.0).columns(at)
     assert columns @ columns.T == pytest.approx(np.minimum.outer(at, at) / 2.0)
+
+
+def test_what_stays_behind_is_against_the_new_direction_and_ends(rng):
+    """One amplitude at each point, straight between them, nothing at the turn and behind the end; odd in the direction."""
+    form, heights = Behind(10.0), rng.normal(size=4)
+    way = np.linspace(0.01, 15.0, 400)
+    expected = np.interp(way, [0.0, 2.0, 4.0, 6.0, 8.0, 10.0], [0.0, *heights, 0.0], right=0.0)
+    assert form.columns(way) @ heights == pytest.approx(-expected)
+    assert form.columns(-way) @ heights == pytest.approx(expected)
+    assert not form.columns(np.zeros(1)).any()

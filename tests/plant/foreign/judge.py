@@ -44,13 +44,16 @@ def judge(folder: Path, checkout: Path, commit: str, session: str) -> dict[str, 
         text, error = said.read().decode(), complained.read().decode()
     if child.returncode < 0 or (not text.strip() and error.startswith(INTERRUPTED)):
         sys.exit(f"{session}: diagnose was interrupted ({child.returncode}); run the same command to go on")
+    summary = json.loads(text) if text.strip() else {}
+    if any(limit["what"] == "stopped" for limit in summary.get("limits", ())):
+        sys.exit(f"{session}: somebody stopped the comparison; run the same command to go on")
     verdict = {
         "session": session,
         "commit": commit,
         "processor_s": used.ru_utime + used.ru_stime,
         "memory_mb": used.ru_maxrss / KIB_PER_MB,
         "exit_code": child.returncode,
-        **({"summary": json.loads(text)} if text.strip() else {"error": error[-2000:]}),
+        **({"summary": summary} if summary else {"error": error[-2000:]}),
     }
     kept.parent.mkdir(parents=True, exist_ok=True)
     part = kept.with_suffix(".part")

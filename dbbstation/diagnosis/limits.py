@@ -1,0 +1,55 @@
+"""What ended at a limit: a search, a parameter, a joint fit, or the patience of whoever waits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.checks.missing_physics import remainder_of
+from dbbstation.diagnosis.explained import MOST_MEMBERS
+from dbbstation.diagnosis.left_where import where_left
+from dbbstation.inference.limit_reached import LimitReached
+
+if TYPE_CHECKING:
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.diagnosis.explained import SettledCircles
+
+
+def limits_of(settled: SettledCircles) -> tuple[LimitReached, ...]:
+    """What ended at a limit on the way to a most probable set and its joint fit, the search first."""
+    found = []
+    if settled.stopped:
+        found.append(
+            LimitReached("stopped", "", "Somebody stopped the comparison. This is the best that it had found.")
+        )
+    if settled.posterior.at_limit:
+        _, where = where_left(settled.after.observations, remainder_of(settled.after, settled.noise))
+        text = (
+            f"The search ended at sets of {MOST_MEMBERS} causes, and a larger set is more probable. What is named stays. "
+            f"The named causes leave {1e3 * settled.left.rms:.2g} µm rms beyond noise. {where}"
+        )
+        found.append(LimitReached("search", "", text))
+    return (*found, *limits_of_fit(settled.after))
+
+
+def limits_of_fit(fit: Calibration) -> tuple[LimitReached, ...]:
+    """Parameters that a fit holds at an end of their range, and whether its last step still moved."""
+    found = [_at_end(fit, column) for column in fit.at_limit]
+    if not fit.settled:
+        text = "The joint fit still moved at its last step. Values and uncertainties are those of that step."
+        found.append(LimitReached("fit", "", text))
+    return tuple(found)
+
+
+def _at_end(fit: Calibration, column: int) -> LimitReached:
+    """A parameter that a fit holds at an end of its range."""
+    term = next(one for one in fit.layout.terms if one.columns.start <= column < one.columns.stop)
+    parameter = term.parameters[column - term.columns.start]
+    value = float(fit.x[column])
+    end = "lower" if value <= float(np.mean(parameter.limits)) else "upper"
+    text = (
+        f"{term.source.name}: {parameter.name} is at the {end} end of its range, {value:.4g} {parameter.unit}. "
+        "The true value may lie beyond it."
+    )
+    return LimitReached("parameter", f"{term.source.name} {parameter.name}", text)

@@ -341,7 +341,7 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
         if values is not None
     }
     every = [*default_sources(), *(channel.source_of(m.cause.name, m.variant) for m in members)]
-    for within, must_settle in ((None, True), (GRID, True), (GRID, False)):
+    for within in (None, GRID):
         # A shape that these runs hardly see, such as a decay shorter than their samples, runs away with its amplitude.
         try:
             return calibrate(
@@ -351,7 +351,7 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
                 start,
                 shapes_within=within,
                 amplitudes_within=float(SCALES[-1]),
-                must_settle=must_settle,
+                must_settle=within is None,
             )
         except (CalibrationError, KinematicsError):
             continue

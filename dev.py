@@ -33,6 +33,7 @@ VERSIONS = ((3, 11), (3, 13))
 CHECKS = (
     ("format", ["ruff", "format", "--check", "."]),
     ("lint", ["ruff", "check", "."]),
+    ("encodings", ["ruff", "check", "--preview", "--select", "PLW1514", "."]),
     ("types", ["mypy"]),
     ("walls", ["lint-imports"]),
     ("docs", ["sphinx-build", "-q", "-W", "-b", "html", "docs", "docs/_build"]),

@@ -12,14 +12,21 @@ _REMEDIES = {
     errno.EACCES: "check the permissions of file and folder",
     errno.EPERM: "check the permissions of file and folder",
     errno.EMFILE: "close other programs: too many files are open",
+    errno.ENAMETOOLONG: "shorten the name",
     errno.ENFILE: "close other programs: too many files are open",
 }
 
 _OTHERWISE = "check that the folder exists, its permissions and the disk"
 
 
+LONGEST_ON_WINDOWS = 259
+"""Characters of a path, unless Windows is told otherwise (Microsoft, "Maximum Path Length Limitation")."""
+
+
 def refusal(error: OSError) -> tuple[str, str]:
     """Return a reason, such as `no space left on device`, and a remedy."""
+    if hasattr(error, "winerror") and len(str(error.filename or "")) > LONGEST_ON_WINDOWS:
+        return "the path is too long for Windows", "shorten it, or set LongPathsEnabled in the registry of Windows"
     return (error.strerror or str(error)).lower(), _REMEDIES.get(error.errno or 0, _OTHERWISE)
 
 

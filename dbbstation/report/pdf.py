@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from dbbstation.errors import StationError
-from dbbstation.system.children import BoundExceededError, Bounds, is_root, run_bounded
+from dbbstation.system.children import BoundExceededError, ProgramBounds, is_root, run_bounded
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 """Names under which a Chromium is installed, on the PATH."""
@@ -16,7 +16,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 BROWSER_VARIABLE = "DBBSTATION_CHROMIUM"
 """Environment variable that names one elsewhere."""
 
-BOUNDS = Bounds(time_s=120.0, memory_mb=8000.0, output_mb=1000.0)
+BOUNDS = ProgramBounds(time_s=120.0, memory_mb=8000.0, output_mb=1000.0)
 """A report of a hundred runs prints in seconds; a browser that takes longer waits for something that does not come."""
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from dbbstation.diagnosis.simulator.ports import SimulationFault
 from dbbstation.files.gateway import content_of
 from dbbstation.simulators.exchanged import ExchangedSimulator
-from dbbstation.system.children import BoundExceededError, Bounds, run_bounded
+from dbbstation.system.children import BoundExceededError, ProgramBounds, run_bounded
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -80,7 +80,7 @@ class ProgramSimulator(ExchangedSimulator):
     def _run(self, folder: Path) -> None:
         said = f"`{self.said}`"
         try:
-            done = run_bounded(self._command, folder, Bounds(self._limit_s, MOST_MEMORY_MB, MOST_OUTPUT_MB))
+            done = run_bounded(self._command, folder, ProgramBounds(self._limit_s, MOST_MEMORY_MB, MOST_OUTPUT_MB))
         except BoundExceededError as error:
             remedy = "; raise `time_limit_s`" if error.of_time else ""
             raise SimulationFault(f"{said} {error}{remedy}") from None

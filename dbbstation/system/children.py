@@ -37,7 +37,7 @@ _PATIENCE_S = 5.0
 
 
 @dataclass(frozen=True)
-class Bounds:
+class ProgramBounds:
     """What a program and all that it starts may use.
 
     Attributes:
@@ -82,7 +82,7 @@ def python_module(name: str, *words: str) -> list[str]:
     return [sys.executable, "-P", "-m", name, *words]
 
 
-def run_bounded(command: Sequence[str], folder: Path, bounds: Bounds) -> Ended:
+def run_bounded(command: Sequence[str], folder: Path, bounds: ProgramBounds) -> Ended:
     """Run a program to its end.
 
     Args:
@@ -107,7 +107,7 @@ def run_bounded(command: Sequence[str], folder: Path, bounds: Bounds) -> Ended:
     return Ended(process.returncode, outputs[-1].tail.decode("utf-8", "replace"))
 
 
-def _watch(process: subprocess.Popen[bytes], folder: Path, bounds: Bounds, outputs: Sequence[_Output]) -> None:
+def _watch(process: subprocess.Popen[bytes], folder: Path, bounds: ProgramBounds, outputs: Sequence[_Output]) -> None:
     """Wait for the end.
 
     Raises:

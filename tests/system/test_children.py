@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from dbbstation.system.children import BoundExceededError, Bounds, python_module, run_bounded
+from dbbstation.system.children import BoundExceededError, ProgramBounds, python_module, run_bounded
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-WIDE = Bounds(time_s=60.0, memory_mb=2000.0, output_mb=50.0)
+WIDE = ProgramBounds(time_s=60.0, memory_mb=2000.0, output_mb=50.0)
 PATIENCE_S = 20.0
 
 
-def run(script: str, folder: Path, bounds: Bounds = WIDE):
+def run(script: str, folder: Path, bounds: ProgramBounds = WIDE):
     return run_bounded([sys.executable, "-c", script], folder, bounds)
 
 
@@ -40,7 +40,7 @@ Path("pid").write_text(str(inner.pid))
 
 @pytest.mark.parametrize("then", ["import time; time.sleep(600)", "sys.exit(0)", "raise SystemExit(1)"])
 def test_what_a_program_started_ends_with_it(tmp_path, then):
-    bounds = Bounds(time_s=1.0, memory_mb=2000.0, output_mb=50.0)
+    bounds = ProgramBounds(time_s=1.0, memory_mb=2000.0, output_mb=50.0)
     if "600" in then:
         with pytest.raises(BoundExceededError, match="takes longer than 1 s") as refused:
             run(GRANDCHILD + then, tmp_path, bounds)
@@ -70,7 +70,7 @@ def test_what_a_program_started_ends_with_it(tmp_path, then):
 def test_each_bound_ends_a_program(tmp_path, script, bounds, what):
     begun = psutil.Process().memory_info().rss
     with pytest.raises(BoundExceededError, match=what) as refused:
-        run(script, tmp_path, Bounds(**{"time_s": 60.0, "memory_mb": 2000.0, "output_mb": 50.0, **bounds}))
+        run(script, tmp_path, ProgramBounds(**{"time_s": 60.0, "memory_mb": 2000.0, "output_mb": 50.0, **bounds}))
     assert not refused.value.of_time
     assert psutil.Process().memory_info().rss - begun < 50e6
 

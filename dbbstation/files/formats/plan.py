@@ -25,6 +25,7 @@ from dbbstation.files.yaml.schema import Schema, dotted, read_document, validate
 from dbbstation.files.yaml.text import YamlDocument
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.plan import LARGEST_LOSS_PERCENT, Ball, Plan, PlannedTest, Plate
+from dbbstation.system.names import is_device
 
 NO_PLATE = JigSchema(bores={}, origin_in_machine_mm=(0.0, 0.0, 0.0))
 """A plan that puts all its balls up under the spindle needs no plate: places are in the machine frame."""
@@ -273,6 +274,7 @@ def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem])
     for index in twice(names):
         location = (*tests[index][0], "name")
         faults.append(document.problem(location, f"the test name `{names[index]}` stands here a second time", "rename"))
+    _check_file_names(document, names, faults)
     for location, test in tests:
         ball = test.get("ball")
         if isinstance(ball, str) and ball not in balls:
@@ -286,6 +288,21 @@ def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem])
             what = f"repeat_at_end: there is no test `{name}`"
             faults.append(document.problem(("repeat_at_end", index), what, "name tests of this plan"))
     _check_tilt_unit(document, faults)
+
+
+def _check_file_names(document: YamlDocument, names: list[Any], faults: list[Problem]) -> None:
+    """Refuse names of tests that cannot all be files on Windows: runs and programs are called after them."""
+    seen: dict[str, str] = {}
+    for (location, _), name in zip(document.entries("tests"), names, strict=True):
+        if not isinstance(name, str):
+            continue
+        other = seen.setdefault(name.lower(), name)
+        if other != name:
+            what = f"the test names `{other}` and `{name}` differ in case alone: Windows takes their files for one"
+            faults.append(document.problem((*location, "name"), what, "rename one"))
+        if is_device(name):
+            what = f"the test name `{name}` is a device on Windows, no file can be called so"
+            faults.append(document.problem((*location, "name"), what, "rename"))
 
 
 def _check_under_spindle(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) -> None:

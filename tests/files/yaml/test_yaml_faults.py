@@ -126,6 +126,8 @@ def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
             "tests[1]: the ball `3-lang` is not in `balls`; known: 3-long, 8-long-on-riser, 9-s",
         ),
         ("name: side", "name: low", "the test name `low` stands here a second time"),
+        ("name: side", "name: LOW", "the test names `low` and `LOW` differ in case alone: Windows takes their files"),
+        ("name: side", "name: Com1.a", "the test name `Com1.a` is a device on Windows, no file can be called so"),
         ("b_deg: -15", "b_deg: -15, elevation_deg: 0.0873", "tests[1].elevation_deg: 0.0873 deg is not plausible"),
         ("1: [0, 100]", "1: [0, 100, 0]", "jig.bores[1]: 2 values were expected, not 3"),
     ],

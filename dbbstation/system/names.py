@@ -1,0 +1,11 @@
+"""Names of files that every system takes."""
+
+from __future__ import annotations
+
+DEVICES = frozenset({"con", "prn", "aux", "nul", *(f"{kind}{n}" for kind in ("com", "lpt") for n in range(1, 10))})
+"""Windows reserves these before the first point of a name, in any case (Microsoft, "Naming Files, Paths, and Namespaces")."""
+
+
+def is_device(name: str) -> bool:
+    """Whether Windows takes a name for a device."""
+    return name.partition(".")[0].lower() in DEVICES

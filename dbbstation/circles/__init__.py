@@ -1,1 +1,1 @@
-"""Figures of measured circles without a model, after ISO 230-4, each with its uncertainty. Pure mathematics."""
+"""Figures of measured circles after ISO 230-4, with uncertainties, without a model."""

@@ -1,4 +1,4 @@
-"""All figures of one circle, and of both directions of one, after ISO 230-4."""
+"""All figures of one circle, or of both directions, after ISO 230-4."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Deviations:
     """Greatest and least radial deviation from the nominal radius.
 
     Attributes:
-        largest_um: Fmax, outwards positive [µm].
+        largest_um: Fmax, outwards positive.
     """
 
     largest_um: float
@@ -48,18 +48,18 @@ class CircleAnalysis:
     """One circle in one direction.
 
     Attributes:
-        chosen: filter of G, F and H.
-        g_um: circular deviation G, minimum zone [µm].
-        centre_mm: of the least-squares circle less the commanded one, X and Y [mm].
-        radius_error_um: radius of the least-squares circle less the nominal one [µm].
-        mean_radial_error_um: mean reading less nominal length of the bar [CAL Table III] [µm].
-        steps: at the reversals of X and Y that can be seen.
+        chosen: of G, F and H.
+        g_um: circular deviation G, minimum zone.
+        centre_mm: least-squares less commanded, X and Y.
+        radius_error_um: least-squares less nominal radius.
+        mean_radial_error_um: mean reading less nominal bar length [CAL Table III].
+        steps: at visible reversals of X and Y.
         harmonics: 2 to 10 undulations per revolution.
-        closure: end of the turn less its beginning; None where too few samples lie there.
-        passes: of the overlap; None where there is none.
-        feed_mm_min: feed that the overlap shows and its standard uncertainty [mm/min]; None where it shows none.
-        lost: samples that are missing in the recording.
-        residual_um: deviations from the least-squares circle, not filtered, in time order, shape (n,) [µm].
+        closure: end less begin of the turn; None for too few samples.
+        passes: None without overlap.
+        feed_mm_min: by the overlap, with standard uncertainty; or None.
+        lost: missing samples.
+        residual_um: from the least-squares circle, unfiltered, in time order, shape (n,).
     """
 
     raw: RawCircle
@@ -87,9 +87,8 @@ def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter =
     """Work out all figures of a circle.
 
     Args:
-        raw: the turn as measured.
-        recording: that it was cut from, for feed, overlap and lost samples; None where there is nothing but the turn.
-        chosen: filter of G, F and H; centre, radius, steps, harmonics, closure and noise are of the readings as they are.
+        recording: for feed, overlap and losses; None: the turn alone.
+        chosen: of G, F and H; other figures are unfiltered.
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -145,7 +144,7 @@ def refiltered(one: CircleAnalysis, chosen: Filter) -> CircleAnalysis:
 
 
 def _without_drift(raw: RawCircle, residual_um: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Deviations of a turn whose end meets its beginning: a step there would raise every line of the spectrum."""
+    """Return deviations without drift, whose step would raise the whole spectrum."""
     apart = closure_of(raw, residual_um, 0.0)
     return residual_um if apart is None else residual_um - apart.height_um * raw.phi_deg / FULL_TURN_DEG
 
@@ -155,10 +154,10 @@ def _extremes(deviation_um: NDArray[np.float64]) -> Deviations:
 
 
 def feed_shown(recording: Recording, circle: Circle, noise_mm: float = 0.0) -> tuple[float, float] | None:
-    """Return the feed that the overlap shows and its standard uncertainty [mm/min]; None where it shows none.
+    """Return the overlap's feed and standard uncertainty [mm/min], or None.
 
     Args:
-        noise_mm: of a sample, as slow figures see it [mm].
+        noise_mm: of a sample, for slow figures.
 
     Raises:
         TraceError: feed-in or feed-out is missing.
@@ -173,11 +172,10 @@ class PairAnalysis:
     """One circle in both directions, on one mounting.
 
     Attributes:
-        one: in the sense that was run first.
-        g_um: bi-directional circular deviation G(b), minimum zone of both paths [µm].
-        d_um: mean bi-directional radial deviation D: radius of the least-squares circle of both paths less the nominal radius
-            [µm].
-        h_um: circular hysteresis H: greatest radial difference between both paths at one angle [µm].
+        one: first in time.
+        g_um: bi-directional circular deviation G(b), minimum zone.
+        d_um: mean bi-directional radial deviation D: common least-squares less nominal radius.
+        h_um: circular hysteresis H: greatest radial difference at one angle.
     """
 
     one: CircleAnalysis

@@ -1,4 +1,4 @@
-"""What is known to be uncertain in the figures of a circle: one term per cause, and the causes that nobody stated."""
+"""Uncertainty budgets of circle figures: one term per cause, and unstated causes."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ NOT_STATED: tuple[str, ...] = (
 
 @dataclass(frozen=True)
 class SetUpKnowledge:
-    """What the session states of bar and ball; None where it does not.
+    """Stated facts of bar and ball; None if not stated.
 
     Attributes:
-        u_temperature_um: standard uncertainty of what the bar has grown by since, which readings were corrected by [µm].
-        not_absolute: why figures that rest on the bar's length have no uncertainty; empty where they have one.
-        u_ball_um: standard uncertainty of the ball's place in X and in Y, coordinate and mounting together [µm].
+        u_temperature_um: standard uncertainty of corrected growth.
+        not_absolute: why figures of bar length have no uncertainty; may be empty.
+        u_ball_um: standard uncertainty in X and Y, coordinate and mounting.
     """
 
     u_bar_um: float | None = None
@@ -63,11 +63,11 @@ class Budget:
     """Standard uncertainty of one figure.
 
     Attributes:
-        u_um: standard uncertainty; None where a cause of unknown size counts [µm].
-        terms_um: standard uncertainty by cause, as far as it is known [µm].
-        missing: causes that count for it and that nobody stated.
-        why_not: why it has no uncertainty; empty where it has one.
-        value_um: the figure, without what noise adds to it [µm].
+        u_um: standard uncertainty; None if a cause of unknown size counts.
+        terms_um: known standard uncertainties by cause.
+        missing: unstated causes.
+        why_not: may be empty.
+        value_um: without noise's contribution.
     """
 
     u_um: float | None
@@ -80,7 +80,7 @@ class Budget:
 
     @property
     def known_um(self) -> float:
-        """Root of the sum of squares of the terms that are known [µm]."""
+        """Return the root sum of squares of known terms [µm]."""
         return float(np.sqrt(sum(term**2 for term in self.terms_um.values())))
 
 
@@ -110,11 +110,7 @@ RANGES = (BudgetQuantity.G, BudgetQuantity.G_LS, BudgetQuantity.F_MAX, BudgetQua
 
 
 def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> Budget:
-    """Return the budget of a figure of one circle.
-
-    Args:
-        known: what the session states.
-    """
+    """Return the budget of a figure of one circle."""
     if quantity in RANGES:
         return _range(one, quantity, known)
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm  # a raised bar: 1 / cos e
@@ -143,7 +139,7 @@ def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowled
 
 
 def _why_not(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> str:
-    """Return why a figure has no uncertainty; empty where it has one."""
+    """Return why a figure has no uncertainty, or an empty text."""
     reasons = []
     if quantity in ABSOLUTE:
         reasons.append(known.not_absolute)
@@ -157,7 +153,7 @@ def _why_not(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledg
 
 
 def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> Budget:
-    """Budget of an extreme of the path, or of the difference of two."""
+    """Return the budget of an extreme, or of a difference of two."""
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
     terms = _of_extremes(one, 1 if quantity in ABSOLUTE else 2)
     missing = NOT_STATED
@@ -175,7 +171,7 @@ def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge)
 
 
 def _of_extremes(one: CircleAnalysis, extremes: int) -> dict[BudgetTerm, float]:
-    """Terms that one extreme of the path has, or the difference of two, whatever its noise."""
+    """Return terms of extremes beside noise."""
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
     root = float(np.sqrt(extremes))
     return {
@@ -201,7 +197,7 @@ OF_BOTH = (BudgetQuantity.G_BOTH, BudgetQuantity.G_BOTH_LS, BudgetQuantity.D, Bu
 def budgets(
     one: CircleAnalysis, known: SetUpKnowledge, quantities: Iterable[BudgetQuantity] = OF_ONE
 ) -> dict[BudgetQuantity, Budget]:
-    """Return the budgets of figures of a circle, all or some; arguments as of `budget_of`."""
+    """Return budgets of figures; arguments as of `budget_of`."""
     return {quantity: budget_of(one, quantity, known) for quantity in quantities}
 
 
@@ -210,7 +206,7 @@ def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[BudgetQuanti
     """Return the budgets of G(b), D and H of a circle in both directions on one mounting.
 
     Args:
-        known: what the session states; bar and ball are the same in both.
+        known: same bar and ball in both directions.
     """
     radius = [budget_of(one, BudgetQuantity.RADIUS, known) for one in (pair.one, pair.other)]
     noise = float(np.hypot(radius[0].terms_um[BudgetTerm.NOISE], radius[1].terms_um[BudgetTerm.NOISE])) / 2.0
@@ -254,7 +250,7 @@ class _Draft:
 
 
 def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, scale: float) -> _Draft:
-    """What bar and height of the ball do to lengths in the plane of the circle, or along the bar."""
+    """Return terms of bar and ball height for in-plane or bar lengths."""
     draft = _Draft()
     for cause, size in ((BudgetTerm.BAR, known.u_bar_um), (BudgetTerm.TEMPERATURE, known.u_temperature_um)):
         if size is None:
@@ -270,7 +266,7 @@ def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, scale: float) -> _
 
 
 def _closure_um(one: CircleAnalysis) -> float:
-    """Size of what drifted over the turn beyond noise: by the overlap where there is one, else by the ends of the turn [µm]."""
+    """Return the drift over the turn beyond noise, by overlap or ends [µm]."""
     if one.passes is not None:
         drift, u = one.passes.mean_um, one.passes.u_mean_um(one.noise.sigma_um)
     elif one.closure is not None:
@@ -281,7 +277,7 @@ def _closure_um(one: CircleAnalysis) -> float:
 
 
 def _slope_um_per_deg(pair: PairAnalysis) -> float:
-    """Root-mean-square slope of the paths along the turn, centre and undulations together [µm/deg]."""
+    """Return the paths' rms slope along the turn [µm/deg]."""
     squares = [
         (1e3 * float(np.hypot(*one.centre_mm))) ** 2 + sum((h.undulations * h.amplitude_um) ** 2 for h in one.harmonics)
         for one in (pair.one, pair.other)

@@ -1,9 +1,8 @@
-"""Noise of one turn at its low undulations, where form lies over it: as its spectrum above is continued by each memory that it may have.
+"""Noise of one turn at low undulations, continued from above by possible memories.
 
-Noise that remembers its neighbours for longer than six degrees of the turn shows the same slope above 30 undulations, whatever its
-memory. The lines below tell more: noise has no more power there than was read, and where many lines have just what a memory lets
-expect, they are noise. Each line is noise alone, or form of any size over it [a mixture of a spike and a slab; Mitchell and
-Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023].
+Noise that remembers more than six degrees has the same slope above 30 undulations. Lines below limit it: noise has at
+most their power, and many lines at the expected power are noise. Each line is noise, or form of any size [spike and slab;
+Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023].
 """
 
 from __future__ import annotations
@@ -44,11 +43,11 @@ FIRST_FORM = 2
 
 @dataclass(frozen=True, eq=False)
 class ContinuedNoise:
-    """Power of noise at lines 0, 1, ... low, by memory.
+    """Noise power at lines 0, 1, ... low, by memory.
 
     Attributes:
-        powers: of a line, shape (memories, low + 1) [µm²].
-        weights: of the memories, their sum one, shape (memories,).
+        powers: shape (memories, low + 1) [µm²].
+        weights: sum one, shape (memories,).
         freedoms: degrees of freedom of each, shape (memories,).
     """
 
@@ -58,19 +57,19 @@ class ContinuedNoise:
 
     @property
     def usual(self) -> NDArray[np.float64]:
-        """Geometric mean over the memories, shape (low + 1,) [µm²]."""
+        """Return the geometric mean over memories, shape (low + 1,) [µm²]."""
         return np.asarray(np.exp(self.weights @ np.log(self.powers)))
 
     @property
     def mean(self) -> NDArray[np.float64]:
-        """Mean over the memories, which is the variance that slow figures have, shape (low + 1,) [µm²]."""
+        """Return the mean over memories, the variance of slow figures, shape (low + 1,) [µm²]."""
         return np.asarray(self.weights @ self.powers)
 
     def drawn(self, rng: np.random.Generator, draws: int) -> NDArray[np.float64]:
-        """Draw powers that the noise may have, shape (draws, low + 1) [µm²].
+        """Return drawn powers, shape (draws, low + 1) [µm²].
 
-        Each draw has one memory, and a strength as a flat prior of its logarithm makes it [scaled inverse chi-square; Gelman et al.,
-        Bayesian Data Analysis, sec. 2.6].
+        Each draw has one memory and a strength of flat log prior [scaled inverse chi-square; Gelman et al., Bayesian Data
+        Analysis, sec. 2.6].
         """
         which = rng.choice(len(self.weights), draws, p=self.weights)
         strength = self.freedoms[which] / rng.chisquare(self.freedoms[which])
@@ -81,9 +80,9 @@ def continued_noise(below: NDArray[np.float64], above: NDArray[np.float64], free
     """Continue the noise of one turn.
 
     Args:
-        below: power at lines 0, 1, ... low, form included, shape (low + 1,) [µm²].
-        above: power of the noise at the lines above, shape (h,) [µm²].
-        freedom: degrees of freedom of each line.
+        below: power at lines 0, 1, ... low, with form, shape (low + 1,) [µm²].
+        above: noise power above, shape (h,) [µm²].
+        freedom: of each line.
     """
     low = len(below) - 1
     found = continuations(freedom * above, low, freedom, _processes)
@@ -101,9 +100,9 @@ def continued_noise(below: NDArray[np.float64], above: NDArray[np.float64], free
 
 
 def _processes(harmonic: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Power of memories and of power laws, shape (corners + exponents, h).
+    """Return the power of memories and power laws, shape (corners + exponents, h).
 
-    At lines 0 and 1, which make radius and centre, a power law has what the window of one turn sees of it, its slower part included.
+    At lines 0 and 1 a power law is seen through the window of one turn.
     """
     laws = np.maximum(harmonic, 1.0) ** -EXPONENTS[:, None]
     for line, power in enumerate(_THROUGH_A_TURN):
@@ -112,10 +111,10 @@ def _processes(harmonic: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _through_a_turn(line: int) -> NDArray[np.float64]:
-    """Power that laws f^-a from `SLOWEST` on have at a line, shape (exponents,).
+    """Return the power of laws f^-a from `SLOWEST` at a line, shape (exponents,).
 
-    It is the mean of both senses of rotation, each through sinc², the window of one turn [Priestley, Spectral Analysis and Time
-    Series, 1981, sec. 6.2].
+    Mean of both rotations, each through sinc², the window of one turn [Priestley, Spectral Analysis and Time Series,
+    1981, sec. 6.2].
     """
     cycles = np.concatenate([np.geomspace(SLOWEST, 0.3, 2001)[:-1], np.linspace(0.3, 30.0, 30001)])
     window = np.sinc(cycles - line) ** 2 + np.sinc(cycles + line) ** 2

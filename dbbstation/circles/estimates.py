@@ -1,4 +1,4 @@
-"""Figures of circles without what noise adds to them: G, F and H of one circle, G(b) and H of both directions."""
+"""Figures of circles without noise's contribution: G, F, H, G(b)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ CLEAR = 2.0
 
 
 def estimate_of(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate | None:
-    """Return G, G(LS), Fmax or Fmin of a circle; None where it has too few samples to separate noise from form."""
+    """Return G, G(LS), Fmax or Fmin; None for too few samples."""
     if not one.noise.known:
         return None
     found = _FOUND.setdefault(one, {})
@@ -69,11 +69,11 @@ def _estimate(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate:
 
 
 def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:
-    """Return the standard deviation of white noise, per sample, that would give a figure its uncertainty [µm].
+    """Return the white noise per sample of equal effect on a figure [µm].
 
     Args:
-        one: the circle. Of too few samples the noise is not known, and the rounding of the readings counts alone.
-        undulations: 0 of radius and mean, 1 of a centre.
+        one: with too few samples only rounding counts.
+        undulations: 0 for radius and mean, 1 for a centre.
     """
     if not one.noise.known:
         return one.noise.sigma_um
@@ -81,7 +81,7 @@ def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:
 
 
 def _apart(one: CircleAnalysis) -> FormAndNoise:
-    """Form and noise of the deviations from the least-squares circle, not filtered; worked out once."""
+    """Return form and noise of unfiltered deviations, cached."""
     if one not in _APART:
         _APART[one] = _taken_apart(one)
     return _APART[one]
@@ -103,10 +103,10 @@ OF_A_CIRCLE = 2
 
 
 def _drawn(one: CircleAnalysis, taken: int) -> tuple[NDArray[np.float64], DrawnPath]:
-    """Form by samples, shape (n,) [µm], and drawn noise of a circle: each direction has draws of its own, as both stand beside each other in a pair.
+    """Return a circle's form, shape (n,) [µm], and drawn noise, independent by direction.
 
     Args:
-        taken: lines of the noise, from 0, that were taken out of the deviations.
+        taken: noise lines from 0 that fits removed.
     """
     known = _DRAWN.setdefault(one, {})
     if taken not in known:
@@ -120,7 +120,7 @@ def _drawn(one: CircleAnalysis, taken: int) -> tuple[NDArray[np.float64], DrawnP
 
 
 def pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate | None:
-    """Return G(b), G(b)(LS) or H of both directions; None where one has too few samples to separate noise from form."""
+    """Return G(b), G(b)(LS) or H; None for too few samples."""
     if not (pair.one.noise.known and pair.other.noise.known):
         return None
     found = _OF_PAIRS.setdefault(pair, {})
@@ -155,7 +155,7 @@ def _filtered(form_um: NDArray[np.float64], chosen: Filter) -> NDArray[np.float6
 
 
 def _hysteresis(pair: PairAnalysis) -> Estimate:
-    """H by the difference of both paths: a series of its own, with a form and a noise of its own."""
+    """Return H by the paths' difference, a series with own form and noise."""
     paths = [path_of(one.raw) for one in (pair.one, pair.other)]
     theta_deg = np.sort(paths[0].theta_deg)
     radii = [np.interp(theta_deg, p.theta_deg, p.about_ball_mm, period=FULL_TURN_DEG) for p in paths]

@@ -1,12 +1,10 @@
-"""Ranges of noisy paths: what the path without its noise has, and how well that is known.
+"""Ranges of noisy paths without noise's contribution, with uncertainty.
 
-Noise widens a range. By how much depends on the form beside it: at a flat peak many samples compete for the extreme, at a sharp
-one few, and where there is no form all of them do. The range that was read is therefore held against what paths of the same form
-and of other sizes, with noise of the measured spectrum, would have shown (a parametric bootstrap [Efron and Tibshirani, An
-Introduction to the Bootstrap, ch. 12 to 14]). The size whose paths show, in the mean, what was read is the estimate; those whose
-paths show it at their 2.5th and 97.5th percentile are the ends of its interval [confidence interval by inversion of a test,
-Casella and Berger, Statistical Inference, 9.2.1]. A range is never below zero: where noise alone shows as much, the interval
-begins there.
+Noise widens a range by an amount that depends on the form. The measured range is compared with paths of this form at
+other sizes plus noise of the measured spectrum (parametric bootstrap [Efron and Tibshirani, An Introduction to the
+Bootstrap, ch. 12 to 14]). The size with this mean range is the estimate; sizes with it at the 2.5th and 97.5th percentile
+bound the interval [confidence interval by inversion of a test, Casella and Berger, Statistical Inference, 9.2.1], from
+zero if noise alone suffices.
 """
 
 from __future__ import annotations
@@ -58,7 +56,7 @@ class Estimate:
     """A figure without what noise adds to it.
 
     Attributes:
-        u_um: its standard uncertainty by noise: half-width of its 95 % interval over 1.96, of the longer side [µm].
+        u_um: standard uncertainty by noise: the longer half of the 95 % interval over 1.96.
     """
 
     value_um: float
@@ -68,16 +66,16 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class DrawnPath:
-    """One path and draws of its noise, sector by sector of the turn.
+    """One path with drawn noise by sectors.
 
     Attributes:
-        form_um: mean of the form in each sector, shape (s,) [µm].
-        highest_um: greatest noise in it, shape (draws, s) [µm].
-        lowest_um: least noise in it, shape (draws, s) [µm].
-        theta_deg: its middle, rising, shape (s,) [deg].
-        least: share of that which noise has where all of its spectrum is as low as at its end.
+        form_um: mean in each sector, shape (s,).
+        highest_um: greatest noise, shape (draws, s).
+        lowest_um: least noise, shape (draws, s).
+        theta_deg: of the sectors, rising, shape (s,).
+        least: noise's share if its whole spectrum were as low as its end.
         order: samples by angle, shape (m,).
-        starts: where each sector begins among them, shape (s,).
+        starts: of sectors among them, shape (s,).
     """
 
     form_um: NDArray[np.float64]
@@ -90,7 +88,7 @@ class DrawnPath:
     starts: NDArray[np.int64]
 
     def with_form(self, form_um: NDArray[np.float64]) -> DrawnPath:
-        """Return the same noise beside another form, of samples in time order, shape (n,) [µm]."""
+        """Return the noise with another form in time order, shape (n,) [µm]."""
         return replace(self, form_um=_means(form_um, self.order, self.starts))
 
 
@@ -100,9 +98,9 @@ def drawn_path(
     """Draw noise of a path.
 
     Args:
-        apart: form and noise of its deviations, in time order; the form filtered already.
-        theta_deg: angles of its samples, shape (n,) [deg].
-        passed: share of the noise's amplitude that the figure's filter lets pass, by line, shape (n // 2 + 1,).
+        apart: form, already filtered, and noise, in time order.
+        theta_deg: shape (n,).
+        passed: transmitted amplitude of noise by line, shape (n // 2 + 1,).
     """
     count = len(theta_deg)
     power = apart.power_um2 * passed**2
@@ -138,12 +136,12 @@ def drawn_path(
 
 
 def _means(values: NDArray[np.float64], order: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Means over sectors, shape (s,)."""
+    """Return sector means, shape (s,)."""
     return np.asarray(np.add.reduceat(values[order], starts) / np.diff(np.append(starts, len(order))))
 
 
 def _least_share(power_um2: NDArray[np.float64], passed: NDArray[np.float64]) -> float:
-    """Share of the noise that is left where no line has more power than the end of the spectrum, its upper third."""
+    """Return noise's share with no line above the spectrum's upper third."""
     end = float(np.mean(power_um2[-max(len(power_um2) // 3, 1) :]))
     whole = float(np.sum(power_um2 * passed**2))
     return float(np.sqrt(np.sum(np.minimum(power_um2, end) * passed**2) / whole)) if whole > 0.0 else 1.0
@@ -156,16 +154,14 @@ BLOCKS = 4
 
 
 def estimated(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> Estimate:
-    """Return a range without what noise adds to it.
+    """Return a range without noise's contribution.
 
-    One recording does not tell noise that remembers its neighbours from form that is short, such as the wave of a screw. Where its
-    spectrum is higher anywhere than at its end, the noise lies between that of the whole spectrum and that of its end. The figure is
-    worked out with both, and its interval holds both intervals.
+    One recording cannot separate correlated noise from short form. If the spectrum rises above its end, both the whole
+    spectrum and its end are used, and the interval covers both.
 
     Args:
-        paths: one, or both directions of a circle, with deviations from one circle.
-        statistic: of greatest and least deviations, shape (draws, s), at angles, shape (s,): a range that is as many times larger
-            as they are.
+        paths: one or both directions, from one circle.
+        statistic: of extremes, shape (draws, s), at angles, shape (s,); homogeneous of degree one.
     """
     if not max(path.sigma_um for path in paths) > 0.0:
         return Estimate(as_read_um, 0.0, as_read_um)
@@ -196,7 +192,7 @@ lines is lower by a twentieth."""
 
 @dataclass(frozen=True)
 class _Interval:
-    """Estimate, ends of the 95 % interval, and the least standard uncertainty [µm]."""
+    """Estimate, 95 % interval, and least standard uncertainty [µm]."""
 
     value: float
     low: float
@@ -205,7 +201,7 @@ class _Interval:
 
 
 def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> _Interval:
-    """Hold what was read against paths of several sizes with drawn noise; arguments as of `estimated`."""
+    """Compare the measured range with scaled paths; arguments as of `estimated`."""
     angles = np.unique(np.concatenate([path.theta_deg for path in paths]))
     forms = [_at(angles, path.theta_deg, path.form_um[None, :], np.nan)[0] for path in paths]
     highest = [_at(angles, path.theta_deg, path.highest_um, -np.inf) for path in paths]
@@ -247,7 +243,7 @@ def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
 def _at(
     angles: NDArray[np.float64], theta_deg: NDArray[np.float64], values: NDArray[np.float64], elsewhere: float
 ) -> NDArray[np.float64]:
-    """Values of a path at the angles of all paths, shape (draws, angles)."""
+    """Return a path's values at all paths' angles, shape (draws, angles)."""
     if len(angles) == len(theta_deg):
         return values
     spread = np.full((len(values), len(angles)), elsewhere)
@@ -258,26 +254,26 @@ def _at(
 def range_of(
     outer: NDArray[np.float64], inner: NDArray[np.float64], _theta_deg: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Greatest less least deviation, shape (draws,)."""
+    """Return the range, shape (draws,)."""
     return np.asarray(outer.max(axis=1) - inner.min(axis=1))
 
 
 def greatest_of(
     outer: NDArray[np.float64], _inner: NDArray[np.float64], _theta: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Greatest deviation outwards, shape (draws,)."""
+    """Return the greatest outward deviation, shape (draws,)."""
     return np.asarray(outer.max(axis=1))
 
 
 def least_of(
     _outer: NDArray[np.float64], inner: NDArray[np.float64], _theta: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Greatest deviation inwards, shape (draws,)."""
+    """Return the greatest inward deviation, shape (draws,)."""
     return np.asarray(-inner.min(axis=1))
 
 
 def farthest_of(
     outer: NDArray[np.float64], inner: NDArray[np.float64], _theta: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Greatest deviation to either side, shape (draws,)."""
+    """Return the greatest deviation, shape (draws,)."""
     return np.asarray(np.maximum(outer.max(axis=1), -inner.min(axis=1)))

@@ -1,4 +1,4 @@
-"""What a circle's deviations are made of: form, which repeats, and noise, whose spectrum is known."""
+"""Separate a circle's deviations into form and noise."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class FormAndNoise:
     """One series of deviations round a turn, taken apart.
 
     Attributes:
-        form_um: its form, noise taken off as far as the spectrum tells both apart, shape (n,) [µm].
-        power_um2: of the noise by line 0, 1, ... n // 2: the variance that white noise of the same power would have [µm²].
-        continued: the same at the first of these lines, which form covers, by the memory that the noise may have.
+        form_um: without noise as far as separable, shape (n,).
+        power_um2: of noise by line 0, 1, ... n // 2, as variance of white noise of equal power.
+        continued: the first of these lines, under form, by memory.
         pushes: how what pushes the noise from sample to sample is distributed.
     """
 
@@ -42,14 +42,13 @@ class FormAndNoise:
 
 
 def form_and_noise(deviation_um: NDArray[np.float64]) -> FormAndNoise:
-    """Take a series of deviations apart.
+    """Separate a series of deviations.
 
-    Noise is read above 30 undulations per revolution and continued below (`dbbstation.inference.harmonics`). There, each line
-    counts as form by the share 1 - S / P of its power P that noise of power S would not have put there: the estimate of a mean
-    square that is left when noise is taken off. Above, what stands out of its neighbours is form: a cyclic error is no noise.
+    Noise is read above 30 undulations per revolution and continued below (`dbbstation.inference.harmonics`), where a
+    line's form share is 1 - S / P, power P over noise S. Above, outstanding lines are form.
 
     Args:
-        deviation_um: about equally spaced over a turn, shape (n,) [µm].
+        deviation_um: about equally spaced over a turn, shape (n,).
     """
     count = len(deviation_um)
     low, high = bands(count)
@@ -79,11 +78,10 @@ alone, as what noise leaves in the form would be counted twice."""
 
 
 def _sharp(quick_um: NDArray[np.float64], low: int) -> NDArray[np.float64]:
-    """Form that is too short for the low undulations and stands at few places, such as a reversal spike, shape (n,).
+    """Return short local form, such as a reversal spike, shape (n,).
 
-    What lies above the low undulations is looked at through a Gaussian filter of four times as many. Noise is about alike all
-    round the turn: where that is further out than noise would be anywhere, it is form. Places are looked for in medians of three
-    neighbours: what one reading shows alone is a tail of the noise.
+    A Gaussian filter of four times the low undulations is applied; exceedances of even noise are form. Medians of three
+    exclude single readings.
     """
     count = len(quick_um)
     passed = np.exp2(-((np.arange(count // 2 + 1.0) / (4.0 * low)) ** 2))
@@ -105,7 +103,7 @@ MEDIAN_OF_NORMAL = 0.6745
 
 
 def _floor(power: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Power of lines with those that stand out replaced by what their neighbours have, and which ones stand out."""
+    """Return line powers with outstanding ones replaced by neighbours, and which ones."""
     standing = np.zeros(len(power), dtype=bool)
     limit = np.log(max(len(power), 1) / CHANCE)  # the power of a line of noise is exponentially distributed
     floor = power
@@ -123,7 +121,7 @@ _ROUNDS = 20
 
 
 def _averaged(power: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Running mean over lines that are known; the mean of all where none of the neighbours is."""
+    """Return a running mean over known lines, else the mean of all."""
     known = np.isfinite(power)
     window = np.ones(min(2 * NEIGHBOURS + 1, len(power)))
     total = np.convolve(np.where(known, power, 0.0), window, mode="same")
@@ -135,11 +133,10 @@ def _averaged(power: NDArray[np.float64]) -> NDArray[np.float64]:
 def drawn_noise(
     apart: FormAndNoise, passed: NDArray[np.float64], draws: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Draw noise that the readings may have, shape (draws, n) [µm].
+    """Return drawn noise, shape (draws, n) [µm].
 
     Args:
-        apart: a series taken apart.
-        passed: share of the amplitude that a filter lets pass, by line, shape (n // 2 + 1,).
+        passed: transmitted amplitude by line, shape (n // 2 + 1,).
     """
     count = len(apart.form_um)
     lines = np.fft.rfft(apart.pushes.drawn(rng, draws, count), axis=1)

@@ -1,4 +1,4 @@
-"""Noise of a circle, read off its own spectrum where the machine's form has died away."""
+"""A circle's noise by its own spectrum above the machine's form."""
 
 from __future__ import annotations
 
@@ -29,9 +29,8 @@ class CircleNoise:
     """Noise of one circle.
 
     Attributes:
-        slow_um: standard deviation of white noise, per sample, that would give slow figures the same uncertainty [µm]; NaN where
-            there are too few samples.
-        resolution_um: step in which the readings come [µm]; zero where none shows.
+        slow_um: white noise per sample of equal effect on slow figures; NaN for too few samples.
+        resolution_um: reading step; zero if invisible.
         freedom: degrees of freedom of `slow_um`.
     """
 
@@ -43,32 +42,32 @@ class CircleNoise:
 
     @property
     def known(self) -> bool:
-        """Whether there were samples enough to separate noise from form."""
+        """Return whether noise and form are separable."""
         return bool(np.isfinite(self.slow_um))
 
     @property
     def least_um(self) -> float:
-        """Standard deviation that no reading is free of: a coarse one may show no noise at all, its rounding is there [µm]."""
+        """Return the least noise of any reading, its rounding [µm]."""
         return max(self.resolution_um / ROUNDING, LEAST_UM)
 
     @property
     def sigma_um(self) -> float:
-        """Standard deviation to count with [µm]."""
+        """Return the standard deviation to use [µm]."""
         return float(np.hypot(np.nan_to_num(self.slow_um), self.least_um))
 
 
 def noise_of(
     deviation_um: NDArray[np.float64], phi_deg: NDArray[np.float64], reading_mm: NDArray[np.float64]
 ) -> CircleNoise:
-    """Return the noise of a circle.
+    """Return a circle's noise.
 
-    The spectrum above 30 undulations per revolution, a floor and a first-order process, is continued below: readings resemble
-    their neighbours, and slow figures then have more noise than single readings would give them (`dbbstation.inference.harmonics`).
+    Floor and first-order process above 30 undulations per revolution are continued below
+    (`dbbstation.inference.harmonics`): correlated readings make slow figures noisier.
 
     Args:
-        deviation_um: radial deviations from the circle in time order, what drifted over the turn taken off, shape (n,) [µm].
-        phi_deg: progress along the turn, about equally spaced, shape (n,) [deg].
-        reading_mm: the readings that they come from, for the step in which they come, shape (n,) [mm].
+        deviation_um: in time order, without drift, shape (n,).
+        phi_deg: about equally spaced, shape (n,).
+        reading_mm: for the reading step, shape (n,).
     """
     resolution_um = 1e3 * _step_mm(reading_mm)
     if len(deviation_um) < FEWEST_SAMPLES:
@@ -89,7 +88,7 @@ def noise_of(
 
 
 def _step_mm(reading_mm: NDArray[np.float64]) -> float:
-    """Step of the readings, where they take few enough values to show one [mm]."""
+    """Return the reading step if values are few enough [mm]."""
     values = np.unique(np.round(reading_mm / _FINEST_MM).astype(np.int64))
     if len(values) < 2 or len(values) > len(reading_mm) / _VISITS:  # noqa: PLR2004 - one value has no step
         return 0.0

@@ -1,4 +1,4 @@
-"""The path of one circle as its figures are taken from it: about the ball, in its plane, filtered."""
+"""A circle's path for figures: about the ball, in its plane, filtered."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Filter(IntEnum):
-    """Cut-off in undulations per revolution (UPR): Gaussian, but for 30, which is the sharp one of predictions and tolerances."""
+    """Cut-off in undulations per revolution (UPR): Gaussian, but sharp at 30 for predictions and tolerances."""
 
     NONE = 0
     UPR_15 = 15
@@ -31,13 +31,13 @@ class Filter(IntEnum):
 
     @property
     def words(self) -> str:
-        """As it is written beside a figure."""
+        """Return the words beside a figure."""
         if self is Filter.UPR_30:
             return "30 UPR, cut off sharply"
         return f"Gaussian, {self.value} UPR" if self else "none"
 
     def passed(self, undulations: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Share of the amplitude of undulations that passes, shape (k,)."""
+        """Return the transmitted amplitude of undulations, shape (k,)."""
         if not self:
             return np.ones(len(undulations))
         if self is Filter.UPR_30:
@@ -45,7 +45,7 @@ class Filter(IntEnum):
         return transmission(undulations, self.value)
 
     def through(self, theta_deg: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return deviations of a full turn as the filter passes them, at the same angles, shape (n,)."""
+        """Return filtered deviations of a full turn, shape (n,)."""
         if not self:
             return values
         if self is Filter.UPR_30:
@@ -60,15 +60,14 @@ SAMPLES_PER_UNDULATION = 4
 
 @dataclass(frozen=True, eq=False)
 class CirclePath:
-    """One circle, or both directions of one, in the plane of the circle.
+    """One circle or both directions in its plane.
 
-    The circle of a raised bar is horizontal too, with the radius R cos e: lengths along the bar are turned into distances
-    from the vertical through the fixed ball, whatever the tilt of the platform.
+    A raised bar's circle is horizontal with radius R cos e: bar lengths become distances from the ball's vertical.
 
     Attributes:
-        radius_mm: nominal radius of the tool tip's path, R cos e [mm].
-        theta_deg: angles about the ball, from +X towards +Y, shape (n,) [deg].
-        about_ball_mm: distances from the vertical through the ball, shape (n,) [mm].
+        radius_mm: nominal, R cos e.
+        theta_deg: about the ball, from +X towards +Y, shape (n,).
+        about_ball_mm: from the ball's vertical, shape (n,).
     """
 
     radius_mm: float
@@ -78,19 +77,19 @@ class CirclePath:
 
     @property
     def points_mm(self) -> NDArray[np.float64]:
-        """Points of the path from the ball, shape (n, 2) [mm]."""
+        """Return the path's points from the ball, shape (n, 2) [mm]."""
         theta = np.radians(self.theta_deg)
         return np.column_stack([self.about_ball_mm * np.cos(theta), self.about_ball_mm * np.sin(theta)])
 
     def zone(self) -> MinimumZone:
-        """The two concentric circles of least separation that hold the path."""
+        """Return the minimum zone."""
         return minimum_zone(self.points_mm)
 
 
 def path_of(raw: RawCircle, chosen: Filter = Filter.NONE) -> CirclePath:
-    """Return the path of a raw circle.
+    """Return a raw circle's path.
 
-    The filter sees deviations from the least-squares circle, so that it takes nothing from centre and radius.
+    The filter acts on deviations from the least-squares circle and leaves centre and radius.
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -104,9 +103,7 @@ def path_of(raw: RawCircle, chosen: Filter = Filter.NONE) -> CirclePath:
 
 
 def both(one: CirclePath, other: CirclePath) -> CirclePath:
-    """Return two paths of one circle as one, with the least-squares circle of both.
-
-    Both are given at their angles about the ball already; they count alike, however many points each has.
+    """Return two paths as one with their common least-squares circle, equally weighted.
 
     Raises:
         TraceError: the points do not determine a circle.

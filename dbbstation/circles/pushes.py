@@ -1,9 +1,8 @@
-"""What pushes the noise of a circle from sample to sample: normal, with longer tails, or with shorter ones than normal.
+"""The distribution of a circle's innovations: normal, or with longer or shorter tails.
 
-A range such as G has the largest of many pushes in it, so that their tails count as much as their standard deviation. Distributions
-with longer tails, Student's t and exp(-|x|^b), are weighed against the normal one by their likelihood. The first have outliers that
-come alone, the second is like noise that is louder in a part of the turn. The kurtosis would need a longer recording: that of five
-degrees of freedom has no standard error, and 720 samples show 2.6 in the middle where 6 is right.
+A range depends on tails as on standard deviation. Student's t (single outliers) and exp(-|x|^b) (locally louder noise)
+compete with the normal by likelihood. The kurtosis is unreliable: with five degrees of freedom it has no standard error,
+and 720 samples show 2.6 instead of 6.
 """
 
 from __future__ import annotations
@@ -36,21 +35,20 @@ LEAST_BETA = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Pushes:
-    """How what pushes the noise is distributed, with unit variance.
+    """The innovations' distribution, unit variance.
 
     Attributes:
-        weights: probability of a normal distribution, of Student's t of each number of degrees of freedom in `TAILS`, and of each
-            of `EXPONENTS`, shape (1 + t + e,), their sum one.
-        excess: kurtosis less the 3 of a normal one where tails are shorter than normal; else zero.
+        weights: of normal, Student's t by `TAILS`, and `EXPONENTS`, shape (1 + t + e,), sum one.
+        excess: kurtosis less 3 if below; else zero.
     """
 
     weights: NDArray[np.float64]
     excess: float = 0.0
 
     def drawn(self, rng: np.random.Generator, draws: int, count: int) -> NDArray[np.float64]:
-        """Draw series of pushes, each with tails of its own, shape (draws, count).
+        """Return drawn innovations, each series with own tails, shape (draws, count).
 
-        Shorter tails are those of a symmetrical beta distribution, whose kurtosis less 3 is -6 / (2 a + 3) [Pearson's type II].
+        Shorter tails are symmetrical beta, whose kurtosis less 3 is -6 / (2 a + 3) [Pearson's type II].
         """
         if self.excess < 0.0:
             shape = max(-3.0 / self.excess - 1.5, LEAST_BETA)
@@ -78,11 +76,11 @@ NO_TAILS = Pushes(_NORMAL_ALONE)
 
 
 def pushes_of(white: NDArray[np.complex128], count: int) -> Pushes:
-    """How what pushes the noise is distributed, as its own lines show.
+    """Return the innovations' distribution by noise lines.
 
     Args:
-        white: lines of the noise in units of their standard deviation, those that form covers zero, shape (count // 2 + 1,).
-        count: samples of the turn.
+        white: standardised lines, zero under form, shape (count // 2 + 1,).
+        count: samples.
     """
     pushes = np.fft.irfft(white, count)
     square = float(np.mean(pushes**2))
@@ -108,7 +106,7 @@ def pushes_of(white: NDArray[np.complex128], count: int) -> Pushes:
 
 
 def _exponential_likelihood(new: NDArray[np.float64], exponent: float) -> float:
-    """Log likelihood of exp(-|x|^b) of its most probable scale, over the height of the normal density."""
+    """Return the log likelihood of exp(-|x|^b) at its best scale, over the normal density's height."""
     scale = float(exponent * np.mean(np.abs(new) ** exponent)) ** (1.0 / exponent)
     height = np.log(exponent) - np.log(2.0 * scale) - float(gammaln(1.0 / exponent)) + 0.5 * np.log(2.0 * np.pi)
     return float(len(new) * (height - 1.0 / exponent))

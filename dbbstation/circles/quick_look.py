@@ -1,6 +1,6 @@
-"""The classical signatures of machines with serial axes in circles of any machine, by least squares.
+"""Classical signatures of serial axes in any circle, by least squares.
 
-On a hexapod they are symptoms, no causes: there are no axes X and Y that could be out of square or lag.
+On a hexapod they are symptoms, not causes.
 """
 
 from __future__ import annotations
@@ -66,12 +66,12 @@ class Symptom:
     """Size of one signature.
 
     Attributes:
-        place: end or axis; empty where it belongs to both axes.
-        value: its size; None where it cannot be determined.
-        u: standard uncertainty of that; None likewise.
-        below: with 95 % probability it is less, where it is not seen and only that can be told; None otherwise.
-        seen: whether it is larger than four times its uncertainty.
-        text: further information, such as the period of a cyclic error.
+        place: end or axis; empty for both.
+        value: None if undetermined.
+        u: standard uncertainty, or None.
+        below: 95 % bound if not seen, else None.
+        seen: exceeds four times its uncertainty.
+        text: such as the period of a cyclic error.
     """
 
     signature: Signature
@@ -89,8 +89,8 @@ class QuickLook:
     """All signatures of one circle.
 
     Attributes:
-        left_rms_um: of what the signatures leave of them, noise included [µm].
-        sigma_um: standard deviation of white noise, per sample, that would give these figures the same uncertainty [µm].
+        left_rms_um: beyond signatures, with noise.
+        sigma_um: white noise per sample of equal effect.
     """
 
     symptoms: tuple[Symptom, ...]
@@ -102,7 +102,7 @@ class QuickLook:
 
 @dataclass(frozen=True, eq=False)
 class _Turn:
-    """One turn as it is fitted."""
+    """A fitted turn."""
 
     one: CircleAnalysis
     theta_deg: NDArray[np.float64]
@@ -111,7 +111,7 @@ class _Turn:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Least squares of all shapes, and of what is fitted with them: centre, radius and form."""
+    """Joint fit of shapes, centre, radius and form."""
 
     shapes: tuple[SignatureColumn, ...]
     value: NDArray[np.float64]
@@ -123,14 +123,14 @@ class _Fit:
 
 @with_one_thread
 def quick_look(turns: Sequence[CircleAnalysis]) -> QuickLook | None:
-    """Fit the signatures to both directions of a circle, or to one.
+    """Fit signatures to one or both directions.
 
-    Beside them are fitted centre and radius of each turn, and a form of 3 to 10 undulations that both have alike. What is then
-    left beyond noise counts like noise that is white up to 30 undulations per revolution and absent above: nothing is known
-    of it but its size. One direction cannot separate squareness from servo mismatch: both are then missing.
+    Centre and radius of each turn and a common form of 3 to 10 undulations are fitted too. The residual counts as noise
+    white up to 30 undulations per revolution. One direction cannot separate squareness from servo mismatch: both are
+    missing then.
 
     Args:
-        turns: one or two, of opposite sense.
+        turns: one or two of opposite sense.
 
     Returns:
         None where a turn has too few samples.
@@ -171,7 +171,7 @@ def _turn(one: CircleAnalysis) -> _Turn:
 
 
 def _fits(turns: Sequence[_Turn], waves: Sequence[NDArray[np.float64]] = ()) -> list[_Fit]:
-    """Return fits with spikes of each length, and of lengths about the likeliest one: high spikes show theirs to a percent."""
+    """Return fits by spike length, refined about the likeliest."""
     found = [_fitted(turns, spike_deg, waves) for spike_deg in SPIKES_DEG]
     for finer in FINER:
         middle = _best(found).spike_deg
@@ -185,12 +185,10 @@ def _best(fits: Sequence[_Fit]) -> _Fit:
 
 
 def _over_lengths(fits: Sequence[_Fit], sigma_um: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return values and standard uncertainties where nobody knows how long the spikes are, shapes (k,).
+    """Return values and standard uncertainties averaged over spike lengths, shapes (k,).
 
-    Each length counts by its marginal likelihood, all alike beforehand and every height too: exp(-squares / 2 s²) times the root of
-    the determinant of the covariance. The mean over lengths has the variance of each and that between them [law of total
-    variance; Hoeting et al., Stat. Sci. 14 (1999), eqs 2, 3]. The one length that leaves least, taken as if it had been known,
-    would fit its spikes to the noise.
+    Weights are marginal likelihoods exp(-squares / 2 s²) times the root of the covariance determinant [law of total
+    variance; Hoeting et al., Stat. Sci. 14 (1999), eqs 2, 3]. A single best length would fit noise.
     """
     squares = np.array([one.left_um @ one.left_um for one in fits]) / sigma_um**2
     spread = np.array([np.linalg.slogdet(one.unit_covariance)[1] for one in fits])
@@ -226,7 +224,7 @@ def _fitted(turns: Sequence[_Turn], spike_deg: float, waves: Sequence[NDArray[np
 
 
 def _beside(turns: Sequence[_Turn]) -> NDArray[np.float64]:
-    """Radius and centre of each turn, and a form that all have alike."""
+    """Return each turn's radius and centre, and the common form."""
     waves = [basis(np.radians(turn.theta_deg), FREE) for turn in turns]
     circle = [0, 1, FREE + 1]
     form = [k for k in range(2 * FREE + 1) if k not in {*circle, 2, FREE + 2}]
@@ -234,7 +232,7 @@ def _beside(turns: Sequence[_Turn]) -> NDArray[np.float64]:
 
 
 def _sigma_um(turns: Sequence[_Turn], fit: _Fit) -> float:
-    """Standard deviation of white noise, per sample, that would give the figures the uncertainty that the residual gives them."""
+    """Return white noise per sample of equal effect as the residual."""
     ends = np.cumsum([len(turn.theta_deg) for turn in turns])[:-1]
     found = misfit(
         np.split(fit.left_um, ends),
@@ -279,7 +277,7 @@ class _Wave:
 
 
 def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
-    """Search the period of a cyclic error of an axis, beside all other signatures."""
+    """Search an axis's cyclic period beside other signatures."""
     diameter_mm = 2.0 * turns[0].one.raw.circle.radius_mm
 
     def trial(periods: float) -> _Trial:
@@ -316,7 +314,7 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """A wave of one period: what it takes off the squares, its sine and cosine."""
+    """A wave of one period: explained squares, sine, cosine."""
 
     gained: float
     period_mm: float

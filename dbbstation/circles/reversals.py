@@ -1,4 +1,4 @@
-"""Steps of a path where an axis turns round, and the undulations of its form."""
+"""Steps at axis reversals, and undulations of the form."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ FEWEST = 6
 
 @dataclass(frozen=True)
 class ReversalStep:
-    """How much the path rises from before a place to behind it, in the sense of travel.
+    """The path's rise behind a place, along the travel.
 
     Attributes:
-        height_um: outwards positive [µm].
+        height_um: outwards positive.
     """
 
     theta_deg: float
@@ -45,10 +45,10 @@ class ReversalStep:
 
 @dataclass(frozen=True)
 class Harmonic:
-    """One undulation A cos k(θ - θ_0) of the path about its least-squares circle.
+    """An undulation A cos k(θ - θ_0) about the least-squares circle.
 
     Attributes:
-        peak_deg: angle θ_0 of its first peak from +X, below 360 / k [deg].
+        peak_deg: first peak θ_0 from +X, below 360 / k.
     """
 
     undulations: int
@@ -59,10 +59,10 @@ class Harmonic:
 def step_at(
     raw: RawCircle, deviation_um: NDArray[np.float64], theta_deg: float, sigma_um: float
 ) -> ReversalStep | None:
-    """Return the step of a path at a place, by straight lines on both its sides.
+    """Return the step at a place by lines on both sides.
 
     Args:
-        deviation_um: of its samples, shape (n,) [µm].
+        deviation_um: shape (n,).
 
     Returns:
         None where the turn begins and ends there, or where too few samples lie beside it: what differs between a
@@ -79,7 +79,7 @@ def step_at(
 
 
 def closure_of(raw: RawCircle, deviation_um: NDArray[np.float64], sigma_um: float) -> ReversalStep | None:
-    """Return how far the end of a turn lies outside of its beginning; None where too few samples lie there."""
+    """Return the turn's end less its begin; None for too few samples."""
     beginning = _line_at(raw.phi_deg, deviation_um, 1.0, sigma_um, near_deg=0.0)
     end = _line_at(raw.phi_deg - FULL_TURN_DEG, deviation_um, -1.0, sigma_um, near_deg=0.0)
     if beginning is None or end is None:
@@ -94,7 +94,7 @@ def _line_at(
     sigma: float,
     near_deg: float = NEAR_DEG,
 ) -> tuple[float, float] | None:
-    """Height at the place of a straight line through the samples on one side of it, and what noise makes of it."""
+    """Return a line's height at the place by one side's samples, with noise."""
     beside = side * away_deg
     inside = (beside >= near_deg) & (beside <= FAR_DEG)
     if np.count_nonzero(inside) < FEWEST:
@@ -107,7 +107,7 @@ def _line_at(
 
 
 def harmonics_of(path: CirclePath) -> tuple[Harmonic, ...]:
-    """Return the undulations of a path about its least-squares circle, 2 to 10 per revolution."""
+    """Return undulations 2 to 10 per revolution about the least-squares circle."""
     orders = np.arange(1, HIGHEST_HARMONIC + 1)
     found = amplitudes(1e3 * path.least_squares.deviation_mm, np.radians(path.theta_deg), HIGHEST_HARMONIC)
     cosine, sine = found.real[1:], -found.imag[1:]

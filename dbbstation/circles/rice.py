@@ -1,4 +1,4 @@
-"""Length of a vector in the plane, such as a centre offset, without what noise adds to it."""
+"""Length of a plane vector, such as a centre offset, without noise's contribution."""
 
 from __future__ import annotations
 
@@ -15,23 +15,22 @@ AXES = 2
 
 
 def without_noise(length: float, u: float) -> tuple[float, float]:
-    """Return the length that shows in the median what was measured, and its standard uncertainty.
+    """Return the length whose median is the measured one, and its standard uncertainty.
 
-    The length of a vector with the standard uncertainty u in either axis has Rice's distribution; its square over u² is a noncentral
-    chi-square with two degrees of freedom [Rice, Bell System Technical Journal 24 (1945) 46, sec. 3.10]. Lengths that show what was
-    measured at their 2.5th and 97.5th percentile are the ends of the 95 % interval [confidence interval by inversion of a test,
-    Casella and Berger, Statistical Inference, 9.2.1]. Its longer side over 1.96 is the standard uncertainty, u at the least.
+    With uncertainty u per axis the length has Rice's distribution [Rice, Bell System Technical Journal 24 (1945) 46, sec.
+    3.10]. Percentiles 2.5 and 97.5 invert to the 95 % interval [confidence interval by inversion of a test, Casella and
+    Berger, Statistical Inference, 9.2.1]; its longer side over 1.96, at least u, is the uncertainty.
 
     Args:
-        length: as measured, not negative.
-        u: standard uncertainty of either coordinate, in the same unit.
+        length: not negative.
+        u: standard, of either coordinate.
     """
     if not u > 0.0 or length > LONG * u:
         return float(np.sqrt(length**2 - u**2)), u
     square = (length / u) ** 2
 
     def shows(share: float) -> float:
-        """Length that is seen as shorter in such a share of all cases, in u."""
+        """Return the length seen as shorter in a share of cases, in u."""
         return float(np.sqrt(chndtrinc(square, AXES, share))) if chndtr(square, AXES, 0.0) > share else 0.0
 
     low, value, high = (shows(share) for share in (0.975, 0.5, 0.025))

@@ -1,7 +1,7 @@
-"""What single faults of a machine with serial axes X and Y do to a circle: known shapes, each of unit size.
+"""Known shapes of single faults of serial axes X and Y.
 
-Radial deviations outwards, over the angle θ from +X towards +Y of a circle of radius R. The sense of travel is d, +1 where
-the angle grows. With position errors e_x, e_y of the axes the deviation is e_x cos θ + e_y sin θ, to first order.
+Radial deviations outwards over θ from +X towards +Y at radius R; d is +1 for a growing angle. Errors e_x, e_y deviate by
+e_x cos θ + e_y sin θ to first order.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class SignatureColumn:
     """One column of the fit.
 
     Attributes:
-        place: end or axis that it belongs to; empty where it belongs to both axes.
+        place: end or axis; empty for both.
     """
 
     signature: Signature
@@ -59,8 +59,8 @@ def shapes_of(
     - Reversal spike h at an end: half a sine of the height h over the first degrees behind it, as the axis holds on.
 
     Args:
-        theta_deg: angles, shape (n,) [deg].
-        circle: radius, feed and sense of travel.
+        theta_deg: shape (n,).
+        circle: radius, feed, sense.
     """
     theta, sign = np.radians(theta_deg), circle.direction.sign
     radius_mm = circle.radius_mm
@@ -85,12 +85,10 @@ def shapes_of(
 
 
 def cyclic_shapes(theta_deg: NDArray[np.float64], circle: Circle, axis: str, period_mm: float) -> NDArray[np.float64]:
-    """Return sine and cosine of an error of unit amplitude that comes back with an axis' position, shape (n, 2) [µm].
-
-    Positions count from the centre of the circle.
+    """Return sine and cosine of a unit error periodic in an axis's position from the centre, shape (n, 2) [µm].
 
     Args:
-        theta_deg: angles, shape (n,) [deg].
+        theta_deg: shape (n,).
         axis: `X` or `Y`.
     """
     theta = np.radians(theta_deg)

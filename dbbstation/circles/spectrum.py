@@ -1,4 +1,4 @@
-"""Undulations of one circle: amplitude by number per revolution, beside what noise alone would show."""
+"""A circle's undulations beside noise."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ HIGHEST = 60
 
 @dataclass(frozen=True, eq=False)
 class FormSpectrum:
-    """Amplitudes of the deviations from the least-squares circle, not filtered.
+    """Unfiltered amplitudes about the least-squares circle.
 
     Attributes:
-        undulations: per revolution, 2 and up, shape (h,).
-        amplitude_um: of each, half of peak to valley, shape (h,) [µm].
-        noise_um: root-mean-square amplitude that the circle's noise alone has at each; NaN where it is not known [µm].
+        undulations: per revolution, from 2, shape (h,).
+        amplitude_um: half of peak to valley, shape (h,).
+        noise_um: rms amplitude of noise; NaN if unknown.
     """
 
     undulations: NDArray[np.int64]
@@ -34,13 +34,12 @@ class FormSpectrum:
 
 
 def spectrum_of(one: CircleAnalysis) -> FormSpectrum:
-    """Return the undulations of a circle.
+    """Return a circle's undulations.
 
-    White noise of standard deviation s has two orthonormal coefficients of that size per undulation: an amplitude of
-    2 s / sqrt(n), root mean square.
+    White noise s has two coefficients of size s each: amplitude 2 s / sqrt(n), rms.
 
     Args:
-        one: the circle; of few samples fewer undulations are separated, of six or less none.
+        one: few samples separate fewer undulations, six or less none.
     """
     count = len(one.raw)
     highest = min(HIGHEST, count // SAMPLES_PER_HARMONIC)

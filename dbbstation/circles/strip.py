@@ -1,4 +1,4 @@
-"""Least separation of two concentric circles about many drawn paths at once."""
+"""Minimum zones of many drawn paths at once."""
 
 from __future__ import annotations
 
@@ -19,17 +19,16 @@ REACHED = 1e-3
 def strip_widths(
     outer: NDArray[np.float64], inner: NDArray[np.float64], theta_deg: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Width of the minimum zone of nearly round paths, shape (draws,), in the unit of the paths.
+    """Return minimum-zone widths of nearly round paths, shape (draws,), in their unit.
 
-    A centre that is off by (a, b) changes radii by a cos θ + b sin θ: less than a nanometre of the second order is left out at
-    0.4 mm. The width is then a Chebyshev approximation by three functions that are a Haar system on the circle, so that four
-    points, outside and inside by turns, determine it. One of them is exchanged at a time [Remez 1934; Cheney, Introduction to
-    Approximation Theory, ch. 3]: their width is a lower bound that grows, that of all points an upper one.
+    A centre offset (a, b) changes radii by a cos θ + b sin θ; second order is below a nanometre at 0.4 mm. Four
+    alternating points determine the Chebyshev approximation, exchanged one at a time [Remez 1934; Cheney, Introduction to
+    Approximation Theory, ch. 3] between a growing lower and an upper bound.
 
     Args:
-        outer: greatest deviation at each angle, shape (draws, angles).
-        inner: least deviation there, shape (draws, angles).
-        theta_deg: rising angles within a turn, shape (angles,) [deg].
+        outer: greatest deviation, shape (draws, angles).
+        inner: least deviation, shape (draws, angles).
+        theta_deg: rising, shape (angles,).
     """
     theta = np.radians(theta_deg)
     waves = np.vstack([np.ones(len(theta)), np.cos(theta), np.sin(theta)])
@@ -58,7 +57,7 @@ def strip_widths(
 def _first_points(
     outer: NDArray[np.float64], inner: NDArray[np.float64], theta_deg: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Indices of the highest or lowest point of each quarter by turns, shape (draws, 4)."""
+    """Return each quarter's highest or lowest point by turns, shape (draws, 4)."""
     edges = np.searchsorted(theta_deg, [0.0, 90.0, 180.0, 270.0, 360.0])
     return np.column_stack(
         [
@@ -74,7 +73,7 @@ def _first_points(
 
 
 def _exchanged(points: NDArray[np.int64], new: NDArray[np.int64], outside: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Put a new point in the place of the one of its kind with which no point of the other kind lies between."""
+    """Exchange a new point for its kind's adjacent one."""
     other_low = np.where(outside, points[:, 1], points[:, 0])
     other_high = np.where(outside, points[:, 3], points[:, 2])
     # Whether it lies on the arc from the first of the other kind to the second, in the order of the angles round the turn.

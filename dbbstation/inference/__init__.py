@@ -1,1 +1,1 @@
-"""Fitting and judging models of one measured channel. Knows columns, noise and priors; knows no hexapod."""
+"""Fit and judge models of one measured channel, without knowledge of hexapods."""

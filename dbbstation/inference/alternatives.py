@@ -1,4 +1,4 @@
-"""Causes that can stand for each other: those alike in all that was measured, and those of which one is there for sure."""
+"""Interchangeable causes: equivalent by all measurements, or one of several."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ class Alternatives:
     """Classes of equivalent causes and ambiguities of a comparison.
 
     Args:
-        best: the set that is taken.
-        form_uncertainty: says of a member by how much its formula may be off, as a share of its effect.
-        of: members of the best set whose classes are wanted.
+        best: chosen set.
+        form_uncertainty: relative inaccuracy of a member's formula.
+        of: members whose classes are wanted.
 
     Attributes:
-        classes: by name of a member, causes whose effects nothing measured here tells from its own, itself first.
-        ambiguities: by name of a member that is not there for sure, causes of which one is, as `ambiguity` has them.
+        classes: equivalent causes by member, itself first.
+        ambiguities: by uncertain member, causes of which one is present; see `ambiguity`.
     """
 
     def __init__(
@@ -67,16 +67,16 @@ class Alternatives:
         }
 
     def probability(self, names: Iterable[str]) -> float:
-        """Probability that at least one of these causes is there."""
+        """Return the probability that at least one is present."""
         columns = [self._place[name] for name in names if name in self._place]
         return float(self._weights @ self._inside[:, columns].any(axis=1)) if columns else 0.0
 
     def class_with(self, name: str) -> tuple[str, ...]:
-        """Class that a cause belongs to; itself alone where there is none."""
+        """Return a cause's class, or itself."""
         return next((equal for equal in self.classes.values() if name in equal), (name,))
 
     def ambiguity(self, name: str) -> tuple[str, ...]:
-        """Causes of which one is there for sure, if not this one, most probable first; none where there are none such."""
+        """Return causes of which one is present if this is not, most probable first."""
         chosen = list(self.class_with(name))
         own = self._inside[:, self._place[name]] if name in self._place else np.zeros(len(self._weights), dtype=bool)
         both = (self._weights * own) @ self._inside
@@ -99,16 +99,16 @@ class Alternatives:
         return (member.cause.name, *(c.name for c in rivals if self._is_alike(member, c, others)))
 
     def _is_alike(self, member: Member, rival: Cause, others: tuple[Member, ...]) -> bool:
-        """Whether a cause in the place of a member does the same, in any of its forms of as many amplitudes."""
+        """Return whether a replacement has the same effect, in any form of equal size."""
         own = member.variant.columns
         same = [v.columns for v in rival.variants if len(v.columns) == len(own)]
         cosine = max((self._cosine(own, columns, others) for columns in same), default=0.0)
         return cosine > EQUIVALENT and not self._is_decided(member, rival, others, cosine)
 
     def _is_decided(self, member: Member, rival: Cause, others: tuple[Member, ...], cosine: float) -> bool:
-        """Whether what was measured decides between a member and a cause in its place: a thousandth of a very large effect is seen.
+        """Return whether measurements separate a member from its replacement.
 
-        Nothing is decided by what the formulas themselves may be off by.
+        Differences within formula inaccuracy decide nothing.
         """
         in_place = self._comparison.scan(others, [rival])
         formulas = np.hypot(self._form_uncertainty(member), self._form_uncertainty(in_place.best[0]))
@@ -117,7 +117,7 @@ class Alternatives:
         return self._best.log_factor(member.cause.name) - float(in_place.log_factor[0]) > NEGLIGIBLE
 
     def _cosine(self, one: NDArray[np.int64], other: NDArray[np.int64], others: tuple[Member, ...]) -> float:
-        """Least cosine between what two causes of as many amplitudes span beside base and others; 1: the same effects."""
+        """Return the least cosine between two causes' spans beside base and others; 1: equal effects."""
         products = self._comparison.beside(others, np.concatenate([one, other]))
         size = len(one)
         a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
@@ -128,14 +128,12 @@ class Alternatives:
 def named_already(
     comparison: ModelComparison, nameless: Sequence[Variant], named: Iterable[tuple[Variant, float]]
 ) -> list[bool]:
-    """Whether a named cause has each form of an unmodelled effect among its own, within what its formula may be off by.
+    """Return whether a named cause covers each form of an unmodelled effect, within its formula's inaccuracy.
 
-    Such a form, of `MOST_ALIKE` amplitudes at the most, is that cause and no hypothesis of its own: listed beside it they would share its
-    probability. What is left of an effect beside a form is counted over all its amplitudes together, each by what is seen of it: a shift of
-    balls that no circle shows decides nothing.
+    Otherwise both would share probability. At most `MOST_ALIKE` amplitudes are compared, weighted by visibility.
 
     Args:
-        named: forms of named causes, and by how much their formula may be off, as a share of the effect.
+        named: forms of named causes, with their relative inaccuracy.
     """
     found = np.zeros(len(nameless), dtype=bool)
     by_size: dict[int, list[tuple[NDArray[np.int64], float]]] = {}
@@ -169,10 +167,10 @@ ambiguous with a step over time in two of two sessions; with 6 four sessions are
 
 
 def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[Member]:
-    """Return the few causes that do best in the place of a member, and not much worse than it does.
+    """Return the best replacements of a member that are not much worse.
 
     Args:
-        causes: to choose from; those of the hypothesis are passed over.
+        causes: the hypothesis's own are skipped.
     """
     scan = comparison.scan(best.without(name), [cause for cause in causes if cause.name not in best.names])
     enough = max(0.5 * best.log_factor(name), 0.0)
@@ -180,11 +178,11 @@ def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause],
 
 
 def standing_out(products: NDArray[np.float64], plausible: NDArray[np.float64]) -> NDArray[np.float64]:
-    """By how many standard deviations combinations of plausible amplitudes stand out, least first, shape (p,).
+    """Return how far combinations of plausible amplitudes stand out, least first, shape (p,).
 
     Args:
-        products: of the columns of a cause beside others, each by the noise, shape (p, p).
-        plausible: sizes of its amplitudes, shape (p,).
+        products: of a cause's columns beside others, by noise, shape (p, p).
+        plausible: shape (p,).
     """
     return np.sqrt(np.maximum(np.linalg.eigvalsh(plausible[:, None] * products * plausible), 0.0))
 
@@ -192,12 +190,12 @@ def standing_out(products: NDArray[np.float64], plausible: NDArray[np.float64]) 
 def norm_over_sigma(
     products: NDArray[np.float64], values: NDArray[np.float64], covariance: NDArray[np.float64]
 ) -> float:
-    """By how many standard deviations the norm of an effect is out, to first order.
+    """Return an effect's norm in standard deviations, to first order.
 
     Args:
-        products: of its columns beside a base, each by the noise, shape (p, p).
-        values: of its amplitudes, shape (p,).
-        covariance: of these, shape (p, p).
+        products: beside a base, by noise, shape (p, p).
+        values: shape (p,).
+        covariance: shape (p, p).
     """
     norm = float(np.sqrt(np.maximum(values @ products @ values, 0.0)))
     if norm == 0.0:
@@ -207,7 +205,7 @@ def norm_over_sigma(
 
 
 def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], NDArray[np.float64], dict[str, int]]:
-    """Sets of causes that count, shape (s, c): which cause is in which; their probabilities, shape (s,); places of causes."""
+    """Return membership of relevant sets, shape (s, c), their probabilities, shape (s,), and places of causes."""
     top = max(posterior.weights.values())
     sets = [(key, weight) for key, weight in posterior.weights.items() if weight > top - NEGLIGIBLE]
     place = {name: k for k, name in enumerate(sorted(set().union(*(key for key, _ in sets))))}
@@ -219,7 +217,7 @@ def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], NDArray[np.flo
 
 
 def _inverse_root(products: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inverse square root of products of columns; directions that are nothing are left out."""
+    """Return the inverse square root of products, without null directions."""
     value, axes = np.linalg.eigh(products)
     usable = value > RANK * max(float(value[-1]), 1e-300)
     return np.asarray((axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T, dtype=np.float64)

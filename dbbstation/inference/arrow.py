@@ -1,8 +1,7 @@
-"""Random effects taken out group by group, before the columns that all groups share are looked at.
+"""Random effects eliminated group by group, before shared columns.
 
-Mountings, balls and beginnings of turns act on the few runs that they belong to: their columns and those of the shared parameters form
-an arrow. Each group is made a triangle by itself, and what it leaves says all that it knows of the shared columns. The work grows with
-the number of groups, not with its cube. [Bjorck, Numerical Methods for Least Squares Problems, 1996, sec. 6.3]
+Mountings and balls touch few runs, so the columns form an arrow. Each group becomes a triangle; the work is linear in
+groups. [Bjorck, Numerical Methods for Least Squares Problems, 1996, sec. 6.3]
 """
 
 from __future__ import annotations
@@ -29,15 +28,15 @@ SMALL = 1e6
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Random effects of some blocks that no other block touches, as a triangle.
+    """Random effects of some blocks alone, as a triangle.
 
     Attributes:
         columns: of the group, shape (j,).
-        border: columns that its blocks share with others, shape (b,).
-        inner: triangle over the columns of the group, shape (j, j).
-        across: the same rows over the border, shape (j, b).
-        target: the same of the right-hand side, shape (j,).
-        left: what the group says of the border: rows over it, target last, shape (r, b + 1).
+        border: shared columns, shape (b,).
+        inner: triangle of the group, shape (j, j).
+        across: same rows over the border, shape (j, b).
+        target: same rows, shape (j,).
+        left: information on the border: rows, target last, shape (r, b + 1).
     """
 
     columns: NDArray[np.int64]
@@ -53,13 +52,12 @@ class Arrow:
     """Triangle of all blocks and priors.
 
     Attributes:
-        groups: random effects that were taken out.
-        alone: random effects that no block touches, of which their prior is all that is known, shape (a,).
-        random: the other random effects, shape (m,).
+        alone: untouched random effects, known by prior only, shape (a,).
+        random: others, shape (m,).
         fitted: fitted columns, shape (f,).
         root: triangle over random, then fitted columns, shape (m + f, m + f).
-        target: of these rows, shape (m + f,).
-        floor: sum of squares that no values of the columns take away.
+        target: shape (m + f,).
+        floor: irreducible sum of squares.
     """
 
     groups: tuple[Group, ...]
@@ -72,16 +70,15 @@ class Arrow:
 
     @property
     def root_of_fitted(self) -> NDArray[np.float64]:
-        """What is known of the fitted columns, random effects averaged over, shape (f, f)."""
+        """Return the information on fitted columns, random effects averaged, shape (f, f)."""
         return self.root[len(self.random) :, len(self.random) :]
 
 
 def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
-    """Take out what groups of blocks have for themselves, and make the rest one triangle.
+    """Eliminate groups and triangulate the rest.
 
     Args:
-        blocks: compressed runs.
-        noise: standard deviation of one measurement, where a block does not state its own.
+        noise: of a measurement, unless a block states its own.
     """
     members, border = _split(blocks, known)
     groups = tuple(_group([blocks[k] for k in places], columns, known, noise) for places, columns in members)
@@ -101,15 +98,13 @@ def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
 def triangles_without(
     blocks: Sequence[Block], known: Columns, noise: float, parts: Sequence[Sequence[int]]
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], float]]:
-    """What all blocks but those of a part say of the fitted columns, for one part after the other.
+    """Yield the information on fitted columns without each part's blocks.
 
-    Only the groups that a part belongs to are made anew. Of the others, as many as the square root of their number have been put
-    together beforehand.
+    Only the part's groups are renewed; others are pre-joined by the root of their number.
 
     Args:
-        blocks: compressed runs.
-        noise: standard deviation of one measurement, where a block does not state its own.
-        parts: places of the blocks that are left out.
+        noise: of a measurement, unless a block states its own.
+        parts: places of omitted blocks.
 
     Yields:
         Triangle over the fitted columns, shape (f, f), its target, shape (f,), and the sum of squares that no values take away.
@@ -139,12 +134,12 @@ def triangles_without(
 
 @dataclass(frozen=True, eq=False)
 class _Border:
-    """Columns that are not taken out: random effects, then fitted ones.
+    """Remaining columns: random, then fitted.
 
     Attributes:
-        order: columns, shape (m + f,).
-        place: of each column in that order, shape (k,); -1 for the others.
-        alone: random effects that no block touches.
+        order: shape (m + f,).
+        place: of each column, shape (k,); -1 for others.
+        alone: untouched random effects.
     """
 
     order: NDArray[np.int64]
@@ -153,7 +148,7 @@ class _Border:
     alone: NDArray[np.int64]
 
     def priors(self, known: Columns) -> NDArray[np.float64]:
-        """Rows of what is known beforehand, and of zeros, so that a triangle has all its rows."""
+        """Return prior rows, padded with zeros for a full triangle."""
         total = len(self.order)
         bounded = self.order[np.isfinite(known.prior[self.order])]
         rows = np.zeros((len(bounded) + total + 1, total + 1))
@@ -161,7 +156,7 @@ class _Border:
         return rows
 
     def rows(self, group: Group) -> NDArray[np.float64]:
-        """What a group says of these columns, target last."""
+        """Return a group's rows over these columns, target last."""
         wide = np.zeros((len(group.left), len(self.order) + 1))
         wide[:, self.place[group.border]] = group.left[:, :-1]
         wide[:, -1] = group.left[:, -1]
@@ -204,13 +199,13 @@ def _group(blocks: Sequence[Block], columns: NDArray[np.int64], known: Columns, 
 
 
 def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[list[int], NDArray[np.int64]]]:
-    """Blocks and random effects of each group.
+    """Return blocks and random effects of each group.
 
-    A random effect that many blocks share, such as the length of a bar, would tie them all together. Effects of up to so many blocks
-    are taken out as makes the work least; the work is counted in rows times columns squared.
+    An effect of many blocks, such as a bar, would tie all. The limit of blocks per effect minimises rows times columns
+    squared.
 
     Args:
-        random: random effects that may be taken out, shape (k,).
+        random: eliminable effects, shape (k,).
     """
     total, count = len(random), sum(len(block.target) for block in blocks)
     together = [(list(range(len(blocks))), np.zeros(0, dtype=np.int64))]
@@ -238,12 +233,12 @@ def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[li
 def _tied(
     blocks: Sequence[Block], which: NDArray[np.int64], touched: NDArray[np.int64], own: NDArray[np.bool_]
 ) -> list[tuple[list[int], NDArray[np.int64]]]:
-    """Blocks that share random effects, directly or through others, with these effects.
+    """Return blocks tied by shared random effects.
 
     Args:
         which: block of each touch, shape (t,).
         touched: column of each touch, shape (t,).
-        own: columns that are to be taken out, shape (k,).
+        own: columns to eliminate, shape (k,).
     """
     number, total = len(blocks), len(own)
     touches = own[touched]

@@ -1,7 +1,6 @@
-"""Columns of all laws and patterns of a channel, and the causes that are made of them.
+"""Columns of all laws and patterns of a channel, and their causes.
 
-Laws are laid out on the grid of their nonlinear parameters at first. One that a hypothesis takes in is laid out anew at its
-best values: exact columns, tangents, and what its formula may be off by.
+Laws start on their grids. A chosen one is refined: exact columns, tangents, formula slack.
 """
 
 from __future__ import annotations
@@ -73,13 +72,13 @@ class Bank:
     """Columns and causes.
 
     Attributes:
-        whitening: that does it, over the kept rows; None where the noise is white and the same in all rows.
-        spread: of the noise in each kept row, over that of all, shape (m,).
-        trust: root of the weight that what is new in each kept row has, shape (m,); ones unless the noise has long tails.
-        tails: degrees of freedom of Student's t that what is new follows; infinite where it is Gaussian.
-        measures_beside_members: whether `measure` asks what a hypothesis leaves, not what everything does.
-        long_tails: whether what is new in a row may follow Student's t.
-        grows_with: what the variance grows with; empty where it is the same in all rows.
+        whitening: over kept rows; None for uniform white noise.
+        spread: relative noise of each kept row, shape (m,).
+        trust: root weight of each kept row's innovation, shape (m,); ones without long tails.
+        tails: Student's t degrees of innovations; infinite if Gaussian.
+        measures_beside_members: `measure` uses the hypothesis's residual, not everything's.
+        long_tails: innovations may follow Student's t.
+        grows_with: variable of the variance; may be empty.
     """
 
     def __init__(self, channel: Channel) -> None:
@@ -98,7 +97,7 @@ class Bank:
         self._of_laws = {law.name: Cause(law.name, self._on_a_grid(law), law.log_odds) for law in channel.laws}
 
     def copy(self) -> Bank:
-        """One that goes its own way from here: columns, laws and patterns that are there already are shared."""
+        """Return an independent copy that shares existing columns, laws and patterns."""
         other: Bank = copy(self)
         other.patterns, other._of_patterns = dict(self.patterns), dict(self._of_patterns)
         other._of_laws, other._everywhere = dict(self._of_laws), list(self._everywhere)
@@ -107,19 +106,19 @@ class Bank:
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """All of them, laws first."""
+        """Return all causes, laws first."""
         return (*self._of_laws.values(), *self._of_patterns.values())
 
     def but_for(self, refused: Container[str]) -> list[Cause]:
-        """Causes but for those that were refused."""
+        """Return causes without refused ones."""
         return [cause for cause in self.causes if cause.name not in refused]
 
     def worthy(self, left: Left, found: Sequence[Pattern]) -> list[Pattern]:
-        """Patterns that are worth their prior odds beside what was fitted.
+        """Return patterns worth their prior odds beside the fit.
 
         Args:
-            left: what that leaves of the kept rows, in units of noise.
-            found: picked from many.
+            left: whitened residual of kept rows.
+            found: from many.
         """
         found = [p for p in {p.name: p for p in found}.values() if p.name not in self.patterns]
         if not found:
@@ -135,23 +134,23 @@ class Bank:
 
     @property
     def looked_for(self) -> set[str]:
-        """Names of patterns that were picked by a look."""
+        """Return names of patterns picked by a look."""
         return {name for name, pattern in self.patterns.items() if pattern.family in LOOKED_FOR}
 
     def kind_of(self, name: str) -> tuple[str, ...]:
-        """What tells a cause from those that are no other place or period of the same."""
+        """Return a cause's identity apart from place or period."""
         pattern = self.patterns.get(name)
         if pattern is None or pattern.family not in LOOKED_FOR:
             return (name,)
         return (pattern.family, *(variable.name for variable in pattern.variables))
 
     def drop(self, names: Iterable[str]) -> None:
-        """Leave out patterns that were looked for and are of no use; their columns stay where they are."""
+        """Remove useless picked patterns; their columns stay."""
         for name in names:
             del self.patterns[name], self._of_patterns[name]
 
     def samples(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Columns over all rows, shape (n, p)."""
+        """Return columns over all rows, shape (n, p)."""
         starts = np.cumsum([0, *(part.shape[1] for part in self._everywhere)])
         found = np.empty((len(self.channel.residual), len(columns)))
         for k, column in enumerate(columns):
@@ -160,20 +159,20 @@ class Bank:
         return found
 
     def fitted(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Columns over the kept rows, whitened, shape (m, p)."""
+        """Return whitened columns over kept rows, shape (m, p)."""
         return np.asarray(self._columns.of(columns), dtype=np.float64)
 
     def beside(self, but_for: NDArray[np.bool_] | None = None, only: NDArray[np.int64] | None = None) -> BesideBase:
-        """Causes beside the base; some kept rows, shape (m,), may say nothing: the target must be zero there.
+        """Return causes beside the base; rows, shape (m,), may be ignored if the target is zero there.
 
         Args:
-            only: columns that are then asked for, rising, shape (q,); all if None.
+            only: needed columns, rising, shape (q,); None: all.
         """
         columns = self._columns if but_for is None else self._columns.but_for(but_for, only)
         return BesideBase(columns, self.channel.known, self.channel.held, self.noise.innovation)
 
     def add(self, more: Sequence[Pattern]) -> list[str]:
-        """Take in patterns that are not there yet, and return their names."""
+        """Add new patterns and return their names."""
         fresh = [p for p in {p.name: p for p in more}.values() if p.name not in self.patterns]
         if not fresh:
             return []
@@ -186,18 +185,17 @@ class Bank:
         return [p.name for p in fresh]
 
     def measure(self, members: Sequence[Member]) -> Coloured:
-        """Noise beside members, or beside everything, as this bank measures it."""
+        """Measure noise beside members or everything, as set."""
         return self.measure_noise(members if self.measures_beside_members else None)
 
     def measure_noise(self, members: Sequence[Member] | None = None, *, white: bool = False) -> Coloured:
-        """Noise from what base and members leave; columns are whitened for it from then on.
+        """Measure noise from the residual and whiten columns by it.
 
-        What columns take out of noise of this kind is put back, by frequency: it is seen by what they take out of draws.
+        Power that columns absorb from such noise, seen by draws, is restored by frequency.
 
         Args:
-            members: that it is measured beside; None: all laws and patterns together. What was looked for in the residual takes
-                part then only where it is worth its odds: the largest of many chance peaks takes more from noise than a column may.
-            white: take it for white, whatever it is.
+            members: None: all laws and patterns; picked ones only if worth their odds, since chance peaks absorb noise.
+            white: assume white noise.
         """
         least = max(QUIETEST * self.channel.size, self.channel.least_noise)
         stretches = self.channel.stretches
@@ -229,9 +227,9 @@ class Bank:
         return self.noise
 
     def log_likelihood(self) -> float:
-        """Log likelihood of the kept rows under the base and this noise alone, but for what is the same for every noise.
+        """Return the kept rows' log likelihood under base and noise, up to a constant.
 
-        What the parameters of the noise cost is part of it [Akaike's criterion for few rows].
+        Noise parameters cost by [Akaike's criterion for few rows].
         """
         target, innovation = self.target, self.noise.innovation
         rest = target - self.base @ self.base_values(np.zeros(len(self.channel.residual)))
@@ -240,7 +238,7 @@ class Bank:
         return self.log_level() - 0.5 * float(rest @ rest) / innovation**2 - float(np.log(seen).sum())
 
     def log_level(self) -> float:
-        """The part of a log likelihood that is of the noise alone: how much is new in each row, less what its parameters cost."""
+        """Return the noise's part of a log likelihood: innovation level and parameter cost."""
         count = len(self.spread)
         uneven = 0.0 if self.whitening is None else float(np.log(self.whitening.diagonal()).sum())
         parameters = self.noise.parameters + (1 if np.isfinite(self.tails) else 0)
@@ -250,7 +248,7 @@ class Bank:
         return -count * float(np.log(self.noise.innovation)) + uneven - cost
 
     def tails_beyond(self, members: Sequence[Member]) -> float:
-        """Log likelihood of what is new in the rows under Student's t, over that of the weighted Gaussian that stands for it."""
+        """Return the innovations' log likelihood gain of Student's t over its weighted Gaussian."""
         if not np.isfinite(self.tails):
             return 0.0
         left = self.beside().left(self.target[:, None], self._sizes(members))[:, 0] / self.noise.innovation
@@ -258,12 +256,12 @@ class Bank:
         return float(np.sum(student - np.log(self.trust) + 0.5 * left**2))
 
     def may_have_long_tails(self, members: Sequence[Member]) -> bool:
-        """Whether what is new in the rows, as the noise is now, has longer tails than the normal distribution beside members."""
+        """Return whether innovations have longer than normal tails beside members."""
         left = self.beside().left(self.target[:, None], self._sizes(members))[:, 0]
         return has_long_tails(left / self.trust)
 
     def _spread_of(self, left: NDArray[np.float64]) -> tuple[NDArray[np.float64], str]:
-        """Spread of each kept row that makes whitened rows most probable: a constant part, those known, and those that grow."""
+        """Return each kept row's most probable spread: constant, known and growing parts."""
         if self.channel.levels is not None:
             return spread_by_kind(np.square(left * self.spread), self.channel.levels[self.channel.kept]), ""
         grows, known, follows = self.channel.grows, self.channel.known_noise, self.channel.noise_follows
@@ -291,7 +289,7 @@ class Bank:
     def _colour_of(
         self, left: NDArray[np.float64], draws: NDArray[np.float64], stretches: Sequence[slice], level: Coloured
     ) -> Coloured:
-        """Noise of the residual, as it was before it was whitened, what columns take out of draws put back; at a level if alike."""
+        """Return the residual's noise before whitening, absorbed power restored; at a level if alike."""
         pairs = [(bands_of(draws[:, k], stretches), bands_of(left[:, 1 + k], stretches)) for k in range(draws.shape[1])]
         taken = [r.log_power - w.log_power for w, r in pairs if w is not None and r is not None]
         bands = bands_of(left[:, 0], stretches)
@@ -315,14 +313,14 @@ class Bank:
         return level if alike(found.with_innovation(level.innovation), level) else found
 
     def _sizes(self, members: Sequence[Member]) -> NDArray[np.float64]:
-        """Prior standard deviations of all columns, zero for those that are of no member."""
+        """Return columns' prior standard deviations, zero outside members."""
         sd = np.zeros(self._columns.count)
         for member in members:
             sd[member.columns] = member.sd
         return sd
 
     def _taking_part(self, beside: BesideBase) -> NDArray[np.float64]:
-        """Prior standard deviations of all columns that noise is measured beside, zero for the others."""
+        """Return prior standard deviations of columns beside which noise is measured, else zero."""
         found = [self._of_patterns[name] for name in self._of_patterns if name in self.looked_for]
         idle: set[str] = set()
         if found:
@@ -350,39 +348,39 @@ class Bank:
             self._columns.add(part)
 
     def whitened(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Kept ones of all rows, shape (n, ...), with their noise made white."""
+        """Return whitened kept rows of all rows, shape (n, ...)."""
         return _whitened(self.channel.kept, self.whitening, rows)
 
     def _whitener(self) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-        """What does that as the noise is now, whatever it is later."""
+        """Return the present whitening as a function."""
         return partial(_whitened, self.channel.kept, self.whitening)
 
     @property
     def target(self) -> NDArray[np.float64]:
-        """Residual of the kept rows, its noise made white, shape (m,)."""
+        """Return the whitened residual of kept rows, shape (m,)."""
         return self.whitened(self.channel.residual)
 
     @property
     def base(self) -> NDArray[np.float64]:
-        """Columns of the base over the kept rows, whitened, shape (m, k)."""
+        """Return the whitened base over kept rows, shape (m, k)."""
         return self._columns.base
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """Orthonormal axes of the base over the kept rows, shape (m, r); fewer than its columns where some say the same."""
+        """Return orthonormal base axes over kept rows, shape (m, r)."""
         return self._columns.axes
 
     def base_values(self, effect: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values of the base columns beside an effect over all rows, shape (k,)."""
+        """Return base values beside an effect over all rows, shape (k,)."""
         target = self.whitened(self.channel.residual - effect)
         block = compress(np.arange(self.base.shape[1]), self.base, target)
         return solve([block], self.channel.known, self.noise.innovation, self.channel.held).x
 
     def refine(self, name: str, nonlinear: tuple[float, ...], amplitudes: NDArray[np.float64]) -> None:
-        """Lay out a law at values of all its parameters, with tangents and slack.
+        """Lay out a law at parameter values, with tangents and slack.
 
         Args:
-            amplitudes: of all its columns, zero for those of other forms, shape (p,).
+            amplitudes: of all columns, zero for other forms, shape (p,).
         """
         law = self.laws[name]
         exact = law.columns(nonlinear) if law.at is None else law.at(nonlinear, amplitudes)
@@ -449,7 +447,7 @@ class Bank:
         return (Variant(own, size, log_weight=half), *alone)
 
     def _odds(self, pattern: Pattern) -> float:
-        """Log prior odds: a family's, shared by its members over all variables and by the forms that were tried."""
+        """Return log prior odds: a family's, shared over variables and tried forms."""
         every = (*self.patterns.values(), pattern)
         over = {tuple(v.name for v in p.variables) for p in every if p.family is pattern.family}
         names = [variable.name for variable in self.channel.variables]
@@ -473,7 +471,7 @@ def _forms(
     nonlinear: tuple[float, ...],
     log_weight: float,
 ) -> list[Variant]:
-    """Forms of a law at one point: its choices where it has them, else all its amplitudes, whose columns these are."""
+    """Return a law's forms at one point: its choices, or all amplitudes."""
     if not law.choices:
         return [Variant(columns, plausible, nonlinear, log_weight=log_weight, positive=law.positive)]
     return [
@@ -490,14 +488,14 @@ def _forms(
 
 
 def amplitudes_of(variant: Variant) -> NDArray[np.int64]:
-    """Numbers of the amplitudes that a form has, among all of its law, shape (p,)."""
+    """Return a form's amplitude numbers within its law, shape (p,)."""
     if not len(variant.whole):
         return np.arange(len(variant.columns))
     return np.searchsorted(variant.whole, variant.columns)
 
 
 def alike(one: Coloured, other: Coloured) -> bool:
-    """Whether two noises are the same for anything that is compared: their spectra are, and what is slow and what is new in them."""
+    """Return whether two noises have equal spectra and innovations."""
     pairs = ((one.innovation, other.innovation), (one.effective, other.effective))
     if any(abs(a - b) >= SETTLED * max(a, b) for a, b in pairs):
         return False
@@ -525,7 +523,7 @@ SETTLED = 0.03
 
 
 def spacing_of(grid: Sequence[float], value: float) -> float:
-    """Spacing of a rising grid about a value; of a single point, its size."""
+    """Return a grid's spacing about a value; for one point, its size."""
     if len(grid) == 1:
         return max(abs(grid[0]), 1e-300)
     k = int(np.clip(np.searchsorted(grid, value), 1, len(grid) - 1))

@@ -1,4 +1,4 @@
-"""Runs compressed to what they say about their columns, and what is known of the columns beforehand."""
+"""Runs compressed to information on their columns, with priors."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """All that one run says about its columns.
+    """One run's information on its columns.
 
     Attributes:
-        columns: which columns of x it touches, shape (k,).
-        triangle: upper triangle of J, shape (r, k), with r at most k + 1.
-        target: transformed right-hand side, shape (r,).
-        count: measurements that went into it.
-        square: sum of squares of the target, which bounds what any fit can explain.
-        noise: standard deviation of one measurement where the block does not share the channel's: another
-            instrument's readings, whose uncertainty is stated; None for the channel's.
+        columns: touched, shape (k,).
+        triangle: of J, shape (r, k), r at most k + 1.
+        target: transformed, shape (r,).
+        count: measurements.
+        square: of the target, a bound of what fits explain.
+        noise: own, of another instrument; None: the channel's.
     """
 
     columns: NDArray[np.int64]
@@ -45,12 +44,10 @@ def compress(columns: NDArray[np.int64], jacobian: NDArray[np.float64], target: 
 
 
 def spread(blocks: Sequence[Block], columns: int, noise: float | None = None) -> NDArray[np.float64]:
-    """Rows of all blocks over all columns, target last, shape (r, columns + 1).
+    """Return all blocks' rows over all columns, target last, shape (r, columns + 1).
 
     Args:
-        blocks: compressed runs.
-        noise: standard deviation of one measurement, where a block does not state its own: rows are divided by it, so that all
-            weigh alike; None leaves them as they are.
+        noise: rows are divided by it or the block's own; None: undivided.
     """
     wide = np.zeros((sum(len(block.target) for block in blocks), columns + 1))
     row = 0
@@ -65,7 +62,7 @@ def spread(blocks: Sequence[Block], columns: int, noise: float | None = None) ->
 
 
 def spread_over(blocks: Sequence[Block], columns: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Rows of all blocks over some columns, shape (k,), in their order, target last, shape (r, k + 1); others are left out."""
+    """Return all blocks' rows over some columns, shape (k,), target last, shape (r, k + 1)."""
     order = np.argsort(columns)
     narrow = np.zeros((sum(len(block.target) for block in blocks), len(columns) + 1))
     row = 0
@@ -79,7 +76,7 @@ def spread_over(blocks: Sequence[Block], columns: NDArray[np.int64]) -> NDArray[
 
 
 def joined(blocks: Sequence[Block], columns: int) -> Block:
-    """One block over all columns that says what several blocks of one noise say together."""
+    """Return blocks of one noise as a single block over all columns."""
     if any(block.noise is not None for block in blocks):
         raise ValueError("blocks with a noise of their own cannot be joined with others")
     triangle = triangle_of(spread(blocks, columns))
@@ -94,13 +91,12 @@ def joined(blocks: Sequence[Block], columns: int) -> Block:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What is known of the columns of x before the measurement.
+    """Prior knowledge of columns.
 
     Attributes:
-        prior: standard deviation of each column about zero, infinite where nothing is known, shape (k,).
-        scale: size at which a column would matter, shape (k,): a direction is lost when the measurement
-            leaves it more uncertain than this.
-        random: True for random effects, which are averaged over rather than reported, shape (k,).
+        prior: standard deviation about zero, infinite if unknown, shape (k,).
+        scale: size that matters, shape (k,): a direction is lost if less certain.
+        random: effects averaged, not reported, shape (k,).
     """
 
     prior: NDArray[np.float64]
@@ -109,7 +105,7 @@ class Columns:
 
 
 def with_random(known: Columns, sd: NDArray[np.float64]) -> Columns:
-    """What is known of columns and of random effects behind them, with these standard deviations."""
+    """Return columns with random effects of these standard deviations appended."""
     return Columns(
         np.concatenate([known.prior, sd]),
         np.concatenate([known.scale, sd]),

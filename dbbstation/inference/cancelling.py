@@ -1,4 +1,4 @@
-"""Effects that cancel each other: each is larger than all of them together."""
+"""Effects that cancel: each exceeds their sum."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Cancelling:
     """Effects that cancel each other.
 
     Attributes:
-        rms: root mean square of each about its mean, by name, those that are larger than all together.
+        rms: about its mean, by name, of those above the sum.
     """
 
     rms: Mapping[str, float]
@@ -32,11 +32,11 @@ class Cancelling:
 
 
 def cancelling(effects: Mapping[str, NDArray[np.float64]], unit: str, scale: float = 1.0) -> Cancelling | None:
-    """Effects larger than all together, where most of their squares cancel; None where they do not.
+    """Return effects above their sum if most squares cancel, else None.
 
     Args:
-        effects: by name, over all rows, shape (n,).
-        scale: this many of it are one of the residual's.
+        effects: by name, shape (n,).
+        scale: per residual unit.
     """
     rms = {name: float(np.std(effect)) for name, effect in effects.items()}
     whole = float(np.std(np.sum(list(effects.values()), axis=0))) if effects else 0.0
@@ -46,11 +46,10 @@ def cancelling(effects: Mapping[str, NDArray[np.float64]], unit: str, scale: flo
 
 
 def effects_by_name(settled: Settled, names: Mapping[str, str] | None = None) -> dict[str, NDArray[np.float64]]:
-    """Effects of the members of the best hypothesis, in order of their names, shape (n,) each.
+    """Return the best hypothesis's effects by name, shape (n,) each.
 
     Args:
-        settled: what a comparison came to.
-        names: by member, what it is shown as; members that are shown as one are added up. None: each as it is.
+        names: display names by member; equal ones are summed. None: own names.
     """
     shown = {name: name if names is None else names.get(name) or name for name in settled.best.names}
     groups = {of: [name for name in shown if shown[name] == of] for of in sorted(set(shown.values()))}

@@ -44,13 +44,13 @@ base parameter more uncertain than that does not see it."""
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """What is fitted anew with every hypothesis.
+    """Columns refitted with every hypothesis.
 
     Attributes:
-        names: of the columns, shape (k,).
-        samples: what one unit of each does to the residual, shape (n, k).
-        prior: standard deviation of each about zero, infinite where nothing is known, shape (k,).
-        random: which are effects of the set-up, averaged over rather than reported, shape (k,); those need a finite prior.
+        names: shape (k,).
+        samples: effect of one unit, shape (n, k).
+        prior: standard deviation about zero, infinite if unknown, shape (k,).
+        random: set-up effects averaged over, with finite prior, shape (k,).
     """
 
     names: tuple[str, ...]
@@ -60,39 +60,35 @@ class Base:
 
     @classmethod
     def flat(cls, names: Sequence[str], samples: NDArray[np.float64]) -> Base:
-        """Columns of which nothing is known beforehand."""
+        """Return columns without prior knowledge."""
         count = samples.shape[1]
         return cls(tuple(names), samples, np.full(count, np.inf), np.zeros(count, dtype=bool))
 
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A physical cause, as columns.
+    """A physical cause as columns.
 
     Attributes:
-        name: unique in its channel.
-        columns: what one unit of each amplitude does to the residual at values of the nonlinear parameters, over all rows, shape
-            (n, p).
-        plausible: usual size of each amplitude, one standard deviation, shape (p,).
-        parameters: names of the amplitudes, then of the nonlinear parameters.
-        grids: values of each nonlinear parameter to begin with, rising.
-        positive: which amplitudes cannot be negative, shape (p,); empty where all can.
-        form_uncertainty: share of the effect by which real objects depart from the formula, one standard deviation.
-        follows: variable along which they do; None where the formula is exact or `discrepancy` says it.
-        discrepancy: columns of what the formula may be off by, shape (n, q), from its effect, shape (n,), its nonlinear
-            parameters and its amplitudes, shape (p,); `form_uncertainty` is their standard deviation. By default, the effect
-            times smooth functions of `follows`.
-        at: columns like `columns`, at values of the nonlinear parameters and about amplitudes, shape (p,), whose effect they give
-            exactly; None where the effect is proportional to the amplitudes.
-        choices: forms of which one is there, where there are several: the columns of each, its log probability, and what tells it
-            from the others. None may be combined with `positive`.
-        reach: largest effect of each amplitude, one standard deviation, whatever the nonlinear parameters are, in the unit of the
-            residual; None: amplitudes have their `plausible` size at all of them.
-        family: of patterns that it belongs to; None for physics of a client.
-        variables: that it follows, where it belongs to a family.
-        followed: names of what it follows, where these are no variables of the channel, such as a signal at a port.
-        way: how it follows them, `direction` or `late`, where it belongs to no family; empty: by value.
-        acts_once: no other rows can show it: a ball that was put up badly.
+        name: unique.
+        columns: one unit of each amplitude at nonlinear parameters, all rows, shape (n, p).
+        plausible: one standard deviation of amplitudes, shape (p,).
+        parameters: amplitudes, then nonlinear ones.
+        grids: start values of nonlinear parameters, rising.
+        positive: amplitudes that cannot be negative, shape (p,); may be empty.
+        form_uncertainty: relative departure of real objects, one standard deviation.
+        follows: variable of that departure; None if exact or given by `discrepancy`.
+        discrepancy: columns of departure, shape (n, q), from effect, shape (n,), nonlinear parameters and amplitudes, shape (p,),
+            with `form_uncertainty` as standard deviation; default: the effect times smooth functions of `follows`.
+        at: columns about amplitudes, shape (p,), exact there; None if the effect is proportional.
+        choices: alternative forms: columns, log probability, label; not with `positive`.
+        reach: largest effect of each amplitude, one standard deviation, in the residual's unit; None: `plausible` holds
+            everywhere.
+        family: of patterns; None for a client's physics.
+        variables: followed, within a family.
+        followed: names that are no variables, such as port signals.
+        way: `direction` or `late` outside families; empty: by value.
+        acts_once: no other rows can show it.
     """
 
     name: str
@@ -116,7 +112,7 @@ class Law:
     acts_once: bool = False
 
     def plausible_of(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Usual size of each amplitude, shape (p,), whose columns are these, shape (n, p)."""
+        """Return usual amplitudes, shape (p,), of columns, shape (n, p)."""
         if self.reach is None:
             return self.plausible
         return np.asarray(self.reach / np.maximum(np.abs(samples).max(axis=0), 1e-300))
@@ -124,35 +120,28 @@ class Law:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """Residual rows and what may have gone into them.
+    """Residual rows and possible contributions.
 
     Attributes:
-        residual: measured less simulated, rows of a block together and in time order, shape (n,).
-        blocks: rows of each block (run, file, day), covering all rows in order.
-        variables: that effects without physics may follow.
+        residual: measured less simulated, by block in time order, shape (n,).
+        blocks: rows of each, covering all in order.
         base: what is fitted anew with every hypothesis.
         laws: physical causes.
-        time: of the rows, rising within blocks, shape (n,); None where their order means nothing.
-        simulated: the simulated value as a variable, to ask whether it is late; None: it is not asked.
-        kept: rows that are fitted, shape (n,); all if not given.
-        apart: rows from one that is kept to the next one where none between them is held back.
-        static: patterns that need no look, where they are known already or a client makes them itself; None: all kinds over all
-            variables.
-        least_noise: standard deviation of one row that is always there, whatever the rows seem to say: what the way they were
-            made leaves of a perfect object, in the unit of the residual.
-        step: that measured values are multiples of, in the unit of the residual; zero where they are of no step that is known.
-        surely: probability that the noise is not more than it is taken for [interval of a variance by chi-square; JCGM 101:2008,
-            sec. 6.4.9.4]; None: its estimate is taken, for which half of that is as good.
-        grows: size of what a part of the noise may be in proportion to, beside a constant part, shape (n,); None: noise is the
-            same in all rows.
-        noise_follows: by name, sizes of what a part of the noise may be in proportion to, of which it follows one at the most,
-            each of shape (n,).
-        known_noise: standard deviation of noise that a row is known to have beyond that of the others, in the unit of the
-            residual, shape (n,); None: no row is known to have more.
-        levels: number of the kind of each row, from 0, where kinds of rows, such as outputs, have each a noise of a size of its
-            own, shape (n,); None: all rows have the same.
-        clock: of all rows, where some were left out or where they show a step by and by; None: they show it at once.
-        direction: of travel as the rows show it, shape (n,); None: nothing is looked for in time that turns with it.
+        time: rising within blocks, shape (n,); None for unordered rows.
+        simulated: to test lateness; None: not tested.
+        kept: fitted rows, shape (n,); default all.
+        apart: rows between kept ones without held-back rows.
+        static: patterns without look; None: all kinds over all variables.
+        least_noise: always present in a row, in the residual's unit.
+        step: of measured values, in the residual's unit; zero if unknown.
+        surely: probability of the noise bound [interval of a variance by chi-square; JCGM 101:2008, sec. 6.4.9.4]; None: the
+            estimate.
+        grows: size of proportional noise beside a constant part, shape (n,); None: constant.
+        noise_follows: candidates for proportional noise by name, shape (n,) each; at most one holds.
+        known_noise: additional standard deviation per row, in the residual's unit, shape (n,); or None.
+        levels: kind of each row from 0, with own noise each, shape (n,); None: one kind.
+        clock: for omitted rows or gradual steps; None: immediate.
+        direction: of travel, shape (n,); None: no direction-dependent looks in time.
     """
 
     residual: NDArray[np.float64]
@@ -183,11 +172,11 @@ class Channel:
             object.__setattr__(self, "kept", np.ones(len(self.residual), dtype=bool))
 
     def without(self, rows: NDArray[np.bool_]) -> Channel:
-        """The same with some rows held back, shape (n,)."""
+        """Return the channel with rows held back, shape (n,)."""
         return replace(self, kept=self.kept & ~rows)
 
     def thinned(self, most: int) -> Channel:
-        """The same with so many kept rows at the most, evenly spaced in each block."""
+        """Return the channel with at most so many kept rows, evenly in each block."""
         apart = int(np.ceil(self.kept.sum() / most))
         if apart <= 1:
             return self
@@ -203,7 +192,7 @@ class Channel:
 
     @cached_property
     def size(self) -> float:
-        """Root mean square of what the base leaves of the kept rows: no effect is much larger, in the unit of the residual."""
+        """Return the rms beyond the base, a bound of effects, in the residual's unit."""
         left = self.target - self.base.samples[self.kept] @ self.fitted(self.target, self._about).x
         return max(
             float(np.sqrt(np.mean(left**2))),
@@ -222,28 +211,28 @@ class Channel:
 
     @cached_property
     def held(self) -> NDArray[np.float64]:
-        """Directions of the base that the rows do not see, kept at zero, shape (h, f)."""
+        """Return base directions invisible to the rows, held at zero, shape (h, f)."""
         return lost_directions([self._block(self.target)], self.known, self._about)
 
     def fitted(self, target: NDArray[np.float64], noise: float) -> Solution:
-        """Fit the base alone to kept rows of a target, at a noise of one row."""
+        """Fit the base to kept rows of a target at a row's noise."""
         return solve([self._block(target)], self.known, noise, self.held)
 
     def refitted(self) -> NDArray[np.float64]:
-        """Values of the base alone by ordinary least squares, shape (k,): what a person would refit who knows neither noise nor priors."""
+        """Return the base's ordinary least-squares values, shape (k,)."""
         rows = self.base.samples[self.kept]
         scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
         return np.asarray(np.linalg.lstsq(rows / scale, self.target, rcond=None)[0] / scale)
 
     @property
     def kept_blocks(self) -> list[slice]:
-        """Blocks as slices of the kept rows; those that have none are left out."""
+        """Return blocks as slices of kept rows, without empty ones."""
         counts = np.cumsum([0, *(int(self.kept[rows].sum()) for rows in self.blocks)])
         return [slice(int(a), int(b)) for a, b in pairwise(counts) if b > a]
 
     @property
     def stretches(self) -> list[slice]:
-        """Kept rows that follow one another without a gap, as slices of the kept rows."""
+        """Return gapless stretches as slices of kept rows."""
         rows = np.flatnonzero(self.kept)
         block = np.searchsorted([b.stop for b in self.blocks], rows, side="right")
         edges = np.flatnonzero((np.diff(rows) != self.apart) | (np.diff(block) != 0)) + 1
@@ -251,7 +240,7 @@ class Channel:
 
     @property
     def _about(self) -> float:
-        """A first idea of the noise: the spread of the residual."""
+        """Return the residual's spread, a first idea of noise."""
         return max(
             float(np.std(self.target)), self.least_noise, 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300
         )

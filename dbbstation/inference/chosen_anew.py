@@ -1,12 +1,9 @@
-"""What each effect brings in parts that took no part in choosing it, by the density of the prediction.
+"""Each effect's gain in parts that took no part in its choice, by predictive density.
 
-Without each part the set of causes is chosen anew, from all that is listed, about the columns of all rows: places of waves, bumps and
-steps, and nonlinear parameters to within half a step of their grid, are those of all. Then the part is predicted with what was chosen,
-and with that but for one effect, base and other effects fitted anew without the part.
-
-A prediction is scored by its log density [Good, Rational decisions, J. R. Stat. Soc. B 14 (1952) 107], which counts errors by how well
-they are known: noise, random effects that only the part knows, such as where its balls came to stand, and what the other parts leave
-open of the base. Squares of errors alone are mostly the last two. What a part adds to the log evidence of a set is that density.
+Without each part the set is chosen anew from all listed causes; places and nonlinear parameters are those of all rows
+within half a grid step. The part is then predicted with the set and without each effect, refitted. The score is the log
+density [Good, Rational decisions, J. R. Stat. Soc. B 14 (1952) 107], which includes noise, the part's own random effects
+and open directions of the base: what a part adds to a set's log evidence.
 """
 
 from __future__ import annotations
@@ -31,21 +28,20 @@ class ChosenAnew:
     """What was found when parts were held back in turn.
 
     Attributes:
-        brought: by kind, in each part, what an effect brought: log density of the prediction with it less that without it; not given
-            where it was not chosen.
-        whole: in each part, the same of everything that was chosen, over the base alone.
+        brought: by kind, log density per part with less without it; absent if not chosen.
+        whole: per part, of everything over the base.
     """
 
     brought: tuple[dict[Kind, float], ...]
     whole: tuple[float, ...]
 
     def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
-        """What effects of some kinds brought together in each part; nothing where none of them was chosen."""
+        """Return the joint gain of kinds per part; empty if never chosen."""
         return DensityGains(tuple(sum(part.get(kind, 0.0) for kind in set(kinds)) for part in self.brought))
 
     @property
     def is_worse(self) -> bool:
-        """Whether what was chosen predicts worse than the base alone does."""
+        """Return whether the choice predicts worse than the base."""
         return sum(self.whole) < 0.0
 
 
@@ -59,9 +55,9 @@ def chosen_anew(
     """Choose anew without each part, and predict it.
 
     Args:
-        of_all: causes beside the base over all rows.
-        choose: members of the most probable set, in a search that begins with what was chosen from all rows.
-        kind_of: name of a cause to what tells it from other places or periods of the same.
+        of_all: causes over all rows.
+        choose: most probable members, starting from all rows' choice.
+        kind_of: from a cause to its kind.
     """
     brought, whole = [], []
     for others in of_others:
@@ -79,5 +75,5 @@ def chosen_anew(
 
 
 def _predicted(of_all: ModelComparison, of_others: ModelComparison, members: Sequence[Member]) -> float:
-    """Log density of the part that was held back, over that by the base alone."""
+    """Return a held-back part's log density over the base's."""
     return of_all.log_evidence(members) - of_others.log_evidence(members)

@@ -1,8 +1,7 @@
-"""Noise whose neighbours resemble each other: an autoregressive process, and the filter that makes it white.
+"""Noise with correlated neighbours: an autoregressive process and its whitening filter.
 
-A row is predicted from those before it; what that leaves is white, and an exact likelihood of all rows [Brockwell and Davis, Time
-Series: Theory and Methods, 2nd ed., prop. 5.2.1]. Low-passed, resonant and wandering noise are such processes, of high order where
-need be. So a wave, a step or a pulse is held against the noise that there is at its own frequencies.
+Innovations give the exact likelihood [Brockwell and Davis, Time Series: Theory and Methods, 2nd ed., prop. 5.2.1].
+Low-passed, resonant and wandering noise are such processes. Effects are judged against noise at their own frequencies.
 """
 
 from __future__ import annotations
@@ -76,9 +75,9 @@ class Coloured:
     """Noise of a channel.
 
     Attributes:
-        sigma: standard deviation of one row, in the unit of the residual.
-        partial: partial autocorrelations from lag 1 on; none for white noise.
-        told_by: numbers that say how neighbours resemble each other, where these are fewer than the partial autocorrelations.
+        sigma: of a row, in the residual's unit.
+        partial: partial autocorrelations from lag 1; none if white.
+        told_by: fewer numbers that determine them.
     """
 
     sigma: float
@@ -87,13 +86,13 @@ class Coloured:
 
     @classmethod
     def first_order(cls, sigma: float, share: float, decay: float, turn_rad: float = 0.0) -> Coloured:
-        """White noise on top of a first-order process, or of one that oscillates as it dies away.
+        """Return white plus first-order noise, or oscillating noise.
 
         Args:
-            sigma: standard deviation of one row.
-            share: part of the variance that belongs to the process, from 0 to 1.
-            decay: correlation of that from one row to the next; of one that oscillates, of its envelope.
-            turn_rad: phase of the oscillation from one row to the next [rad].
+            sigma: of a row.
+            share: of the process in the variance, 0 to 1.
+            decay: correlation of neighbours, or of the envelope.
+            turn_rad: oscillation phase per row.
         """
         lags = np.arange(LONGEST + 1)
         correlation = np.where(lags == 0, 1.0, share * decay**lags * np.cos(turn_rad * lags))
@@ -106,36 +105,36 @@ class Coloured:
 
     @property
     def order(self) -> int:
-        """Rows that a prediction looks back over."""
+        """Return the rows that a prediction uses."""
         return len(self.partial)
 
     @property
     def parameters(self) -> int:
-        """Numbers that say how neighbours resemble each other."""
+        """Return the number of correlation parameters."""
         return min(self.order, self.told_by)
 
     @property
     def correlation_samples(self) -> float:
-        """Rows that count as one independent row for anything smooth; 1 for white noise."""
+        """Return rows per independent row for smooth effects; 1 if white."""
         return (self.effective / self.sigma) ** 2
 
     @property
     def effective(self) -> float:
-        """Standard deviation of white noise with the same power at frequency zero."""
+        """Return the white noise of equal power at frequency zero."""
         return self.innovation / abs(float(self.filter.sum()))
 
     @property
     def innovation(self) -> float:
-        """Standard deviation of what is new in a row."""
+        """Return the innovation's standard deviation."""
         return self.sigma * float(np.sqrt(self._predictors[1][-1]))
 
     def with_innovation(self, innovation: float) -> Coloured:
-        """The same at a level where so much is new in a row."""
+        """Return the noise scaled to an innovation."""
         return replace(self, sigma=innovation / float(np.sqrt(self._predictors[1][-1])))
 
     @cached_property
     def _predictors(self) -> tuple[list[NDArray[np.float64]], list[float]]:
-        """Coefficients of predictions from 0, 1, ... rows before, and the share of the variance that each leaves."""
+        """Return prediction coefficients of orders 0, 1, ..., and remaining variance shares."""
         coefficients, left = [np.zeros(0)], [1.0]
         for partial in self.partial:
             before = coefficients[-1]
@@ -145,25 +144,24 @@ class Coloured:
 
     @cached_property
     def filter(self) -> NDArray[np.float64]:
-        """Coefficients that take a row and those before it to what is new in it, shape (p + 1,)."""
+        """Return the whitening filter, shape (p + 1,)."""
         return np.concatenate([[1.0], -self._predictors[0][-1]])
 
     def log_power(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Log of the spectrum at frequencies [cycles per row], that of white noise being the log of its variance."""
+        """Return the log spectrum [cycles per row], log variance for white noise."""
         taps = self.filter
         phase = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(taps))))
         gain = np.abs(phase @ taps) ** 2
         return np.asarray(2.0 * np.log(self.innovation) - np.log(gain), dtype=np.float64)
 
     def independent_samples(self, stretches: Sequence[slice]) -> float:
-        """Effective number of independent samples that squares of rows of this noise make up, summed over stretches.
+        """Return the independent samples of squared rows, over stretches.
 
-        n / (1 + 2 sum of rho(k)²) = n mean(S)² / mean(S²), S being the spectrum averaged over 1 / n, since n rows show no more of it
-        [Bartlett, J. R. Stat. Soc. 98 (1935) 536; Priestley 1981, sec. 5.3.2]. Slow noise has few, and so has noise of one frequency.
-        Rows count as equally spaced.
+        n / (1 + 2 sum of rho(k)²) = n mean(S)² / mean(S²), S averaged over 1 / n [Bartlett, J. R. Stat. Soc. 98 (1935)
+        536; Priestley 1981, sec. 5.3.2].
 
         Args:
-            stretches: rows that follow one another without a gap.
+            stretches: gapless rows.
         """
         power = np.exp(
             self.log_power((np.arange(FREQUENCIES, dtype=np.float64) + 0.5) / (2.0 * FREQUENCIES))
@@ -177,10 +175,10 @@ class Coloured:
         return total
 
     def whitening(self, stretches: Sequence[slice]) -> csr_array | None:
-        """Matrix that makes noise of rows white with the standard deviation `innovation`; None where it is white.
+        """Return the matrix to white noise of size `innovation`; None if white.
 
         Args:
-            stretches: rows that follow one another without a gap, covering all rows in order.
+            stretches: gapless, covering all rows in order.
         """
         if self.is_white:
             return None
@@ -205,7 +203,7 @@ class Coloured:
         return csr_array(flat, shape=(size, size))
 
     def unwhitened(self, white: NDArray[np.float64], stretches: Sequence[slice]) -> NDArray[np.float64]:
-        """Rows, shape (n,), that `whitening` takes to these.
+        """Return the rows, shape (n,), that whitening maps to these.
 
         Args:
             white: shape (n,).
@@ -226,17 +224,17 @@ class Coloured:
 
 
 def _state(taps: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np.float64]:
-    """State of the filter 1/taps behind outputs, the last one last, shape (p,)."""
+    """Return the state of filter 1/taps behind outputs, last one last, shape (p,)."""
     order = len(taps) - 1
     recent = before[::-1]
     return np.array([-(taps[k + 1 :] @ recent[: order - k]) for k in range(order)])
 
 
 def partial_autocorrelations(correlation: NDArray[np.float64]) -> tuple[float, ...]:
-    """Partial autocorrelations of a process [Levinson-Durbin recursion], the last ones that say nothing left out.
+    """Return partial autocorrelations [Levinson-Durbin recursion], without negligible last ones.
 
     Args:
-        correlation: autocorrelation from lag 0 on, shape (p + 1,).
+        correlation: from lag 0, shape (p + 1,).
     """
     coefficients, left, found = np.zeros(0), 1.0, []
     for order in range(1, len(correlation)):
@@ -256,12 +254,12 @@ def partial_autocorrelations(correlation: NDArray[np.float64]) -> tuple[float, .
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """Powers of rows by frequency, averaged over bands as logs.
+    """Log powers averaged over frequency bands.
 
     Attributes:
-        frequency: mean of each band [cycles per row], shape (b,).
-        log_power: mean log of the power, made that of the mean power of noise, shape (b,).
-        count: frequencies in each, shape (b,).
+        frequency: mean [cycles per row], shape (b,).
+        log_power: bias-corrected mean log, shape (b,).
+        count: frequencies per band.
     """
 
     frequency: NDArray[np.float64]
@@ -270,9 +268,9 @@ class Bands:
 
 
 def bands_of(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Bands | None:
-    """Spectrum of rows; None where no stretch is long enough.
+    """Return the rows' spectrum; None if stretches are too short.
 
-    Logs are averaged, so that a few lines, which are waves that nobody has found yet, hardly raise a band.
+    Logs resist unexplained spectral lines.
     """
     frequency, power = [], []
     longest = max((stretch.stop - stretch.start for stretch in stretches), default=0)
@@ -298,14 +296,14 @@ def bands_of(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Bands | N
 
 
 def autoregressive(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Coloured:
-    """Noise of which rows are made, by predictions that err least forward and backward.
+    """Return autoregressive noise by forward and backward prediction.
 
-    [Burg's method; Percival and Walden, Spectral Analysis for Physical Applications, 1993, sec. 9.5]. The order is by Akaike's
+    [Burg's method; Percival and Walden, Spectral Analysis for Physical Applications, 1993, sec. 9.5], order by Akaike's
     criterion for few rows [Hurvich and Tsai, Biometrika 76 (1989) 297].
 
     Args:
         rows: shape (n,).
-        stretches: that follow one another without a gap.
+        stretches: gapless.
     """
     ahead = [rows[stretch] for stretch in stretches if stretch.stop - stretch.start > 1]
     count = sum(len(own) for own in ahead)
@@ -333,15 +331,15 @@ def autoregressive(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Col
 
 
 def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) -> Coloured:
-    """White noise on top of a first-order process whose spectrum is nearest to bands; white where nothing more is worth it.
+    """Return white plus first-order noise nearest to bands, or white if not worse.
 
-    Its autocovariance is a for lag 0 and b phi^|k| cos(k t) on top of it for every lag; its spectrum
-    a + b / 2 times the sum over w + t and w - t of (1 - phi²) / |1 - phi exp(-i w)|² [Priestley, Spectral Analysis and Time Series,
-    1981, sec. 4.12]. With two parameters (t = 0), or three, it cannot follow lines that are waves nobody has found yet.
+    Autocovariance: a at lag 0, plus b phi^|k| cos(k t). Spectrum: a + b / 2 times the sum over w ± t of (1 - phi²) / |1 -
+    phi exp(-i w)|² [Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12]. Two or three parameters cannot follow
+    unexplained lines.
 
     Args:
         most: largest phi.
-        oscillates: try phases t from row to row, too: those of the bands.
+        oscillates: also try phases t of the bands.
     """
     weight = bands.count / LOG_VARIANCE
     worth = float(np.log(bands.count.sum()))
@@ -369,25 +367,25 @@ def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) ->
 
 
 def largest_decay(rows: int) -> float:
-    """Correlation of neighbours of first-order noise of which so many rows hold `FEWEST_INDEPENDENT` independent samples.
+    """Return the largest neighbour correlation with `FEWEST_INDEPENDENT` independent samples.
 
-    These are n (1 - phi²) / (1 + phi²); zero where there are no more rows than that: such noise is white.
+    Their number is n (1 - phi²) / (1 + phi²); zero for too few rows.
     """
     ratio = max(rows / FEWEST_INDEPENDENT, 1.0)
     return float(np.sqrt((ratio - 1.0) / (ratio + 1.0)))
 
 
 def akaike_cost(parameters: int, rows: int) -> float:
-    """What so many fitted parameters cost in log likelihood [Hurvich and Tsai, Biometrika 76 (1989) 297]."""
+    """Return fitted parameters' cost in log likelihood [Hurvich and Tsai, Biometrika 76 (1989) 297]."""
     return parameters * rows / max(rows - parameters - 2.0, 1.0)
 
 
 def with_put_back(noise: Coloured, bands: NDArray[np.float64], taken: NDArray[np.float64], rows: int) -> Coloured:
-    """The same with what was taken from its spectrum put back, of an order that so many rows can tell.
+    """Return the noise with absorbed power restored, in an order that the rows support.
 
     Args:
-        bands: frequencies [cycles per row], rising, shape (b,).
-        taken: log of the share that is left there, shape (b,).
+        bands: rising [cycles per row], shape (b,).
+        taken: log of the remaining share, shape (b,).
     """
     frequency = np.linspace(0.0, 0.5, FREQUENCIES + 1)
     power = np.exp(noise.log_power(frequency) - np.interp(frequency, bands, taken))

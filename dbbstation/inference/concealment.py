@@ -1,4 +1,4 @@
-"""How much of a signature the fitted parameters take up, so that a fit looks fine without it."""
+"""The share of a signature that fitted parameters absorb."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ SEEN = 1e-5
 
 @dataclass(frozen=True)
 class Concealment:
-    """A signature before and after the fitted parameters have taken their share.
+    """A signature before and after absorption.
 
     Attributes:
-        share: of the sum of squares that is taken up, 1 - |rest|²/|whole|².
+        share: of squares, 1 - |rest|²/|whole|².
     """
 
     share: float
@@ -40,15 +40,13 @@ def concealment(
     amplitudes: NDArray[np.float64],
     free: NDArray[np.float64] | None = None,
 ) -> Concealment:
-    """Share of a signature that fitted columns take up, unweighted over all samples.
+    """Return the absorbed share over all samples, unweighted.
 
     Args:
-        blocks: compressed runs; compression keeps all sums of products.
-        fitted: columns of the fitted parameters, shape (f,).
+        fitted: columns, shape (f,).
         columns: of the signature, shape (p,).
-        amplitudes: that make the signature of its columns, shape (p,).
-        free: directions of the fitted parameters that were fitted, as columns, shape (f, g); all of them if None. A
-            direction that was held takes up nothing, even where it is not quite lost.
+        amplitudes: shape (p,).
+        free: fitted directions as columns, shape (f, g); None: all. Held directions absorb nothing.
     """
     wanted = np.concatenate([fitted, columns])
     size = 1 + max(int(wanted.max()), *(int(block.columns.max()) for block in blocks))

@@ -1,4 +1,4 @@
-"""Further forms of curves: splines, stretches of rows, and products of two variables."""
+"""Further curves: splines, stretches of rows, products."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ CUBIC = 3
 
 @dataclass(frozen=True, eq=False)
 class Spline(Form):
-    """Any smooth curve: a cubic spline of so many functions over a range; outside it goes on as at its end.
+    """A smooth curve: cubic B-splines over a range, constant outside.
 
-    The functions add up to one [de Boor, A Practical Guide to Splines, rev. ed., ch. IX, eq. 36]. Without the last of them (`falls`) a
-    curve falls to zero at the upper end.
+    They sum to one [de Boor, A Practical Guide to Splines, rev. ed., ch. IX, eq. 36]; without the last (`falls`) the
+    curve falls to zero.
     """
 
     low: float
@@ -33,11 +33,11 @@ class Spline(Form):
 
     @property
     def count(self) -> int:
-        """One amplitude per function."""
+        """Return one per function."""
         return self.functions - self.falls
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """B-splines at the values, shape (..., p)."""
+        """Return B-splines at values, shape (..., p)."""
         inner = np.linspace(0.0, 1.0, self.functions - CUBIC + 1)
         knots = np.concatenate([np.zeros(CUBIC), inner, np.ones(CUBIC)])
         share = np.clip((np.asarray(values, dtype=np.float64) - self.low) / (self.high - self.low), 0.0, 1.0)
@@ -51,7 +51,7 @@ class Spline(Form):
 
 @dataclass(frozen=True, eq=False)
 class Power(Form):
-    """A power of the variable, from -1 to 1 over its range (odd) or 0 to 1 (even)."""
+    """A power of the variable scaled to -1..1 (odd) or 0..1 (even)."""
 
     low: float
     high: float
@@ -69,12 +69,12 @@ class Power(Form):
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """When rows were, and what they show of something that begins at once.
+    """When rows were, and their response to a step.
 
     Attributes:
-        rows: of each row, its time in rows from one to the next, rising, shape (n,); rows that were left out count too.
-        response: what is seen of a step from zero to one, by rows since it, 0 long before and 1 long after.
-        reach: rows before and after it beyond which the response is the same for all that follow.
+        rows: time in row intervals, rising, shape (n,), omitted rows counted.
+        response: of a unit step by rows since it, from 0 to 1.
+        reach: rows until the response is constant.
     """
 
     rows: NDArray[np.float64]
@@ -83,16 +83,16 @@ class Clock:
 
     @classmethod
     def plain(cls, count: int) -> Clock:
-        """Rows without a gap that show a step at once."""
+        """Return gapless rows with immediate response."""
         return cls(np.arange(count, dtype=np.float64), lambda since: (since >= 0.0).astype(np.float64), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Stretches(Form):
-    """One value over each of several stretches of time, nothing elsewhere; the variable is the time in rows of a clock.
+    """One value per stretch of time, else zero; the variable is a clock's rows.
 
     Attributes:
-        last: its end; infinite where it does not end.
+        last: infinite if endless.
     """
 
     first: tuple[float, ...]
@@ -101,15 +101,15 @@ class Stretches(Form):
 
     @property
     def count(self) -> int:
-        """One height per stretch."""
+        """Return one height per stretch."""
         return len(self.first)
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What is seen of one in each stretch, shape (n, p)."""
+        """Return the visible part of each stretch, shape (n, p)."""
         begun, ended = (self.response(values[..., None] - np.array(edges)) for edges in (self.first, self.last))
         return np.asarray(begun - ended, dtype=np.float64)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Both sides of every edge."""
+        """Return both sides of every edge."""
         edges = np.array([[a - 0.5, a + 0.5, b - 0.5, b + 0.5] for a, b in zip(self.first, self.last, strict=True)])
         return np.unique(np.clip(np.concatenate([[low], edges.ravel(), [high]]), low, high))

@@ -1,4 +1,4 @@
-"""How large an effect over a variable must be to be found in the noise that there is, beside what is fitted anew."""
+"""The smallest detectable effects over variables."""
 
 from __future__ import annotations
 
@@ -37,10 +37,7 @@ SEED = 0
 
 
 def detectable(settled: Settled) -> tuple[Detectable, ...]:
-    """Sizes over every variable and of every cause of the user's, the least detectable first.
-
-    Sizes are those of the effect itself, before the base takes its part.
-    """
+    """Return detectable sizes over variables and user's causes, the least detectable first, before absorption by the base."""
     asked: dict[str, Cause] = {}
     for cause in settled.causes:
         family = _family(settled.bank, cause.name)
@@ -78,15 +75,14 @@ def _detectable(settled: Settled, follows: str, cause: Cause) -> Detectable:
 def least_seen(
     products: NDArray[np.float64], samples: NDArray[np.float64], plausible: NDArray[np.float64], log_odds: float
 ) -> float | None:
-    """Least root mean square of an effect at which `POWER` of random ones are sure to be there; None where none is.
+    """Return the least rms at which `POWER` of random effects are surely found, or None.
 
-    An effect has amplitudes N(0, 1), scaled to one size. The comparison has z = L a + L^(1/2) e of it along the axes of the information L,
-    e being noise, and averages over `SCALES` as it does over any cause.
+    Amplitudes N(0, 1) at one size give z = L a + L^(1/2) e along the information L; averaged over `SCALES` as any cause.
 
     Args:
-        products: information on the amplitudes beside base and others, shape (p, p).
-        samples: columns, shape (m, p).
-        plausible: sizes of the amplitudes, shape (p,).
+        products: information beside base and others, shape (p, p).
+        samples: shape (m, p).
+        plausible: shape (p,).
     """
     rng = np.random.default_rng(SEED)
     directions = rng.standard_normal((DRAWS, len(plausible)))

@@ -1,4 +1,4 @@
-"""Held-out error of a whole selection, everything chosen anew from the rows that are left, and what each effect gained by it."""
+"""Held-out error of a complete selection, and each effect's gain."""
 
 from __future__ import annotations
 
@@ -35,27 +35,25 @@ Kind: TypeAlias = "tuple[str, ...]"
 
 
 def numbered(names: Sequence[str]) -> list[int]:
-    """Number of each name, counted in the order in which they first appear."""
+    """Return each name's number by first appearance."""
     order = {name: k for k, name in enumerate(dict.fromkeys(names))}
     return [order[name] for name in names]
 
 
 def in_turn(names: Sequence[str], most: int) -> list[int]:
-    """Group of each run by the name of its test, tests taken in turn; as many groups as tests where these are fewer."""
+    """Return each run's group by test, tests in turn; at most one group per test."""
     tests = numbered(names)
     return [test % min(most, max(tests) + 1) for test in tests]
 
 
 @dataclass(frozen=True)
 class Fold:
-    """One part that was held back.
+    """One held-back part.
 
     Attributes:
-        as_simulated: root mean square error of the reference, in the unit of the residual.
-        before: with the base fitted to the other parts by ordinary least squares.
-        gains: by kind of the effects that were chosen from the other parts, sum of squares of the errors without them, less that
-            with them, in the squared unit of the residual; of a simulator, log density of the prediction with them less that
-            without.
+        as_simulated: rms error of the reference, in the residual's unit.
+        before: base refitted by ordinary least squares.
+        gains: by kind, squared error without less with it, in squared units; for a simulator, log density with less without.
     """
 
     name: str
@@ -68,32 +66,32 @@ class Fold:
 
 @dataclass(frozen=True)
 class HeldOutError:
-    """What predictions leave of rows that took no part in choosing or fitting."""
+    """Errors of rows that took no part."""
 
     folds: tuple[Fold, ...]
 
     @property
     def as_simulated(self) -> float:
-        """Over all parts, of the reference."""
+        """Return the reference's error over all parts."""
         return self._all([fold.as_simulated for fold in self.folds])
 
     @property
     def before(self) -> float:
-        """Over all parts, with the base refitted by ordinary least squares."""
+        """Return the refitted base's error over all parts."""
         return self._all([fold.before for fold in self.folds])
 
     @property
     def after(self) -> float:
-        """Over all parts, with what was chosen."""
+        """Return the choice's error over all parts."""
         return self._all([fold.after for fold in self.folds])
 
     @property
     def is_worse(self) -> bool:
-        """Whether what was chosen predicts worse than the reference."""
+        """Return whether the choice predicts worse than the reference."""
         return is_worse(self.after, self.as_simulated)
 
     def gains_of(self, kinds: Collection[Kind]) -> Gains:
-        """What effects of some kinds brought together in each part; nothing where none of them was chosen."""
+        """Return the joint gain of kinds per part; empty if never chosen."""
         parts = tuple(sum(fold.gains.get(kind, 0.0) for kind in set(kinds)) for fold in self.folds)
         return Gains(parts, tuple(fold.rows for fold in self.folds))
 
@@ -110,16 +108,14 @@ def held_out_error(
     alike: float = 1.0,
     reference: Callable[[NDArray[np.bool_]], NDArray[np.float64]] | None = None,
 ) -> HeldOutError:
-    """Hold back parts in turn [`part_numbers`]: blocks, pieces of long ones, and short ones together.
+    """Hold back parts in turn [`part_numbers`].
 
-    Beside a stretch the rows that resemble it are held back from the choice, too: they know it. The reference may know them.
+    Rows that resemble a held-back stretch are excluded from the choice, not from the reference.
 
     Args:
-        choose_without: the whole selection, laws, patterns, noise and looks, without rows that are held back, shape (n,).
-        progress: called with what is being done, and how much of how much.
-        alike: correlation time of the noise [rows].
-        reference: what predictions are held against, over all rows, shape (n,), from the rows that it may be fitted to, shape
-            (n,); the mean of these if None.
+        choose_without: full selection without rows, shape (n,).
+        alike: correlation time of noise [rows].
+        reference: prediction over all rows, shape (n,), from allowed rows, shape (n,); None: their mean.
     """
     found = []
     parts = parts_of(channel)
@@ -136,7 +132,7 @@ def held_out_error(
 
 
 def _gains(settled: Settled, rows: NDArray[np.bool_]) -> dict[Kind, float]:
-    """What each member brings in rows that took no part, the others refitted without it, by kind."""
+    """Return each member's gain in unused rows, others refitted, by kind."""
     residual, members = settled.channel.residual, settled.best.members
     with_all = float(np.sum(np.square((residual - settled.predicted())[rows])))
     columns = {member.cause.name: settled.bank.samples(member.columns) for member in members}
@@ -153,7 +149,7 @@ def _gains(settled: Settled, rows: NDArray[np.bool_]) -> dict[Kind, float]:
 
 
 def beside(channel: Channel, rows: NDArray[np.bool_], alike: float) -> NDArray[np.bool_]:
-    """Rows of the same block within a correlation time of a part; none where rows have no order or resemble no neighbour, shape (n,)."""
+    """Return rows of a block within a correlation time of a part, shape (n,)."""
     found = np.zeros(len(rows), dtype=bool)
     gap = min(int(np.ceil(alike)), int(WIDEST_GAP * rows.sum())) if channel.time is not None and alike > 1.0 else 0
     for block in channel.blocks:
@@ -164,7 +160,7 @@ def beside(channel: Channel, rows: NDArray[np.bool_], alike: float) -> NDArray[n
 
 
 def parts_of(channel: Channel) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Parts that are held back, with a name each: rows, shape (n,)."""
+    """Return named parts to hold back: rows, shape (n,)."""
     number = part_numbers([block.stop - block.start for block in channel.blocks])
     found = []
     for k in range(int(number.max()) + 1):
@@ -175,10 +171,9 @@ def parts_of(channel: Channel) -> list[tuple[str, NDArray[np.bool_]]]:
 
 
 def part_numbers(lengths: Sequence[int]) -> NDArray[np.int64]:
-    """Part that each row of blocks of these lengths belongs to, parts being of like size and as whole as blocks are, shape (n,).
+    """Return each row's part, parts of similar size and whole blocks, shape (n,).
 
-    A block as long as two parts or nearly so is split evenly; neighbours that are shortest together are joined until there are `FOLDS` parts
-    at most, each of half an even share or more.
+    Long blocks are split evenly; short neighbours are joined to at most `FOLDS` parts of at least half an even share.
     """
     share = sum(lengths) / (min(FOLDS, len(lengths)) if len(lengths) >= ENOUGH_BLOCKS else FOLDS)
     sizes: list[int] = []

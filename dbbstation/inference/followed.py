@@ -1,4 +1,4 @@
-"""Which variables are followed: classes of them by probability over all sets of causes, and what they bring in held-out parts."""
+"""Followed variables: classes by probability over all sets, and held-out gains."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class WithoutPart:
     """Everything chosen anew without one part.
 
     Attributes:
-        rows: of the part, shape (n,).
+        rows: shape (n,).
     """
 
     rows: NDArray[np.bool_]
@@ -59,7 +59,7 @@ class WithoutPart:
 
 
 def followed_by(bank: Bank, name: str) -> frozenset[str]:
-    """Variables that a cause follows; physics of a user has its own name."""
+    """Return a cause's variables; a user's physics has its own name."""
     of, law = bank.patterns.get(name) or bank.laws.get(name), bank.laws.get(name)
     if of is None:
         return frozenset({name})
@@ -73,7 +73,7 @@ def followed_by(bank: Bank, name: str) -> frozenset[str]:
 
 
 def way_of(bank: Bank, name: str) -> str:
-    """How a cause follows its variables."""
+    """Return a cause's way of following."""
     of, law = bank.patterns.get(name) or bank.laws.get(name), bank.laws.get(name)
     if law is not None and law.way:
         return law.way
@@ -81,7 +81,7 @@ def way_of(bank: Bank, name: str) -> str:
 
 
 def only_begun(settled: Settled) -> frozenset[str]:
-    """Members with memory that is mostly what fades from the start of a run, and that are not sure themselves: these follow the time."""
+    """Return uncertain members whose memory is mostly initial transient: these follow time."""
     channel, bank, found, first = settled.channel, settled.bank, set(), 0
     members = settled.best.members
     values = settled.comparison.estimates(members).values if members else np.zeros(0)
@@ -106,20 +106,20 @@ def _follow(settled: Settled) -> Callable[[str], frozenset[str]]:
 
 
 def weighted(settled: Settled) -> list[tuple[Settled, float]]:
-    """What the beginnings of the noise came to, with their probability."""
+    """Return noise beginnings' outcomes with probability."""
     every = [settled, *settled.others]
     logs = np.array([one.log_probability for one in every])
     return list(zip(every, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
 
 
 def probability_of_any(settled: Settled) -> float:
-    """That any cause is there."""
+    """Return the probability of any cause."""
     none = (share * one.posterior.probability_of(lambda names: not names) for one, share in weighted(settled))
     return 1.0 - float(sum(none))
 
 
 class VariableProbabilities:
-    """Probability that variables are followed, over all sets of causes and beginnings of the noise."""
+    """Probabilities of followed variables over all sets and noise beginnings."""
 
     def __init__(self, settled: Settled) -> None:
         self._sets: dict[frozenset[str], float] = {}
@@ -132,12 +132,12 @@ class VariableProbabilities:
                     self._sets[key] = self._sets.get(key, 0.0) + share * float(np.exp(weight - total))
 
     def of(self, names: Iterable[str]) -> float:
-        """That at least one of these is followed."""
+        """Return the probability that one of these is followed."""
         wanted = set(names)
         return min(1.0, sum(p for key, p in self._sets.items() if key & wanted))
 
     def class_of(self, name: str) -> tuple[str, ...]:
-        """A variable with others of which one is followed for sure, if it is not."""
+        """Return a variable with its rivals."""
         chosen = [name]
         every = sorted(frozenset[str]().union(*self._sets))
         unsure = [other for other in every if self.of([other]) < SURE]
@@ -152,11 +152,11 @@ class VariableProbabilities:
 
 @dataclass(frozen=True)
 class VariableClass:
-    """Variables that the same members follow.
+    """Variables of the same members.
 
     Attributes:
-        others: variables that these rows cannot tell from them.
-        members: causes of the best set that follow them.
+        others: indistinguishable variables.
+        members: of the best set.
     """
 
     each: tuple[tuple[str, ...], ...]
@@ -165,12 +165,12 @@ class VariableClass:
 
     @property
     def wanted(self) -> frozenset[str]:
-        """All variables that are pooled."""
+        """Return all pooled variables."""
         return frozenset(self.others).union(*self.each)
 
 
 def classes_of(settled: Settled, probabilities: VariableProbabilities) -> list[VariableClass]:
-    """Classes of the variables that anything in the best set follows, most probable first."""
+    """Return classes of the best set's variables, most probable first."""
     follow = _follow(settled)
     of = {member.cause.name: follow(member.cause.name) for member in settled.best.members}
     there = sorted(frozenset[str]().union(*of.values()), key=lambda v: (-probabilities.of([v]), v))
@@ -193,7 +193,7 @@ def classes_of(settled: Settled, probabilities: VariableProbabilities) -> list[V
 def interchangeable(
     settled: Settled, members: Collection[str], follow: Callable[[str], frozenset[str]]
 ) -> tuple[str, ...]:
-    """Variables over which one cause that acts at once makes what members do, beside base and the other members."""
+    """Return variables over which one immediate cause can replace members."""
     comparison, best, bank = settled.comparison, settled.best, settled.bank
     columns, values = _columns_and_values(settled, members)
     others = [m for m in best.members if m.cause.name not in members]
@@ -224,7 +224,7 @@ def _columns_and_values(settled: Settled, members: Collection[str]) -> tuple[NDA
 
 
 def _share_made(products: NDArray[np.float64], values: NDArray[np.float64]) -> float:
-    """Share of the squares of an effect, of the first columns with these values, that the other columns make."""
+    """Return the reproducible share of an effect's squares."""
     p = len(values)
     whole = float(values @ products[:p, :p] @ values)
     axes_of = np.linalg.pinv(products[p:, p:], rcond=1e-9, hermitian=True)
@@ -234,11 +234,11 @@ def _share_made(products: NDArray[np.float64], values: NDArray[np.float64]) -> f
 
 @dataclass(frozen=True)
 class ClassGain:
-    """What a class brings in held-out parts.
+    """A class's held-out gains.
 
     Attributes:
-        gains: log density with it less that without.
-        before: root mean square error without it.
+        gains: log density with less without it.
+        before: rms error without it.
     """
 
     gains: DensityGains
@@ -247,7 +247,7 @@ class ClassGain:
 
     @property
     def predicts(self) -> bool:
-        """Whether parts prefer it without the best of them, half of the rows at least, and err less."""
+        """Return whether parts without the best prefer it, with half of the rows and less error."""
         return self.gains.predicts and self.gains.share_with_gain >= MOST_PARTS and self.after < self.before
 
 
@@ -256,14 +256,14 @@ MOST_PARTS = 0.5
 
 
 class PartGains(Protocol):
-    """What held-out parts say of classes."""
+    """Held-out gains of classes."""
 
     @property
     def rows(self) -> Sequence[NDArray[np.bool_]]:
-        """Of the parts, shape (n,) each."""
+        """Return the parts' rows, shape (n,) each."""
 
     def of(self, wanted: Collection[str] | None) -> ClassGain:
-        """What all that follows some variables brings there; all that was chosen if None."""
+        """Return the gain of everything over some variables; None: everything."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,23 +271,23 @@ class ChosenWithoutParts:
     """Parts of a table.
 
     Attributes:
-        parts: everything chosen anew without each.
+        parts: chosen anew without each.
     """
 
     parts: Sequence[WithoutPart]
 
     @property
     def rows(self) -> Sequence[NDArray[np.bool_]]:
-        """Of the parts, shape (n,) each."""
+        """Return the parts' rows, shape (n,) each."""
         return [part.rows for part in self.parts]
 
     def of(self, wanted: Collection[str] | None) -> ClassGain:
-        """What all that follows some variables brings there; all that was chosen if None."""
+        """Return the gain of everything over some variables; None: everything."""
         return gain_of(self.parts, wanted)
 
 
 def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None) -> ClassGain:
-    """What all that follows some variables brings in parts that did not choose it; all that was chosen if None."""
+    """Return the gain over some variables in unused parts; None: everything."""
     brought, before, after = [], 0.0, 0.0
     for part in parts:
         one, rows = part.settled, part.rows
@@ -304,7 +304,7 @@ def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None) -> Cla
 
 
 def _left_without(one: Settled, names: Collection[str]) -> NDArray[np.float64]:
-    """What is left of all rows without some members, base and the others refitted, shape (n,)."""
+    """Return the residual without some members, others refitted, shape (n,)."""
     effect = np.zeros(len(one.channel.residual))
     if rest := one.best.without(*names):
         samples = np.hstack([one.bank.samples(member.columns) for member in rest])
@@ -313,9 +313,9 @@ def _left_without(one: Settled, names: Collection[str]) -> NDArray[np.float64]:
 
 
 def log_density(one: Settled, rows: NDArray[np.bool_], left: NDArray[np.float64]) -> float:
-    """Log density of what is left of a part in the noise of the others, but for what is the same for all that is left.
+    """Return a part's log residual density in the others' noise, up to a constant.
 
-    Rows count as far apart as those that the noise was measured on.
+    Row spacing is that of the noise measurement.
     """
     spaced = np.zeros(len(rows), dtype=bool)
     spaced[np.flatnonzero(rows)[:: one.channel.apart]] = True
@@ -327,7 +327,7 @@ def log_density(one: Settled, rows: NDArray[np.bool_], left: NDArray[np.float64]
 
 
 def way_probability(settled: Settled, wanted: Collection[str], way: str) -> float:
-    """That a cause follows some variables in a way."""
+    """Return the probability that a cause follows variables in a way."""
 
     def inside(cause: Cause, one: Settled) -> bool:
         return bool(followed_by(one.bank, cause.name) & set(wanted)) and way_of(one.bank, cause.name) == way

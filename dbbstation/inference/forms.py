@@ -1,6 +1,6 @@
-"""Forms of curves that an unmodelled effect may follow along its variable: each is a few columns of amplitudes.
+"""Curves of unmodelled effects over a variable, as few amplitudes.
 
-A form says what its columns are at any values of its variable, and at which values its curve is printed.
+A form gives its columns and its printed places.
 """
 
 from __future__ import annotations
@@ -28,57 +28,57 @@ BEHIND_POINTS = 4
 
 
 class Form(ABC):
-    """One family of curves over a variable; p amplitudes."""
+    """A family of curves with p amplitudes."""
 
     @property
     def count(self) -> int:
-        """Number of amplitudes, p: one, the height of the curve, where a form does not say otherwise."""
+        """Return the number of amplitudes; by default one."""
         return 1
 
     @abstractmethod
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Curve of each amplitude at values of the variable, shape (..., p)."""
+        """Return each amplitude's curve at values, shape (..., p)."""
 
     @abstractmethod
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Places between least and greatest value at which a curve is printed, shape (q,)."""
+        """Return printed places between extremes, shape (q,)."""
 
     def text(self, unit: str) -> str:
-        """What tells it from others of its kind, values in the unit of its variable; empty where there are none."""
+        """Return the form's distinction in the variable's unit; may be empty."""
         del unit
         return ""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearSplines(Form):
-    """Any smooth curve: straight between seven points. Limits are arrays where every strut has its own."""
+    """A curve straight between seven points; limits may be arrays by strut."""
 
     low: NDArray[np.float64]
     high: NDArray[np.float64]
 
     @property
     def count(self) -> int:
-        """One amplitude per point."""
+        """Return one per point."""
         return SPLINES
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """One at its own point, zero at all others."""
+        """Return hat functions of the points."""
         place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (SPLINES - 1)
         return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(SPLINES)))
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Its own points, in the middle between struts that have their own."""
+        """Return its points, averaged over struts."""
         del low, high
         return np.linspace(np.mean(self.low), np.mean(self.high), SPLINES)
 
 
 @dataclass(frozen=True, eq=False)
 class Walk(Form):
-    """A random walk: straight between its points, and each step as large as the root of its length.
+    """A random walk, steps as large as the root of their length.
 
     Args:
-        at: its points, rising, shape (p + 1,).
-        unit: length of a step of unit size, in the unit of the variable.
+        at: rising, shape (p + 1,).
+        unit: length of a unit step, in the variable's unit.
     """
 
     at: NDArray[np.float64]
@@ -86,11 +86,11 @@ class Walk(Form):
 
     @property
     def count(self) -> int:
-        """One amplitude per step."""
+        """Return one per step."""
         return len(self.at) - 1
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Zero before a step, its size behind it."""
+        """Return zero before a step, its size after."""
         steps = np.diff(self.at)
         return np.clip((values[..., None] - self.at[:-1]) / steps, 0.0, 1.0) * np.sqrt(steps / self.unit)
 
@@ -102,7 +102,7 @@ class Walk(Form):
 
 @dataclass(frozen=True, eq=False)
 class Wave(Form):
-    """Cosine and sine of one frequency [1 / unit of the variable]."""
+    """Cosine and sine of a frequency [1 / unit]."""
 
     frequency: float
 
@@ -121,7 +121,7 @@ class Wave(Form):
         return np.stack([np.cos(phase), np.sin(phase)], axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Eight per period, over all of the variable; over one period where it holds very many."""
+        """Return eight places per period, over one period if there are many."""
         periods = (high - low) * self.frequency
         periods = periods if periods <= _MOST_PERIODS else 1.0
         span = periods / self.frequency
@@ -133,31 +133,31 @@ _MOST_PERIODS = 100.0
 
 @dataclass(frozen=True, eq=False)
 class WaveOfTurn(Form):
-    """A wave of the angle since the start [turns] that need not close, with a phase of its own in each direction.
+    """A wave of the angle since the start [turns], with own phase by direction.
 
-    The variable is signed: positive in counterclockwise runs.
+    The variable is positive counterclockwise.
     """
 
     frequency: float
 
     @property
     def count(self) -> int:
-        """Cosine and sine for either direction."""
+        """Return cosine and sine by direction."""
         return 4
 
     def text(self, unit: str) -> str:
-        """Waves per turn."""
+        """Return waves per turn."""
         del unit
         return f"{self.frequency:.4g} per turn"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Cosine and sine counterclockwise, then clockwise."""
+        """Return cosine and sine counterclockwise, then clockwise."""
         both = Wave(self.frequency).columns(np.abs(values))
         ccw = (values > 0.0)[..., None]
         return np.concatenate([both * ccw, both * ~ccw], axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Clockwise runs first, each from its end to its start, then counterclockwise ones."""
+        """Return clockwise runs backwards, then counterclockwise ones."""
         del low, high
         turn = np.linspace(0.0, 1.0, int(np.ceil(POINTS_PER_WAVE * max(self.frequency, 1.0))) + 1)
         return np.concatenate([-turn[:0:-1], turn[1:]])
@@ -165,17 +165,17 @@ class WaveOfTurn(Form):
 
 @dataclass(frozen=True, eq=False)
 class Lobes(Form):
-    """Waves that close within one turn of an angle [deg]."""
+    """Waves that close within a turn [deg]."""
 
     numbers: tuple[int, ...]
 
     @property
     def count(self) -> int:
-        """Cosine and sine of each."""
+        """Return cosine and sine of each."""
         return 2 * len(self.numbers)
 
     def text(self, unit: str) -> str:
-        """How many lobes, where it is one number alone."""
+        """Return the number of lobes if single."""
         del unit
         return f"{self.numbers[0]} lobes" if len(self.numbers) == 1 else ""
 
@@ -185,7 +185,7 @@ class Lobes(Form):
         return np.stack([f(k * theta) for k in self.numbers for f in (np.cos, np.sin)], axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """One turn, finely enough for the shortest wave."""
+        """Return one turn, fine enough for the shortest wave."""
         del low, high
         step = 10.0 if max(self.numbers) <= 10 else 5.0  # noqa: PLR2004 - lobes as in `LOBES`
         return np.arange(0.0, 360.0, step)
@@ -193,7 +193,7 @@ class Lobes(Form):
 
 @dataclass(frozen=True, eq=False)
 class Bump(Form):
-    """A bell about one value, with its standard deviation as width."""
+    """A bell with a standard deviation as width."""
 
     centre: float
     width: float
@@ -213,7 +213,7 @@ class Bump(Form):
 
 @dataclass(frozen=True, eq=False)
 class StepForm(Form):
-    """Minus a half before one value, plus a half behind it, over a few widths either way."""
+    """A step from minus to plus a half over a few widths."""
 
     at: float
     width: float
@@ -238,7 +238,7 @@ def _across(at: float, width: float, low: float, high: float) -> NDArray[np.floa
 
 @dataclass(frozen=True, eq=False)
 class SignForm(Form):
-    """One way round plus, the other way minus."""
+    """Plus one way, minus the other."""
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sign of the variable."""
@@ -252,22 +252,22 @@ class SignForm(Form):
 
 @dataclass(frozen=True, eq=False)
 class Proportional(Form):
-    """In proportion to the variable; the amplitude belongs to `unit` of it."""
+    """Proportional to the variable; amplitude per `unit`."""
 
     unit: float
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Variable in its unit."""
+        """Return the variable in its unit."""
         return (values / self.unit)[..., None]
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Both ends and the middle."""
+        """Return ends and middle."""
         return np.linspace(low, high, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class Plane(Form):
-    """In proportion to each coordinate of a place, and with `constant` also the same everywhere."""
+    """Proportional to coordinates, with `constant` also constant."""
 
     unit: float
     coordinates: int
@@ -275,27 +275,27 @@ class Plane(Form):
 
     @property
     def count(self) -> int:
-        """One per coordinate, and the constant."""
+        """Return one per coordinate, and the constant."""
         return self.coordinates + self.constant
 
     def text(self, unit: str) -> str:
-        """Whether with a constant."""
+        """Return whether with constant."""
         del unit
         return "with a constant" if self.constant else ""
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Coordinates in their unit; values of shape (n, c)."""
+        """Return coordinates in their unit; values of shape (n, c)."""
         scaled = values / self.unit
         return np.column_stack([scaled, np.ones(len(scaled))]) if self.constant else scaled
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Both ends and the middle, along the direction in which most changes."""
+        """Return ends and middle along the strongest direction."""
         return np.linspace(low, high, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneStep(Form):
-    """A step across a straight line in the plane, at an angle to +X and a distance from the origin."""
+    """A step across a straight line in the plane, by angle to +X and distance."""
 
     across_deg: float
     at: float
@@ -307,15 +307,15 @@ class PlaneStep(Form):
 
     @property
     def across(self) -> NDArray[np.float64]:
-        """Direction across the line, shape (2,)."""
+        """Return the direction across the line, shape (2,)."""
         return np.array([np.cos(np.radians(self.across_deg)), np.sin(np.radians(self.across_deg))])
 
     def along(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance from the origin across the line, shape (n,)."""
+        """Return the distance across the line from the origin, shape (n,)."""
         return np.asarray(values @ self.across, dtype=np.float64)
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """From minus to plus a half; values of shape (n, 2)."""
+        """Return minus to plus a half; values of shape (n, 2)."""
         return StepForm(self.at, self.width).columns(self.along(values))
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
@@ -325,11 +325,11 @@ class PlaneStep(Form):
 
 @dataclass(frozen=True, eq=False)
 class Spring(Form):
-    """The same everywhere, and in proportion to a distance: what a spring of unknown length pulls.
+    """Constant plus proportional to a distance: a spring of unknown length.
 
     Args:
-        towards_deg: where its far end is, seen from the Z axis.
-        about: distance that counts as none [mm].
+        towards_deg: its far end, seen from Z.
+        about: zero distance [mm].
     """
 
     towards_deg: float
@@ -337,7 +337,7 @@ class Spring(Form):
 
     @property
     def count(self) -> int:
-        """A constant and a slope."""
+        """Return constant and slope."""
         return 2
 
     def text(self, unit: str) -> str:
@@ -346,11 +346,11 @@ class Spring(Form):
         return f"towards {self.towards_deg:.0f} deg to +X"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """One, and the distance in 100 mm; values of shape (n,)."""
+        """Return one, and the distance in 100 mm; values of shape (n,)."""
         return np.column_stack([np.ones(len(values)), (values - self.about) / 100.0])
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Both ends and the middle."""
+        """Return ends and middle."""
         return np.linspace(low, high, 3)
 
 
@@ -360,7 +360,7 @@ RINGS_FOR = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Ringing(Form):
-    """A damped oscillation after a reversal, over the time since then, which has the sign of the new direction: cosine and sine."""
+    """A damped oscillation over the signed time since a reversal: cosine and sine."""
 
     period: float
     decay: float
@@ -375,14 +375,14 @@ class Ringing(Form):
         return f"period {self.period:.3g} {unit}, fading over {self.decay:.3g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Both turn their sign with the direction; zero before the first reversal."""
+        """Return both, odd in direction, zero before the first reversal."""
         since = np.abs(values)
         phase = 2.0 * np.pi * since / self.period
         fading = -np.sign(values) * np.exp(-since / self.decay)
         return np.stack([fading * np.cos(phase), fading * np.sin(phase)], axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """From the reversal on."""
+        """Return places from the reversal on."""
         del low
         last = min(high, RINGS_FOR * self.decay)
         return np.linspace(1e-6, last, max(int(POINTS_PER_WAVE * last / self.period), 2) + 1)

@@ -1,10 +1,8 @@
-"""Residuals of whole periods in harmonics: how strong the noise is, and whether more than noise is left.
+"""Residuals of whole periods in harmonics: noise level and misfit.
 
-Physics that a model lacks is smooth or stepped along a period and lives in the low harmonics; the noise of a channel
-reaches far beyond them. A spectrum fitted to the harmonics above the low ones, continued downwards, is therefore the
-noise in the low harmonics, and does not depend on a smooth misfit. It is a floor and a first-order process,
-S(k) = a + b / (1 + (k / c)²) [Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12], since neighbouring
-samples resemble each other and the low harmonics then hold more noise than the high ones.
+Missing physics lives in low harmonics, noise far beyond. The spectrum above, continued downwards, is the noise at low
+harmonics independent of misfit: floor plus first-order process, S(k) = a + b / (1 + (k / c)²) [Priestley, Spectral
+Analysis and Time Series, 1981, sec. 4.12].
 """
 
 from __future__ import annotations
@@ -43,10 +41,10 @@ class Misfit:
     """The residual beyond noise.
 
     Attributes:
-        probability: of such a misfit or a larger one if only noise were left.
-        noise: standard deviation, per sample, of white noise with the same power at low harmonics.
-        rms: of the residual beyond noise in the low harmonics; zero where less than noise is left.
-        ratio: power in the low harmonics over what noise alone puts there, 1 for noise.
+        probability: by noise alone.
+        noise: white noise per sample of equal low-harmonic power.
+        rms: beyond noise in low harmonics, at least zero.
+        ratio: low-harmonic power over noise's.
     """
 
     probability: float
@@ -57,11 +55,11 @@ class Misfit:
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Power of noise by harmonic, and how well it is known.
+    """Noise power by harmonic with its certainty.
 
     Attributes:
-        power: at harmonics 0, 1, ... LOW, that of one orthonormal coefficient, shape (LOW + 1,).
-        freedom: degrees of freedom that the mean of these would have as a mean of squares.
+        power: of an orthonormal coefficient at 0, 1, ... LOW, shape (LOW + 1,).
+        freedom: of their mean as a mean square.
     """
 
     power: NDArray[np.float64]
@@ -69,13 +67,13 @@ class Spectrum:
 
 
 def coefficients(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], highest: int) -> NDArray[np.float64]:
-    """Orthonormal Fourier coefficients of a whole period, harmonics 0 to `highest`, shape (2 highest + 1,) or (..., m).
+    """Return orthonormal Fourier coefficients of a whole period, harmonics 0 to `highest`, shape (2 highest + 1,) or (..., m).
 
-    White noise of standard deviation s has coefficients of standard deviation s, whatever the number of samples.
+    White noise s gives coefficients of size s.
 
     Args:
-        residual: shape (n,), or (n, m) for several of the same period; about equally spaced over it.
-        phase_rad: shape (n,), from 0 to 2 pi [rad].
+        residual: shape (n,) or (n, m), about equally spaced.
+        phase_rad: 0 to 2 pi, shape (n,).
         highest: below half of the samples.
     """
     columns = residual.reshape(len(residual), -1)
@@ -85,23 +83,20 @@ def coefficients(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], 
 
 
 def basis(phase_rad: NDArray[np.float64], highest: int) -> NDArray[np.float64]:
-    """Constant, cosines and sines of mean square one, shape (n, 2 highest + 1)."""
+    """Return constant, cosines and sines of mean square one, shape (n, 2 highest + 1)."""
     fine, coarse = _waves(phase_rad, highest)
     waves = (coarse[:, None, :] * fine[None, :, :]).reshape(-1, len(phase_rad))[1 : highest + 1].T
     return np.hstack([np.ones((len(phase_rad), 1)), np.sqrt(2.0) * waves.real, np.sqrt(2.0) * waves.imag])
 
 
 def _waves(phase_rad: NDArray[np.float64], highest: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Few waves of which harmonic a + AT_ONCE b is the product, shapes (AT_ONCE, n) and (blocks, n).
-
-    Products are ten times as quick as cosines.
-    """
+    """Return factor waves whose products are harmonics a + AT_ONCE b, shapes (AT_ONCE, n) and (blocks, n), ten times faster than cosines."""
     first = np.exp(1j * phase_rad)
     return _powers(first, min(AT_ONCE, highest + 1)), _powers(np.exp(1j * AT_ONCE * phase_rad), highest // AT_ONCE + 1)
 
 
 def _powers(wave: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
-    """Powers 0 to count - 1, each by one product, shape (count, n)."""
+    """Return powers 0 to count - 1, shape (count, n)."""
     found = np.empty((count, len(wave)), dtype=np.complex128)
     found[0] = 1.0
     for k in range(1, count):
@@ -112,7 +107,7 @@ def _powers(wave: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
 def _sums(
     values: Sequence[NDArray[np.float64]], phase_rad: NDArray[np.float64], highest: int
 ) -> list[NDArray[np.complex128]]:
-    """Sums of values times exp(i k phase), k from 0 to `highest`, of each: products of small matrices, no basis is made."""
+    """Return sums of values times exp(i k phase), k to `highest`, without a basis."""
     total = np.zeros((len(values), highest // AT_ONCE + 1, min(AT_ONCE, highest + 1)), dtype=np.complex128)
     for rows in _stretches(len(phase_rad)):
         fine, coarse = _waves(phase_rad[rows], highest)
@@ -122,7 +117,7 @@ def _sums(
 
 
 def _stretches(samples: int) -> Iterator[slice]:
-    """Yield the samples in stretches whose waves stay in a processor's cache: twice as quick as all of a long run at once."""
+    """Yield cache-sized stretches of samples, twice as fast."""
     for start in range(0, samples, STRETCH):
         yield slice(start, start + STRETCH)
 
@@ -132,15 +127,14 @@ STRETCH = 2048
 
 
 def amplitudes(values: NDArray[np.float64], phase_rad: NDArray[np.float64], highest: int) -> NDArray[np.complex128]:
-    """Harmonics of values by least squares, shape (highest + 1,): values are about the real part of sum a_k exp(i k phase).
+    """Return least-squares harmonics, shape (highest + 1,): values are the real part of sum a_k exp(i k phase).
 
-    The cosine of harmonic k has the real part of a_k, its sine the imaginary part with the other sign. The normal equations of
-    harmonics have sums and differences of harmonics, so that they are worked out without their basis. Phases that leave part
-    of the period out make them ill-conditioned: the basis is then made.
+    Normal equations need only sums and differences of harmonics. Incomplete periods are ill-conditioned and use the
+    basis.
 
     Args:
         values: shape (n,).
-        phase_rad: shape (n,) [rad].
+        phase_rad: shape (n,).
         highest: below half of the samples.
     """
     return amplitudes_of([values], phase_rad, highest)[0]
@@ -149,7 +143,7 @@ def amplitudes(values: NDArray[np.float64], phase_rad: NDArray[np.float64], high
 def amplitudes_of(
     several: Sequence[NDArray[np.float64]], phase_rad: NDArray[np.float64], highest: int
 ) -> list[NDArray[np.complex128]]:
-    """Harmonics of several values at the same phases, each as `amplitudes` has them: one set of normal equations serves all."""
+    """Return harmonics of several values at equal phases, as `amplitudes`."""
     moment, *further = _sums([np.ones(len(phase_rad)), *several], phase_rad, 2 * highest)
     order = np.arange(-highest, highest + 1)
     apart = order[None, :] - order[:, None]
@@ -165,14 +159,14 @@ def amplitudes_of(
 
 
 def smooth(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], highest: int = LOW) -> NDArray[np.float64]:
-    """Residual without what lies above a harmonic, by least squares, shape (n,)."""
+    """Return the residual up to a harmonic by least squares, shape (n,)."""
     return smooth_of([residual], phase_rad, highest)[0]
 
 
 def smooth_of(
     several: Sequence[NDArray[np.float64]], phase_rad: NDArray[np.float64], highest: int
 ) -> list[NDArray[np.float64]]:
-    """Several residuals at the same phases, each as `smooth` has it."""
+    """Return several such residuals at equal phases."""
     if not several:
         return []
     padded = np.zeros((len(several), (highest // AT_ONCE + 1) * min(AT_ONCE, highest + 1)), dtype=np.complex128)
@@ -195,7 +189,7 @@ AT_ONCE = 16
 
 
 def bands(samples: int) -> tuple[int, int]:
-    """Highest smooth harmonic, and highest that noise is read from, for so many samples per period."""
+    """Return the highest smooth harmonic, and the highest for noise."""
     high = min(HIGH, max(samples // SAMPLES_PER_HARMONIC, 2))
     return min(LOW, max(high // 4, 1)), high
 
@@ -207,16 +201,15 @@ def misfit(
     freedom_used: float,
     noise: Spectrum | None = None,
 ) -> Misfit:
-    """Compare the low harmonics of residuals with what noise puts there by an F test.
+    """Test low harmonics of residuals against noise by an F test.
 
-    The first harmonic of each group of runs is left out of it: a common shift there is an effect whose size is only
-    roughly known, such as where a ball came to stand. Differences within a group count.
+    Each group's common first harmonic is excluded, such as a ball's place.
 
     Args:
-        residuals: one whole period per run.
-        groups: what each run shares its first harmonic with.
-        freedom_used: degrees of freedom that the fit took out of the low harmonics beside those shifts.
-        noise: measured elsewhere; read from the high harmonics of these residuals if None.
+        residuals: one period per run.
+        groups: sharing the first harmonic.
+        freedom_used: by the fit in low harmonics, beside shifts.
+        noise: None: from high harmonics.
     """
     low, high = bands(min(len(residual) for residual in residuals))
     all_coefficients = _all_coefficients(residuals, phases_rad, high)
@@ -246,14 +239,13 @@ def noise_left_by(
     phases_rad: Sequence[NDArray[np.float64]],
     of_white: Sequence[NDArray[np.float64]],
 ) -> Spectrum:
-    """Noise from what a model of very many columns leaves, in the harmonics above the low ones.
+    """Return noise from a residual of many columns, in higher harmonics.
 
-    Such a model takes out a good deal of the noise itself, of some harmonics more than of others. How much is seen from
-    what it leaves of white noise of unit size.
+    Absorption is measured with draws of white noise.
 
     Args:
-        residuals: what it leaves of the measurement, one whole period per run.
-        of_white: what it leaves of draws of white noise, per run, shape (n, draws).
+        residuals: one period per run.
+        of_white: residuals of white draws, per run, shape (n, draws).
     """
     low, high = bands(min(len(residual) for residual in residuals))
     together = [np.column_stack([one, white]) for one, white in zip(residuals, of_white, strict=True)]
@@ -288,23 +280,23 @@ LEAST_LEFT = 0.02
 def _all_coefficients(
     residuals: Sequence[NDArray[np.float64]], phases_rad: Sequence[NDArray[np.float64]], high: int
 ) -> NDArray[np.float64]:
-    """Coefficients of all runs, shape (runs, 2 high + 1) or (runs, 2 high + 1, m)."""
+    """Return all runs' coefficients, shape (runs, 2 high + 1) or (runs, 2 high + 1, m)."""
     return np.array([coefficients(r, phase, high) for r, phase in zip(residuals, phases_rad, strict=True)])
 
 
 def _squares(all_coefficients: NDArray[np.float64], high: int) -> tuple[float, NDArray[np.float64]]:
-    """Sums of squares over runs: of harmonic 0, and of harmonics 1 to `high`, shape (high,)."""
+    """Return sums of squares over runs: harmonic 0, and 1 to `high`, shape (high,)."""
     squares = (all_coefficients**2).sum(axis=0)
     return float(squares[0]), squares[1 : high + 1] + squares[high + 1 :]
 
 
 def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Spectrum:
-    """Spectrum of noise in the harmonics up to `low`, from those above.
+    """Return the noise spectrum up to `low` from higher harmonics.
 
     Args:
-        squares: sums of squares of the coefficients at harmonics low + 1, low + 2, ..., shape (h,).
-        low: highest harmonic that is not among them.
-        freedom: degrees of freedom of each sum.
+        squares: at low + 1, low + 2, ..., shape (h,).
+        low: excluded.
+        freedom: of each.
     """
     found = continuations(squares, low, freedom, partial(first_order, corners=CORNERS))
     if found is None:
@@ -321,12 +313,12 @@ def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Sp
 
 @dataclass(frozen=True, eq=False)
 class Continuations:
-    """Noise in the low harmonics as each process lets expect it.
+    """Low-harmonic noise by process.
 
     Attributes:
-        powers: of one orthonormal coefficient at harmonics 0, 1, ... low, shape (processes, low + 1).
-        likely: log likelihood of the harmonics above, less a constant, shape (processes,).
-        variances: of the logarithm of the mean of the powers, shape (processes,).
+        powers: at 0, 1, ... low, shape (processes, low + 1).
+        likely: log likelihood of higher harmonics, up to a constant, shape (processes,).
+        variances: of the log mean power, shape (processes,).
     """
 
     powers: NDArray[np.float64]
@@ -340,13 +332,13 @@ def continuations(
     freedom: float,
     processes: Callable[[NDArray[np.float64]], NDArray[np.float64]],
 ) -> Continuations | None:
-    """Continue the spectrum of noise below `low` with a floor and each of some processes; None where it counts as white.
+    """Continue noise below `low` with a floor and each process; None if white.
 
     Args:
-        squares: sums of squares of the coefficients at harmonics low + 1, low + 2, ..., shape (h,).
-        low: highest harmonic that is not among them.
-        freedom: degrees of freedom of each sum.
-        processes: their power at harmonics of shape (h,), each of a size of its own, shape (processes, h).
+        squares: at low + 1, low + 2, ..., shape (h,).
+        low: excluded.
+        freedom: of each.
+        processes: power at harmonics, of free size, shape (processes, h).
     """
     harmonic = np.arange(low + 1.0, low + 1.0 + len(squares))
     mean = squares / freedom
@@ -370,17 +362,17 @@ def continuations(
 
 
 def first_order(harmonic: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Power of first-order processes of unit height, one for each corner, shape (processes, h)."""
+    """Return unit first-order processes by corner, shape (processes, h)."""
     return np.asarray(1.0 / (1.0 + (harmonic / corners[:, None]) ** 2))
 
 
 def _on_a_floor(power: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A floor and each of the processes, shape (processes, 2, h)."""
+    """Return floor and each process, shape (processes, 2, h)."""
     return np.stack([np.ones_like(power), power], axis=1)
 
 
 def _fitted(mean: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Floor and height, not negative, of greatest likelihood, by reweighted least squares, shape (processes, 2)."""
+    """Return non-negative maximum-likelihood floor and height, shape (processes, 2)."""
     power = np.full((len(shapes), len(mean)), mean.mean())
     for _ in range(_ROUNDS):
         found = _not_negative(shapes / power[:, None, :], mean / power)
@@ -389,13 +381,13 @@ def _fitted(mean: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[n
 
 
 def _not_negative(rows: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Least squares by two columns at a time, none negative, shape (processes, 2).
+    """Return non-negative least squares by two columns, shape (processes, 2).
 
-    Where the solution has a negative part, the best one lies on an edge: one column alone.
+    A negative solution lies on an edge: one column.
 
     Args:
-        rows: the two columns of each problem, shape (processes, 2, h).
-        values: what they are to sum up to, shape (processes, h).
+        rows: two columns per problem, shape (processes, 2, h).
+        values: shape (processes, h).
     """
     normal = np.einsum("cih,cjh->cij", rows, rows)
     right = np.einsum("cih,ch->ci", rows, values)
@@ -423,7 +415,7 @@ _SMALLEST_SHARE = 1e-6
 
 
 def _likelihood(mean: NDArray[np.float64], power: NDArray[np.float64], freedom: float) -> float:
-    """Log likelihood of mean squares under a spectrum [Whittle 1953], less a constant."""
+    """Return the log likelihood of mean squares under a spectrum [Whittle 1953], up to a constant."""
     if not np.all(power > 0.0):
         return -np.inf
     return -0.5 * freedom * float(np.sum(np.log(power) + mean / power))

@@ -1,4 +1,4 @@
-"""Prediction of blocks that were left out of the fit."""
+"""Prediction of omitted blocks."""
 
 from __future__ import annotations
 
@@ -21,10 +21,8 @@ class HeldOut:
     """What predictions leave of measurements that were not fitted.
 
     Attributes:
-        rms: root mean square once random effects that only the left-out blocks know have settled under their priors, in
-            the channel's unit: where a ball came to stand says nothing for or against a model of the machine.
-        normalised: root of the sum of squares in units of its predicted covariance, by noise, random effects and the
-            uncertainty of what was fitted, over its degrees of freedom; near 1 where model and uncertainties are right.
+        rms: with own random effects settled under priors, in the channel's unit.
+        normalised: root of squares in predicted covariance over freedom; near 1 if right.
     """
 
     rms: float
@@ -40,17 +38,15 @@ def held_out(
     held: NDArray[np.float64],
     single: float | None = None,
 ) -> HeldOut:
-    """Leave groups of blocks out in turn and predict them from the others.
+    """Omit groups of blocks in turn and predict them.
 
     Args:
-        blocks: compressed runs.
-        groups: group of each block, such as the fold of its test.
+        groups: of each block, such as its test's fold.
         known: priors and scales of all columns.
-        active: columns that the model uses, shape (a,).
-        noise: standard deviation of one measurement that white noise of the same power at low frequencies would have.
-        held: directions of the fitted columns to keep at zero, in units of their scales.
-        single: standard deviation of a single measurement, less than `noise` where neighbours resemble each other;
-            the same if None.
+        active: used columns, shape (a,).
+        noise: white noise of equal low-frequency power.
+        held: directions kept at zero, in scales.
+        single: of a single measurement if less; None: `noise`.
     """
     used = Columns(known.prior[active], known.scale[active], known.random[active])
     thin = [_restricted(block, active) for block in blocks]
@@ -75,9 +71,9 @@ def _restricted(block: Block, active: NDArray[np.int64]) -> Block:
 
 
 def _weighted(blocks: Sequence[Block], fitted: Solution, noise: float) -> tuple[float, int]:
-    """Sum of squares of what predictions leave, weighted by its predicted covariance, and its degrees of freedom.
+    """Return weighted squares of prediction errors and their freedom.
 
-    The covariance is noise + W C W^T; with C = F F^T its inverse needs a matrix of C's size only [Woodbury].
+    noise + W C W^T, C = F F^T, is inverted at C's size [Woodbury].
     """
     # The last row of a triangle holds the length of what no column reaches, which is not one measurement's noise.
     cut = [Block(b.columns, b.triangle[:-1], b.target[:-1], b.count, b.square) for b in blocks]
@@ -91,7 +87,7 @@ def _weighted(blocks: Sequence[Block], fitted: Solution, noise: float) -> tuple[
 
 
 def _left(blocks: Sequence[Block], known: Columns, x: NDArray[np.float64], noise: float) -> float:
-    """Sum of squares that is left of blocks once their random effects have settled."""
+    """Return blocks' remaining squares with settled random effects."""
     random = np.flatnonzero(known.random)
     whole, target = np.hsplit(spread(blocks, len(known.prior)), [-1])
     fixed = x.copy()

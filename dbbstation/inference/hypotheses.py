@@ -1,8 +1,7 @@
-"""Search over sets of causes, and the posterior probabilities that come of it.
+"""Search over sets of causes, with posterior probabilities.
 
-A hypothesis is a set of causes. Its log posterior is its marginal likelihood, averaged over variants and sizes of each
-cause beside the others, and the prior odds of all its causes. The search grows, shrinks and exchanges members of the
-best hypotheses until the neighbours of every likely one have been looked at.
+A set's log posterior is its marginal likelihood, averaged over variants and sizes, plus prior odds. Growth, removal and
+exchange continue until all likely neighbours are examined.
 """
 
 from __future__ import annotations
@@ -62,9 +61,9 @@ class Hypothesis:
     """A set of causes.
 
     Attributes:
-        members: with the variants and sizes that suit them best.
-        log_posterior: log of its probability over that of the base alone.
-        log_factors: log Bayes factor of each member beside the others, averaged over its variants and sizes.
+        members: with best variants and sizes.
+        log_posterior: over the base.
+        log_factors: Bayes factor of each member beside others, averaged.
     """
 
     members: tuple[Member, ...]
@@ -78,7 +77,7 @@ class Hypothesis:
 
     @property
     def lean(self) -> bool:
-        """Whether every member is worth its prior odds: without one that is not, a hypothesis is more probable."""
+        """Return whether every member is worth its prior odds."""
         return all(f + m.cause.log_prior_odds > 0.0 for m, f in zip(self.members, self.log_factors, strict=True))
 
     def without(self, *names: str) -> tuple[Member, ...]:
@@ -95,10 +94,9 @@ class Posterior:
     """Probabilities over sets of causes.
 
     Attributes:
-        hypotheses: that were looked at, most probable first.
-        weights: log posterior of every set of names that was scored and is not negligible.
-        at_limit: a larger set than is allowed would have been more probable than the best one. What the best sets have in common is as
-            sure as ever; something beside them is not explained.
+        hypotheses: examined, most probable first.
+        weights: log posterior of every relevant scored set.
+        at_limit: a larger set would be better; common members stay certain.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -111,12 +109,12 @@ class Posterior:
         return self.hypotheses[0]
 
     def probability(self, names: Iterable[str]) -> float:
-        """Probability that at least one of these causes is there."""
+        """Return the probability that at least one is present."""
         wanted = frozenset(names)
         return self.probability_of(lambda key: bool(key & wanted))
 
     def probability_of(self, holds: Callable[[frozenset[str]], bool]) -> float:
-        """Probability of all sets of causes for which something holds."""
+        """Return the probability of sets with a property."""
         inside = [weight for key, weight in self.weights.items() if holds(key)]
         # A part of a sum can round to more than the whole.
         return min(1.0, float(np.exp(logsumexp(inside) - self._total))) if inside else 0.0
@@ -137,11 +135,10 @@ def search(
     """Posterior over sets of causes.
 
     Args:
-        seeds: members of hypotheses to look at beside those that the search finds itself, such as those of an earlier one about
-            another linearisation.
-        most_expanded: hypotheses whose neighbours are looked at, at the most.
-        most_members: causes of a hypothesis at the most; None: hypotheses may grow as they like.
-        likely: log odds against the best hypothesis within which others are looked at; `CLOSE` where that one alone is wanted.
+        seeds: further sets to examine, such as earlier ones.
+        most_expanded: sets whose neighbours are examined.
+        most_members: None: unlimited.
+        likely: log odds of examined sets below the best; `CLOSE` for the best alone.
     """
     return _Search(comparison, causes, most_expanded, most_members, likely).run(seeds)
 
@@ -166,7 +163,7 @@ class _Search:
         self._top = -np.inf  # log posterior of the most probable hypothesis so far
 
     def run(self, seeds: Iterable[Sequence[Member]]) -> Posterior:
-        """Look at hypotheses until none is likely that was not looked at."""
+        """Search until all likely sets are examined."""
         self._grow(seeds)
         self._drop_negligible()
         weights = {**self._scored, **{key: h.log_posterior for key, h in self._seen.items()}}
@@ -174,7 +171,7 @@ class _Search:
         return Posterior(found, weights, at_limit=self._beyond > self._top)
 
     def _grow(self, seeds: Iterable[Sequence[Member]]) -> None:
-        """Look at neighbours of the most probable hypothesis not yet looked at, until none is likely."""
+        """Expand the most probable unexpanded sets."""
         self._look_at(())
         for members in seeds:
             self._look_at([self._anew(member) for member in members if member.cause.name in self._causes])
@@ -199,7 +196,7 @@ class _Search:
             self._challenge(best)
 
     def _expand(self, hypothesis: Hypothesis) -> None:
-        """Look at neighbours: one more, one less, one in the place of another."""
+        """Examine neighbours: addition, removal, exchange."""
         around = self._around(hypothesis)
         self._try_more(hypothesis.members, hypothesis.log_posterior, around.without(())[0])
         for member, factor in zip(hypothesis.members, hypothesis.log_factors, strict=True):
@@ -209,7 +206,7 @@ class _Search:
             self._try_more(others, without, around.without([member.cause.name])[0])
 
     def _challenge(self, hypothesis: Hypothesis) -> None:
-        """Try one cause in the place of two, and two in the place of one that is flexible or has no name."""
+        """Exchange one for two causes, and two for one that is flexible or nameless."""
         around = self._around(hypothesis)
         for pair in self._least_worth(hypothesis):
             others = hypothesis.without(*pair)
@@ -232,13 +229,13 @@ class _Search:
         return self._comparison.around(hypothesis.members, self._causes.values())
 
     def _try_more(self, members: Sequence[Member], log_posterior: float, scan: Scan) -> None:
-        """Score every further cause beside members; look at those that make a likely hypothesis more probable."""
+        """Score every addition; examine improvements of likely sets."""
         worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
         for k in np.flatnonzero(log_posterior + worth > self._top - NEGLIGIBLE).tolist():
             self._score([*members, scan.best_of(k)], log_posterior + float(worth[k]), worth=float(worth[k]))
 
     def _score(self, members: Sequence[Member], log_posterior: float, worth: float = 1.0) -> None:
-        """Keep a first score, and look at the hypothesis where it is likely and its last member is worth its odds."""
+        """Keep a first score; examine a likely set whose last member is worth its odds."""
         if len(members) > self._most_members:
             self._beyond = max(self._beyond, log_posterior)
             return
@@ -250,12 +247,12 @@ class _Search:
             self._look_at(members)
 
     def _drop_negligible(self) -> None:
-        """Forget first scores that became negligible since they were kept."""
+        """Forget negligible first scores."""
         self._scored = {key: score for key, score in self._scored.items() if score > self._top - NEGLIGIBLE}
         self._room = max(MOST_SCORES, 2 * len(self._scored))
 
     def _pairs(self, members: Sequence[Member], scan: Scan) -> None:
-        """Look at the best pairs of named causes beside members: each may show only beside the other."""
+        """Examine the best pairs, which may show only together."""
         hidden = {
             c.name for c, factor in zip(scan.causes, scan.log_factor, strict=True) if factor + c.log_prior_odds <= 0.0
         }
@@ -283,12 +280,11 @@ class _Search:
                     self._look_at([*members, named[a], named[b]])
 
     def _may_be_likely(self, members: Sequence[Member], evidence: float, worth: float) -> bool:
-        """Whether members of this evidence with something of so much worth beside them may, settled, be anything but negligible."""
+        """Return whether members plus a gain may become relevant when settled."""
         odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
         return evidence + odds + worth > self._top - NEGLIGIBLE
 
     def _anew(self, member: Member) -> Member:
-        """The same form of a cause as it is laid out now."""
         cause, old = self._causes[member.cause.name], member.variant
         same = [v for v in cause.variants if (v.label, v.law) == (old.label, old.law)] or list(cause.variants)
 
@@ -298,7 +294,7 @@ class _Search:
         return Member(cause, min(same, key=away), member.scale)
 
     def _look_at(self, members: Sequence[Member]) -> None:
-        """Give every member what suits it best and keep the hypothesis; look at it without a member that is not worth it."""
+        """Settle and keep a set; examine it without unworthy members."""
         key = frozenset(member.cause.name for member in members)
         if key in self._seen or len(key) > self._most_members:
             return
@@ -310,7 +306,7 @@ class _Search:
             self._look_at(found.without(found.members[int(np.argmin(worth))].cause.name))
 
     def _settled(self, members: list[Member]) -> Hypothesis:
-        """Sizes and variants that suit each member beside the others, and what each is worth there."""
+        """Return settled members with their worth."""
         many = len(members) > MANY
         beside = _Beside(self._comparison, members)
         for _ in range(SWEEPS if len(members) > 1 else 1):
@@ -341,10 +337,9 @@ class _Search:
         return Hypothesis(tuple(members), evidence + more + odds, tuple(factors))
 
     def _possible(self, comparison: ModelComparison, members: list[Member]) -> list[float]:
-        """What it makes of the evidence that amplitudes of each member are known not to be negative.
+        """Return the evidence of non-negative amplitudes.
 
-        A prior that is cut off at zero has twice the density above it, and the likelihood counts there alone: the posterior
-        probability of being above zero over the prior one, which is a half.
+        A truncated prior doubles density above zero: posterior over prior probability of positivity, a half.
         """
         found = [0.0] * len(members)
         if not any(any(member.variant.positive) for member in members):
@@ -360,7 +355,7 @@ class _Search:
         return found
 
     def _as_close_as_it_is(self, beside: _Beside, members: list[Member]) -> tuple[list[Member], float]:
-        """Members with the share of their slack that suits each best, and what averaging over the shares adds."""
+        """Return members with best slack shares, and the gain of averaging."""
         more, known = 0.0, beside.log_evidence(members)
         for k, member in enumerate(members):
             if not len(member.variant.slack):
@@ -392,13 +387,13 @@ class _Search:
 
 
 class _Beside:
-    """What members of one hypothesis are asked beside each other, the largest of them taken out once for all the others.
+    """Members of one set asked beside each other, the largest eliminated once.
 
     Args:
-        members: of the hypothesis; their forms and sizes may change.
+        members: forms and sizes may change.
 
     Attributes:
-        local: comparison of their causes alone.
+        local: of their causes alone.
     """
 
     def __init__(self, comparison: ModelComparison, members: Sequence[Member]) -> None:
@@ -407,14 +402,14 @@ class _Beside:
         self._last: tuple[Member, ModelComparison] | None = None
 
     def others(self, members: Sequence[Member], k: int) -> tuple[ModelComparison, list[Member]]:
-        """Comparison, and members that are no part of its base, in which everything is asked beside all members but one."""
+        """Return comparison and remaining members, for questions beside all but one."""
         if k == self._largest:
             return self.local, [*members[:k], *members[k + 1 :]]
         first = self._largest
         return self._beside_largest(members), [m for j, m in enumerate(members) if j not in {k, first}]
 
     def log_evidence(self, members: Sequence[Member]) -> float:
-        """Log marginal likelihood of all members."""
+        """Return all members' log marginal likelihood."""
         if not members:
             return self.local.log_evidence(members)
         first = self._largest
@@ -428,5 +423,5 @@ class _Beside:
 
 
 def _single(member: Member) -> bool:
-    """Whether a cause has one form only, which follows its formula."""
+    """Return whether a cause has one exact form."""
     return len(member.cause.variants) == 1 and not len(member.variant.slack)

@@ -1,4 +1,4 @@
-"""Values that cannot be: what takes up energy, or has a size, cannot be negative beyond its uncertainty."""
+"""Significantly negative values that cannot be."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ NEGATIVE_SIGMA = 3.0
 
 
 def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.float64]) -> str:
-    """Why amplitudes of a law cannot be: one is negative beyond its uncertainty though it cannot be; empty where they can.
+    """Return why amplitudes are impossible, or an empty text.
 
     Args:
         values: shape (p,).
-        variances: of these, shape (p,).
+        variances: shape (p,).
     """
     for k, positive in enumerate(law.positive):
         value = float(values[k])
@@ -31,7 +31,7 @@ def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.floa
 
 
 def impossibly_negative(name: str, value: float, sigma: float, unit: str) -> str:
-    """Why a value that cannot be negative is none that can be: it is so beyond its uncertainty; empty where it is not."""
+    """Return why a non-negative quantity's value is impossible, or an empty text."""
     if value >= -NEGATIVE_SIGMA * sigma:
         return ""
     return (

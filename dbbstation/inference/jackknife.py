@@ -1,8 +1,7 @@
-"""Uncertainty of a least-squares fit from leaving out its blocks in turn.
+"""Uncertainty of least squares by omitting blocks in turn.
 
-Noise that is correlated over less than a block, or larger in some places than in others, is allowed for without a
-model of it: what such noise does to the values is seen in how they move. [Tukey 1958; delete-a-group jackknife in Künsch,
-The jackknife and the bootstrap for general stationary observations, Annals of Statistics 17 (1989) 1217, sec. 2]
+It covers correlated or uneven noise without a model. [Tukey 1958; delete-a-group jackknife in Künsch, The jackknife and
+the bootstrap for general stationary observations, Annals of Statistics 17 (1989) 1217, sec. 2]
 """
 
 from __future__ import annotations
@@ -25,10 +24,10 @@ if TYPE_CHECKING:
 
 
 def jackknife_covariance(blocks: Sequence[Block], size: int) -> NDArray[np.float64]:
-    """Covariance of least-squares values, shape (k, k).
+    """Return the values' covariance, shape (k, k).
 
     Args:
-        blocks: compressed runs, at least two; values that one block alone knows come out with a large variance.
+        blocks: at least two; values known to one alone get a large variance.
     """
     norm = np.maximum(np.linalg.norm(spread(blocks, size)[:, :-1], axis=0), 1e-300)
     values = []
@@ -46,11 +45,11 @@ def weighted_jackknife(
     without: NDArray[np.float64],
     variances_without: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Standard uncertainties from how values move when parts are left out, shape (p,).
+    """Return standard uncertainties by omitted parts, shape (p,), weighted by remaining information.
 
-    Each part counts by the share of the information that is left without it. So the expected square is the variance where the stated
-    variances are right, however unequal the parts are, and a part that alone knows a value says nothing about its spread.
-    [weighted jackknife, Wu, Annals of Statistics 14 (1986) 1261, eq. 5.1, for each value by itself]
+    The expected square is the stated variance if right [weighted jackknife, Wu, Annals of Statistics 14 (1986) 1261, eq.
+    5.1, by value]. `values` and `variances` have shape (p,); `without` and `variances_without` shape (k, p), not finite
+    if a value is lost.
 
     Args:
         values: from all parts, shape (p,).
@@ -66,26 +65,24 @@ def weighted_jackknife(
 def widening(
     variances: NDArray[np.float64], moved: NDArray[np.float64], variances_without: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Factors of standard uncertainties after which each is the larger of model and jackknife, shape (p,).
+    """Return factors to the larger of model and jackknife uncertainty, shape (p,).
 
-    Values that the same weak direction makes uncertain get nearly the same factor, so a covariance whose rows and columns are
-    multiplied by them still knows combinations better than their parts. A value without variance, which is held, stays held.
+    Values of one weak direction get similar factors, so scaled covariances keep combinations. Held values stay.
 
     Args:
-        variances: stated of the values from all parts, shape (p,).
-        moved: by how much the values differ without each part, shape (k, p).
-        variances_without: stated of the values without each part, shape (k, p).
+        variances: shape (p,).
+        moved: changes without each part, shape (k, p).
+        variances_without: shape (k, p).
     """
     found = weighted_jackknife(np.zeros(len(variances)), variances, moved, variances_without)
     return np.maximum(found / np.sqrt(np.where(variances > 0.0, variances, np.inf)), 1.0)
 
 
 def refits_without(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> tuple[Solution, ...]:
-    """Base and members of the best hypothesis fitted without each part, in the noise that there is: nothing is chosen anew.
+    """Return refits of base and best members without each part, nothing chosen anew.
 
     Args:
-        settled: what a comparison came to.
-        parts: rows of each, shape (n,).
+        parts: rows, shape (n,).
     """
     bank, channel, members = settled.bank, settled.channel, settled.best.members
     columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])

@@ -1,4 +1,4 @@
-"""Which law a class of variables is followed by: causes in one place, scored by parts that took no part in fitting them."""
+"""The law of a class of variables, by held-out scores."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ SURELY = float(np.log(SURE / ABSENT))
 
 
 def law_form(settled: Settled, one: VariableClass, parts: Sequence[NDArray[np.bool_]]) -> LawForm:
-    """Score single causes over the variables of a class, and the best set's own sum, in the place of what follows it.
+    """Score single causes over a class's variables, and the best set's sum, in its place.
 
-    The score of a part is the log evidence of all rows less that of the rows without the part, in the noise of all rows. A law is named
-    where it beats each other candidate by the odds at which something is sure, without its best part.
+    A part's score is the log evidence of all rows less that without it. A law is named if it beats each rival surely,
+    without its best part.
     """
     others = [m for m in settled.best.members if m.cause.name not in one.members]
     taken = {m.cause.name for m in others}
@@ -77,7 +77,7 @@ def _scores(
     others: Sequence[Member],
     parts: Sequence[NDArray[np.bool_]],
 ) -> dict[str, NDArray[np.float64]]:
-    """Log evidence of each part given the others, over nothing in the place, shape (parts,) each."""
+    """Return each part's conditional log evidence over an empty place, shape (parts,) each."""
     bank, kept = settled.bank, settled.channel.kept
     every = np.unique(np.concatenate([m.columns for ms in (others, *candidates.values()) for m in ms]))
     target = bank.target
@@ -94,7 +94,7 @@ def _scores(
 
 
 def _cosine(settled: Settled, one: Sequence[Member], other: Sequence[Member], others: Sequence[Member]) -> float:
-    """Least cosine between what two causes span beside base and others; zero where they have not as many amplitudes."""
+    """Return the least cosine between two causes' spans; zero for unequal sizes."""
     a, b = one[0].variant.columns, other[0].variant.columns
     if len(one) > 1 or len(other) > 1 or len(a) != len(b):
         return 0.0

@@ -1,7 +1,7 @@
-"""Whether what a hypothesis leaves is noise: its sum of squares, its periodogram, its runs of sign, its blocks, its variables.
+"""Test a residual as noise: squares, periodogram, runs of sign, blocks, variables.
 
-"Nothing is left beyond noise" holds only where all of these pass. Each is a probability by chance, times the number of things
-that were looked at [Bonferroni; Miller, Simultaneous Statistical Inference, 2nd ed., sec. 1.3].
+All must pass. Each is a chance probability times its number of looks [Bonferroni; Miller, Simultaneous Statistical
+Inference, 2nd ed., sec. 1.3].
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ class ResidualTest:
 
     Attributes:
         name: `sum of squares`, `wave in time`, `runs of sign`, `blocks`, or a variable.
-        probability: that noise alone leaves as much.
-        rms: of what stands out, beyond noise, in the unit of the residual.
-        where: place, in words; empty where it has none.
+        probability: by noise.
+        rms: beyond noise, in the residual's unit.
+        where: may be empty.
     """
 
     name: str
@@ -52,7 +52,7 @@ class LeftOver:
     """Whether something is left beyond noise.
 
     Attributes:
-        probability: that noise alone leaves as much in any of these tests.
+        probability: by noise in any test.
     """
 
     is_noise: bool
@@ -61,16 +61,15 @@ class LeftOver:
 
     @property
     def worst(self) -> ResidualTest:
-        """The one that is least probable by chance."""
+        """Return the least probable test."""
         return min(self.looks, key=lambda look: look.probability)
 
 
 def left_over(settled: Settled, freedom: float | None = None) -> LeftOver:
-    """Test what the best hypothesis leaves of the kept rows, its noise made white.
+    """Test the best hypothesis's whitened residual.
 
     Args:
-        settled: what the comparison came to.
-        freedom: degrees of freedom of the residual; from the number of amplitudes if None.
+        freedom: None: by the number of amplitudes.
     """
     channel, bank = settled.channel, settled.bank
     rows = channel.residual - settled.predicted()
@@ -96,7 +95,7 @@ def left_over(settled: Settled, freedom: float | None = None) -> LeftOver:
 
 
 def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: float) -> list[ResidualTest]:
-    """Wave in time, and runs of one sign."""
+    """Return the tests of waves in time and runs of sign."""
     longest = left[max(stretches, key=lambda rows: rows.stop - rows.start)]
     found = []
     if len(longest) >= FEWEST:
@@ -129,7 +128,7 @@ def _by_block(left: NDArray[np.float64], blocks: Sequence[slice], sigma: float) 
 
 
 def _over(left: NDArray[np.float64], variable: Variable, sigma: float) -> ResidualTest:
-    """Means over pieces of a variable with as many rows in each."""
+    """Return means over equal pieces of a variable."""
     values = variable.values
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))

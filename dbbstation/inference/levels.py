@@ -1,7 +1,6 @@
-"""The answer in three levels: does anything differ, what does it follow, which law is it.
+"""The three levels: does anything differ, what does it follow, which law.
 
-Each level has its own probability, summed over all sets of causes and beginnings of the noise, and its own gain in held-out parts. A level
-that is not sure says less; it takes nothing from the level above it.
+Each has own probability over all sets and held-out gain. An uncertain level takes nothing from the one above.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ TIME, RUN = "time", "run"
 
 
 class Differs(StrEnum):
-    """Level 1: whether measured and simulated values differ beyond noise and refitted parameters."""
+    """Level 1: difference beyond noise and refit."""
 
     YES = "yes"
     NO = "no"
@@ -28,7 +27,7 @@ class Differs(StrEnum):
 
 
 class FollowsAnswer(StrEnum):
-    """Level 2: what is known of a class of variables."""
+    """Level 2: knowledge of a variable class."""
 
     FOLLOWS = "follows"
     GOES_ON = "goes on in time"
@@ -40,13 +39,12 @@ class FollowsAnswer(StrEnum):
 
 @dataclass(frozen=True)
 class Detectable:
-    """How large an effect must be to be found.
+    """Smallest detectable effect.
 
     Attributes:
-        follows: variable, or name of a cause.
-        size: root mean square of the effect itself from which on it is found in nine of ten cases, with a margin, in the unit of the
-            residual; None where the fitted parameters take up any size.
-        concealed: share of its squares that the fitted parameters take up.
+        follows: variable or cause.
+        size: rms found in nine of ten cases, in the residual's unit; None if absorbed at any size.
+        concealed: absorbed share of squares.
     """
 
     follows: str
@@ -59,10 +57,10 @@ class DifferenceFound:
     """Level 1.
 
     Attributes:
-        why: reason, where the answer is not a plain yes.
-        matters: size that the user cares about, in the unit of the residual.
-        matters_stated: whether the user stated it; else it is what the fitted parameters leave of all rows.
-        gain: log density of held-out parts with everything that was chosen, less that of the base alone; None where not tested.
+        why: if not a plain yes.
+        matters: size of interest, in the residual's unit.
+        matters_stated: else the refitted residual.
+        gain: held-out log density of everything over the base; None if not tested.
     """
 
     answer: Differs
@@ -81,7 +79,7 @@ class ScoredLaw:
     """A law, or the sum of several, in one place.
 
     Attributes:
-        log_density: of held-out parts with it, over nothing in its place.
+        log_density: held-out, over an empty place.
     """
 
     name: str
@@ -90,12 +88,12 @@ class ScoredLaw:
 
 @dataclass(frozen=True)
 class LawForm:
-    """Level 3: the law within a class.
+    """Level 3: the law of a class.
 
     Attributes:
-        name: of the law; None where it is open.
-        not_worse: causes that predict parts as well as it, or as the best; those that are the same to these rows included.
-        scored: all that were compared, best first.
+        name: None if open.
+        not_worse: causes as good as it or the best, with equivalents.
+        scored: best first.
     """
 
     name: str | None
@@ -108,16 +106,15 @@ class Followed:
     """Level 2: one class of variables.
 
     Attributes:
-        variables: of which one is followed, most probable first; of several classes that the same causes follow, all of these.
-        or_variables: that these rows cannot tell from them.
-        ways: probability that it is followed by value, by direction, late, or in time.
-        rms: of the fitted sum of all that follows them, in the unit of the residual.
-        members: causes that do, in the most probable set.
-        before: error of held-out rows without these; None where not tested.
-        gain: log density of held-out parts with them less that without; None where not tested.
-        consequence: whether what is followed results from what is simulated, as the user states: it shows the difference and is
-            no cause.
-        form: the law; None where the class is not known to be followed, or is the time.
+        variables: one is followed, most probable first.
+        or_variables: indistinguishable ones.
+        ways: probability by value, direction, lateness, time.
+        rms: fitted sum, in the residual's unit.
+        members: of the most probable set.
+        before: held-out error without them; None if not tested.
+        gain: held-out log density with less without; None if not tested.
+        consequence: the variable results from the simulation, as stated, and is no cause.
+        form: None if not followed, or time.
     """
 
     variables: tuple[tuple[str, ...], ...]
@@ -137,7 +134,7 @@ class Followed:
 
     @property
     def name(self) -> str:
-        """Of the class, in words."""
+        """Return the class in words."""
         return " and ".join(" or ".join(one) for one in self.variables)
 
 
@@ -146,10 +143,8 @@ class Levels:
     """The answer.
 
     Attributes:
-        differs: level 1.
-        follows: level 2 with level 3 in it, most probable first.
-        correction: whether the fitted sum of everything may be used: it predicts held-out rows better than as simulated; None where
-            nothing was found, or nothing was tested.
+        follows: with level 3, most probable first.
+        correction: whether the fitted sum predicts better than as simulated; None if nothing was found or tested.
     """
 
     differs: DifferenceFound
@@ -167,12 +162,12 @@ def difference_of(
     doubts: tuple[str, ...],
     rest: tuple[float, bool, float, tuple[Detectable, ...]],
 ) -> DifferenceFound:
-    """Level 1 from what the levels below it found.
+    """Return level 1 from the others.
 
     Args:
         classes: level 2.
-        gains: of everything in held-out parts; None: not tested.
-        rest: size that matters, whether it was stated, independent samples, and detectable sizes.
+        gains: None: not tested.
+        rest: size of interest, whether stated, independent samples, detectable sizes.
     """
     matters, stated, samples, detectable = rest
     answer, why = Differs.NO, ""

@@ -1,4 +1,4 @@
-"""Read the three levels off a comparison and what was chosen anew without each part."""
+"""The three levels from a comparison and held-out parts."""
 
 from __future__ import annotations
 
@@ -43,13 +43,12 @@ def levels_of(
     held_out: HeldOutError | None,
     matters: float | None = None,
 ) -> Levels:
-    """Answer in three levels.
+    """Return the three levels.
 
     Args:
-        settled: what the comparison came to.
-        left: tests of the residual.
-        parts: what held-out parts say; None where these were not asked for.
-        matters: size of an effect that matters, in the unit of the residual; None: what the base leaves of the rows.
+        left: residual tests.
+        parts: None if not tested.
+        matters: size of interest, in the residual's unit; None: the refitted residual.
     """
     probabilities = VariableProbabilities(settled)
     classes = tuple(_followed(settled, one, probabilities, parts) for one in classes_of(settled, probabilities))
@@ -70,7 +69,7 @@ def levels_of(
 
 
 def _doubts(settled: Settled, left: LeftOver, sizes: tuple[Detectable, ...], matters: float) -> tuple[str, ...]:
-    """Why an effect that matters may be there though none is found; none where none can."""
+    """Return why an effect of interest may be hidden."""
     channel, unit, found = settled.channel, settled.channel.unit, []
     if len(channel.target) <= FEWEST_INDEPENDENT:
         found.append(f"{len(channel.target)} rows are too few to know the noise")
@@ -90,7 +89,7 @@ def _doubts(settled: Settled, left: LeftOver, sizes: tuple[Detectable, ...], mat
 
 
 def slow_chance(settled: Settled) -> float:
-    """Probability by chance of as much power in the slowest frequencies of what is left, over that of the next ones."""
+    """Return the chance of as much power at the slowest frequencies relative to the next."""
     channel = settled.channel
     if channel.time is None:
         return 1.0

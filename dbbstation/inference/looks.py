@@ -1,7 +1,7 @@
-"""A look for waves, bumps, steps and pulses in what a fit leaves: which of many forms the rows follow best.
+"""Search a residual for waves, bumps, steps and pulses.
 
-Nobody says where or when. The number of independent forms that one was picked from counts against it [look-elsewhere effect:
-Gross and Vitells, Eur. Phys. J. C 70 (2010) 525].
+The number of independent tries counts against a find [look-elsewhere effect: Gross and Vitells, Eur. Phys. J. C 70 (2010)
+525].
 """
 
 from __future__ import annotations
@@ -64,12 +64,12 @@ FINER = (1.0 / 30.0, 1.0 / 450.0)
 
 
 def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_], size: float) -> list[Pattern]:
-    """Waves, bumps and steps over variables that the rows follow best.
+    """Return the best waves, bumps and steps over variables.
 
     Args:
-        left: what a fit leaves of the rows that were kept.
-        kept: which rows were fitted, shape (n,).
-        size: of an effect, one standard deviation, in units of noise.
+        left: of kept rows.
+        kept: shape (n,).
+        size: one standard deviation, in noise.
     """
     found: list[Pattern] = []
     for variable in variables:
@@ -93,7 +93,7 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_
 
 
 def _waves(variable: Variable, sums: Sums, size: float, pieces: int, strongest: int, *, roughly: bool) -> list[Pattern]:
-    """Waves of all periods from twice the range to four pieces, made finer about the best."""
+    """Return waves from twice the range to four pieces, refined."""
     extent = variable.extent
     grid, explained = sums.explained_by_waves(min(MOST_CYCLES, pieces / PIECES_PER_WAVE), size)
     if not len(grid):
@@ -110,7 +110,7 @@ def _waves(variable: Variable, sums: Sums, size: float, pieces: int, strongest: 
 
 
 def _nearest(sums: Sums, frequency: float, step: float, lowest: float, size: float) -> tuple[float, float]:
-    """Sum of squares that a wave near a frequency explains at the most, and its frequency."""
+    """Return the greatest explained squares near a frequency, and its place."""
     near = np.asarray(frequency + np.arange(-15, 16) * step, dtype=np.float64)
     near = near[near > lowest]
     by_near = sums.explained(_cosines(sums.at, float(near[0]), step, len(near)), size)
@@ -129,7 +129,7 @@ def _best(
     *,
     roughly: bool,
 ) -> list[Pattern]:
-    """Forms that explain more than their neighbours in the list; only every so many-th counts as another try."""
+    """Return local maxima of a list; every so many-th counts as a try."""
     if not forms:
         return []
     tried = max(len(forms) / apart, 1.0)
@@ -146,20 +146,17 @@ def _best(
 
 
 def _least(tried: float) -> float:
-    """Sum of squares below which neither a form of a list nor those about it can be worth their prior odds.
-
-    A log Bayes factor is at most half of the sum of squares that a form explains.
-    """
+    """Return the sum of squares below which no form is worth its odds: twice a log Bayes factor."""
     return -2.0 * NEIGHBOUR * log_odds(1, tried)
 
 
 def placed_better(pattern: Pattern, left: Left, kept: NDArray[np.bool_], size: float) -> Pattern:
-    """A wave, bump or step at the frequency, place and width where it explains most.
+    """Return a pattern refined in frequency, place and width.
 
     Args:
-        pattern: that `looked_for` made.
-        left: the residual beside everything but it.
-        kept: which rows were fitted, shape (n,).
+        pattern: from `looked_for`.
+        left: residual without it.
+        kept: shape (n,).
     """
     (variable,), form = pattern.variables, pattern.form
     if form is None:
@@ -173,7 +170,7 @@ def placed_better(pattern: Pattern, left: Left, kept: NDArray[np.bool_], size: f
 
 
 def _explained_by(left: Left, columns: NDArray[np.float64], size: float) -> float:
-    """Sum of squares that whitened columns, shape (m, p), explain beside what was fitted, less what their sizes cost."""
+    """Return squares explained by whitened columns, shape (m, p), less their cost."""
     beside = columns - left.axes @ (left.axes.T @ columns)
     along = columns.T @ left.rest
     return float(along @ np.linalg.solve(columns.T @ beside + np.eye(columns.shape[1]) / size**2, along))
@@ -242,7 +239,7 @@ def _steps(variable: Variable) -> list[Form]:
 
 
 def _cosines(at: NDArray[np.float64], lowest: float, step: float, count: int) -> NDArray[np.float64]:
-    """Cosine and sine of so many frequencies a step apart, shape (b, m, 2): one is the one before it, turned."""
+    """Return cosines and sines of equidistant frequencies by rotation, shape (b, m, 2)."""
     turned = np.empty((len(at), count), dtype=np.complex128)
     turned[:, 0] = np.exp(2j * np.pi * lowest * at)
     turned[:, 1:] = np.exp(2j * np.pi * step * at)[:, None]

@@ -1,7 +1,6 @@
-"""Whether what a model leaves is larger in some stretches than elsewhere: what noise that is the same everywhere does not do.
+"""Whether a residual is larger in some stretches.
 
-A quick oscillation lies above the harmonics that a model is asked for, where noise is read from. It then counts as noise and hides.
-Noise is there all the time; an oscillation that begins with an event is there after the event only.
+Fast oscillations above the modelled harmonics count as noise, but occur only after their event.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ class Louder:
     """Mean squares in some stretches against those elsewhere.
 
     Attributes:
-        probability: that stretches picked by chance are as much louder.
+        probability: for random stretches.
     """
 
     probability: float
@@ -35,19 +34,18 @@ class Louder:
 
     @property
     def beyond(self) -> float:
-        """What these stretches have beyond the others, root mean square in the unit of the residual."""
+        """Return the stretches' excess rms, in the residual's unit."""
         return float(np.sqrt(max(self.rms**2 - self.elsewhere**2, 0.0)))
 
 
 def louder(residuals: Sequence[NDArray[np.float64]], begins: Sequence[NDArray[np.int64]], length: int) -> Louder | None:
-    """Compare stretches of so many rows that begin in some rows with all others of the same length; None where they are too few.
+    """Compare stretches from given rows with equally long others; None if too few.
 
-    Mean squares of stretches scatter by more than those of white noise do where neighbours resemble each other. So their degrees of
-    freedom are read from the scatter itself, 2 mean² / variance each [Satterthwaite, Biometrics Bulletin 2 (1946) 110].
+    Freedom of correlated mean squares is 2 mean² / variance [Satterthwaite, Biometrics Bulletin 2 (1946) 110].
 
     Args:
-        residuals: of each run, in the order of time, shape (n,).
-        begins: rows of each run in which a stretch begins, in any order.
+        residuals: per run, in time order, shape (n,).
+        begins: rows per run, unordered.
     """
     inside, outside = [], []
     for residual, rows in zip(residuals, begins, strict=True):

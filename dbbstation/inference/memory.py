@@ -1,7 +1,6 @@
-"""Effects with a memory: what follows a variable late, as a first-order lag or after a dead time.
+"""Effects with memory: first-order lag or dead time.
 
-A residual alone shows their shadow: a curve over time, a hysteresis, something in proportion to the speed. Laid out as laws, they are
-held against those by what they predict.
+Their shadows are curves over time, hysteresis and speed; they compete by prediction.
 """
 
 from __future__ import annotations
@@ -53,13 +52,12 @@ def memory_laws(
     size: float,
     unit: str,
 ) -> list[Law]:
-    """A first-order lag and a dead time of each variable that is sampled along a path.
+    """Return lag and dead time of each path variable.
 
     Args:
-        variables: that an effect may follow.
-        time: of the rows, rising within blocks, shape (n,).
-        blocks: rows of each, in time order.
-        size: of an effect, one standard deviation, in the unit of the residual.
+        time: rising within blocks, shape (n,).
+        blocks: in time order.
+        size: one standard deviation, in the residual's unit.
     """
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0 and v.is_path(blocks)]
     moving = [rows for rows in blocks if rows.stop - rows.start > 1]
@@ -100,7 +98,7 @@ def memory_laws(
 
 
 def _choices(width: int) -> tuple[tuple[tuple[int, ...], float, str], ...]:
-    """The simulation lacks the effect, or has it at once; either with what is left of the state at the start."""
+    """Return choices: the effect is missing, or simulated at once; with or without initial state."""
     starts = tuple(range(2, width))
     return (
         ((0, *starts), float(np.log(1.0 - AT_ONCE)), "which the simulation lacks"),
@@ -115,7 +113,7 @@ def _grid(shortest: float, longest: float) -> tuple[float, ...]:
 def _lag(
     variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], point: tuple[float, ...]
 ) -> NDArray[np.float64]:
-    """Late value, late less present value, and what fades from the start of each block, shape (n, 2 + starts)."""
+    """Return late, late less present, and initial transients by block, shape (n, 2 + starts)."""
     starts = _starts(blocks)
     found = np.zeros((len(time), 2 + starts))
     for k, rows in enumerate(blocks):
@@ -133,7 +131,7 @@ def _starts(blocks: Sequence[slice]) -> int:
 def _delay(
     variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], point: tuple[float, ...]
 ) -> NDArray[np.float64]:
-    """Value a while ago, and that less the present one, shape (n, 2); before the first row it was as there."""
+    """Return the delayed value, and less the present one, shape (n, 2), constant before the first row."""
     found = np.zeros((len(time), 2))
     for rows in blocks:
         values, at = variable.travel(rows), time[rows]
@@ -147,15 +145,15 @@ def _middle(variable: Variable) -> float:
 
 
 def lagging(values: NDArray[np.float64], time: NDArray[np.float64], constant: float) -> NDArray[np.float64]:
-    """What a first-order lag makes of values, less these, shape (n,); it begins settled on the first one.
+    """Return a first-order lag of values less these, shape (n,), initially settled.
 
-    Exact for values on straight lines between rows [triangle-hold equivalent: Franklin, Powell and Workman, Digital Control of
-    Dynamic Systems, 3rd ed., sec. 6.3.2].
+    Exact for linear interpolation [triangle-hold equivalent: Franklin, Powell and Workman, Digital Control of Dynamic
+    Systems, 3rd ed., sec. 6.3.2].
 
     Args:
         values: shape (n,).
         time: rising, shape (n,).
-        constant: time constant, in the unit of `time`.
+        constant: in `time`'s unit.
     """
     steps = np.diff(time)
     fades = np.exp(-steps / constant)

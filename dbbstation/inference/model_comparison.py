@@ -1,14 +1,9 @@
-"""Causes that a base model may lack, compared by their marginal likelihood.
+"""Missing causes compared by marginal likelihood.
 
-The model is target = base + sum of causes + noise, linear in all amplitudes. The base is fitted anew beside every
-combination: its columns are projected out of all others once. Amplitudes have Gaussian priors, so that their marginal
-likelihood is known in closed form [MacKay, Bayesian interpolation, Neural Computation 4 (1992), eqs 2.5 and 4.1]. The
-size of an effect is known only to its order of magnitude: the standard deviation of the prior is itself unknown and is
-averaged over, and so are the variants of a cause.
-
-A machine follows the formula of a cause only roughly. What the formula may be off by are further columns of a variant,
-its slack; without its amplitudes it has none [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, on model
-discrepancy].
+target = base + causes + noise, linear in amplitudes; the base is projected out. Gaussian priors give closed forms
+[MacKay, Bayesian interpolation, Neural Computation 4 (1992), eqs 2.5 and 4.1]. Prior sizes and variants are averaged
+over. Formula inaccuracy is a variant's slack, proportional to its amplitudes [Kennedy and O'Hagan, J. R. Stat. Soc. B 63
+(2001) 425, on model discrepancy].
 """
 
 from __future__ import annotations
@@ -55,19 +50,19 @@ _Group: TypeAlias = "tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.floa
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """One form of a cause: columns of the comparison and what is known of their amplitudes.
+    """One form of a cause.
 
     Attributes:
-        columns: of the amplitudes, shape (p,).
-        plausible: their plausible sizes, shape (p,).
-        nonlinear: values of the nonlinear parameters that the columns were made with.
-        label: which of several things of a kind it is, or of which strut; empty where there is one only.
-        law: which law it follows, where a cause has several.
-        whole: columns of the form that has all amplitudes at the same point, shape (q,); empty where it is this one.
-        slack: columns of what the formula may be off by, shape (d,).
-        slack_sd: standard deviations of their coefficients at the amplitudes `slack_at`, shape (d,).
-        slack_at: root mean square of the amplitudes, in plausible ones, that the slack was made for.
-        positive: which amplitudes cannot be negative, shape (p,); empty where all can.
+        columns: of amplitudes, shape (p,).
+        plausible: sizes, shape (p,).
+        nonlinear: parameters of the columns.
+        label: kind or strut; may be empty.
+        law: if a cause has several.
+        whole: columns of the form with all amplitudes, shape (q,); may be empty.
+        slack: columns, shape (d,).
+        slack_sd: at amplitudes `slack_at`, shape (d,).
+        slack_at: rms amplitude in plausible ones.
+        positive: shape (p,); may be empty.
     """
 
     columns: NDArray[np.int64]
@@ -88,10 +83,9 @@ class Cause:
     """Something that the base model may lack.
 
     Attributes:
-        variants: its forms; their weights add up to one.
-        log_prior_odds: log odds of its being there before anything was measured.
-        named: it is a physical cause with a name; else an unmodelled effect, or a fault of the set-up.
-        setup: it is a fault of the set-up.
+        variants: weights sum to one.
+        named: physical; else unmodelled or a set-up fault.
+        setup: a set-up fault.
     """
 
     name: str
@@ -103,11 +97,11 @@ class Cause:
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A cause in a hypothesis, with the variant and the size that suit it best there.
+    """A cause in a hypothesis, with best variant and size.
 
     Attributes:
-        scale: standard deviation of its amplitudes, in plausible ones.
-        slack_share: how closely this machine follows the formula, in units of what is stated.
+        scale: prior standard deviation in plausible amplitudes.
+        slack_share: of the stated slack.
     """
 
     cause: Cause
@@ -118,12 +112,12 @@ class Member:
 
     @cached_property
     def columns(self) -> NDArray[np.int64]:
-        """Columns of amplitudes, then of slack."""
+        """Return columns of amplitudes, then slack."""
         return np.concatenate([self.variant.columns, self.variant.slack])
 
     @cached_property
     def sd(self) -> NDArray[np.float64]:
-        """Prior standard deviations of these."""
+        """Return prior standard deviations."""
         return np.concatenate([self.variant.plausible * self.scale, self.variant.slack_sd * self.slack_scale])
 
 
@@ -132,11 +126,11 @@ class Scan:
     """Causes beside a hypothesis.
 
     Attributes:
-        log_factor: log Bayes factor of each cause that was asked for, averaged over variants and sizes, shape (c,).
-        factors: log Bayes factors of all forms at all sizes, shape (m, s).
-        first: first form of each cause among all, shape (c,).
-        last: the one behind its last, shape (c,).
-        slim: which forms of each cause have fewer than `FLEXIBLE` amplitudes.
+        log_factor: Bayes factor, averaged, shape (c,).
+        factors: by form and size, shape (m, s).
+        first: first form of each cause, shape (c,).
+        last: one behind its last, shape (c,).
+        slim: forms with fewer than `FLEXIBLE` amplitudes.
     """
 
     causes: tuple[Cause, ...]
@@ -148,7 +142,7 @@ class Scan:
     slim: tuple[list[int], ...]
 
     def best_of(self, k: int) -> Member:
-        """The variant and scale that suit a cause best."""
+        """Return a cause's best variant and scale."""
         form, scale = self._best(k)
         return Member(self.causes[k], self.causes[k].variants[form], float(SCALES[scale]))
 
@@ -159,17 +153,17 @@ class Scan:
 
     @cached_property
     def log_best(self) -> NDArray[np.float64]:
-        """Log Bayes factor of the best, without the weight of variant and scale, shape (c,)."""
+        """Return best log Bayes factors without weights, shape (c,)."""
         best = (self._best(k) for k in range(len(self.causes)))
         return np.array([self.factors[self.first[k] + form, scale] for k, (form, scale) in enumerate(best)])
 
     @cached_property
     def narrow(self) -> tuple[Member | None, ...]:
-        """The best of the variants that have fewer than `FLEXIBLE` amplitudes; None where that is `best`, or where there is none."""
+        """Return the best slim variants; None if they are `best` or missing."""
         return tuple(self._narrow(k) for k in range(len(self.causes)))
 
     def of(self, kept: Sequence[int]) -> Scan:
-        """The same for some of the causes."""
+        """Return the scan of some causes."""
         numbers = np.array(kept, dtype=np.int64)
         return replace(
             self,
@@ -194,21 +188,20 @@ class Scan:
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """Amplitudes of a hypothesis: posterior means and covariance, in the order of the members' columns."""
+    """Posterior means and covariance of members' columns, in order."""
 
     values: NDArray[np.float64]
     covariance: NDArray[np.float64]
 
 
 class _OfCause:
-    """Forms of one cause, those of one number of amplitudes together.
+    """Forms of one cause by number of amplitudes.
 
     Args:
-        gram: products of all columns, shape (n, n).
+        gram: shape (n, n).
 
     Attributes:
-        groups: by number of amplitudes p: numbers of forms that have it, shape (m,); places of their columns and plausible sizes,
-            shape (m, p) each; products of these columns, shape (m, p, p).
+        groups: by p: forms, shape (m,); columns and plausible sizes, shape (m, p) each; products, shape (m, p, p).
     """
 
     def __init__(
@@ -229,13 +222,12 @@ class _OfCause:
 
 
 class _Forms:
-    """Forms of causes, those of one number of amplitudes together.
+    """Forms of causes by number of amplitudes.
 
     Attributes:
-        needed: columns of all forms, shape (q,).
-        groups: numbers of forms that have one number of amplitudes, shape (m,); places of their columns in `needed` and plausible
-            sizes, shape (m, p) each; products of these columns, shape (m, p, p).
-        weights: log probability of each form among those of its cause.
+        needed: columns, shape (q,).
+        groups: forms, shape (m,); places in `needed` and plausible sizes, shape (m, p) each; products, shape (m, p, p).
+        weights: log probability of each form within its cause.
     """
 
     def __init__(self, each: Sequence[_OfCause], count: int) -> None:
@@ -263,10 +255,10 @@ class ModelComparison:
     """Marginal likelihoods over sets of causes.
 
     Args:
-        gram: products of all columns, the base projected out, in units of the noise, shape (n, n).
-        towards: products of the columns with the target, shape (n,).
-        columns: numbers of the columns, rising, shape (n,), where these are not all that there are; None: they are numbered from zero on.
-        evidence: log evidence of what is part of the base here, over the base that log evidences are told against.
+        gram: products beside the base, in noise, shape (n, n).
+        towards: with the target, shape (n,).
+        columns: numbers, rising, shape (n,); None: from zero.
+        evidence: of causes already in this base.
     """
 
     def __init__(
@@ -284,14 +276,14 @@ class ModelComparison:
         self._forms_of_many: _Forms | None = None
 
     def among(self, causes: Iterable[Cause]) -> ModelComparison:
-        """The same for some causes alone, whose products stand together: what asks for them many times finds them sooner."""
+        """Return the comparison of some causes, stored together for speed."""
         every = [part for cause in causes for one in cause.variants for part in (one.columns, one.slack)]
         columns = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *every]))
         own = self._at(columns)
         return ModelComparison(self._gram[np.ix_(own, own)], self._towards[own], columns, self._evidence)
 
     def beside_of(self, member: Member) -> ModelComparison:
-        """The same with a member as a part of the base: what is asked beside it then need not take it out each time."""
+        """Return the comparison with a member in the base."""
         lower, z, evidence = self._eliminated((member,))
         across = self._across((member,), lower, np.arange(len(self._gram)))
         return ModelComparison(self._gram - across.T @ across, self._towards - across.T @ z, self._columns, evidence)
@@ -299,7 +291,7 @@ class ModelComparison:
     def _across(
         self, members: Sequence[Member], lower: NDArray[np.float64], places: NDArray[np.int64]
     ) -> NDArray[np.float64]:
-        """What the Cholesky factor of members makes of their products with columns at these places, shape (p, q)."""
+        """Return the members' factor applied to columns, shape (p, q)."""
         if not members:
             return np.zeros((0, len(places)))
         taken, sd = _stacked(members)
@@ -311,16 +303,16 @@ class ModelComparison:
         return columns if self._columns is None else np.searchsorted(self._columns, columns)
 
     def log_evidence(self, members: Sequence[Member]) -> float:
-        """Log marginal likelihood of base and members over that of the base alone."""
+        """Return members' log marginal likelihood over the base."""
         return self._eliminated(members)[2]
 
     def explained(self, members: Sequence[Member]) -> float:
-        """Reduction of chi-square by members, less what their sizes cost."""
+        """Return the chi-square reduction less the cost of sizes."""
         _, z, _ = self._eliminated(members)
         return float(z @ z)
 
     def values(self, members: Sequence[Member]) -> NDArray[np.float64]:
-        """Posterior means of the amplitudes and the slack of members, in the order of their columns, shape (p,)."""
+        """Return posterior means of amplitudes and slack, shape (p,)."""
         lower, z, _ = self._eliminated(members)
         _, sd = _stacked(members)
         return np.asarray(sd * _solved(lower, z, transposed=True), dtype=np.float64)
@@ -335,7 +327,7 @@ class ModelComparison:
         return Estimates(sd * values, sd[:, None] * inverse * sd)
 
     def beside(self, members: Sequence[Member], columns: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Products of columns among each other, base and members projected out under their priors, shape (p, p)."""
+        """Return products of columns beside base and members, shape (p, p)."""
         columns = self._at(columns)
         own = self._gram[np.ix_(columns, columns)]
         if not members:
@@ -345,7 +337,7 @@ class ModelComparison:
         return np.asarray(own - across.T @ across, dtype=np.float64)
 
     def log_evidence_of_pairs(self, members: Sequence[Member], more: Sequence[Member]) -> dict[tuple[int, int], float]:
-        """Log marginal likelihood of members with every pair of further ones, without the slack of these."""
+        """Return members' log marginal likelihood with every pair, pairs without slack."""
         lower, z, evidence = self._eliminated(members)
         columns = self._at(np.concatenate([np.zeros(0, dtype=np.int64), *(m.variant.columns for m in more)]))
         sd = np.concatenate([np.zeros(0), *(m.variant.plausible * m.scale for m in more)])
@@ -373,7 +365,7 @@ class ModelComparison:
         return found
 
     def scan(self, members: Sequence[Member], causes: Iterable[Cause]) -> Scan:
-        """Every cause beside members, each in all its variants and sizes."""
+        """Scan every cause beside members, over variants and sizes."""
         forms = self._forms_of(tuple(causes))
         needed = forms.needed
         lower, z, _ = self._eliminated(members)
@@ -386,17 +378,17 @@ class ModelComparison:
         return _scanned(forms, towards, left)
 
     def around(self, members: Sequence[Member], causes: Iterable[Cause]) -> Around:
-        """Every cause beside members but for any few of them, for one elimination of all of them."""
+        """Return every cause beside members but any few, by one elimination."""
         forms = self._forms_of(tuple(causes))
         lower, z, evidence = self._eliminated(members)
         across = self._across(members, lower, forms.needed)
         return Around(tuple(members), forms, lower, z, evidence, across, self._towards[forms.needed])
 
     def each_beside_others(self, members: Sequence[Member]) -> list[tuple[Member, float, float]]:
-        """Every member beside all the others, in its own variant, without slack, at all sizes; one inversion serves all.
+        """Scan each member beside the others, in its variant, without slack, at all sizes.
 
-        With A the information of all amplitudes and priors, the inverse of a block of A's inverse is what that block has
-        beside all others [Schur complement; Horn and Johnson, Matrix Analysis, 2nd ed., sec. 0.7.3].
+        A block's inverse in A's inverse is what it has beside others [Schur complement; Horn and Johnson, Matrix
+        Analysis, 2nd ed., sec. 0.7.3].
 
         Returns:
             Per member: it with the size that suits it best; its log Bayes factor averaged over sizes, with the weight of its
@@ -423,7 +415,7 @@ class ModelComparison:
         return found
 
     def _information(self, columns: NDArray[np.int64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Information of amplitudes in units of their priors, that of the priors with it, shape (p, p)."""
+        """Return the information with priors, in prior units, shape (p, p)."""
         own = self._at(columns)
         information = self._gram[np.ix_(own, own)]
         information *= sd[:, None]
@@ -432,7 +424,7 @@ class ModelComparison:
         return information
 
     def _forms_of(self, causes: tuple[Cause, ...]) -> _Forms:
-        """Forms of causes as `scan` takes them; those of each cause are kept, which a search scans again and again."""
+        """Return causes' forms for `scan`, cached."""
         each = []
         for cause in causes:
             one = self._of_causes.get(cause.name)
@@ -450,7 +442,7 @@ class ModelComparison:
         return self._forms[name]
 
     def _eliminated(self, members: Sequence[Member]) -> _Eliminated:
-        """Cholesky factor of the members' information, what it makes of the target, and their log evidence."""
+        """Return the members' Cholesky factor, transformed target and log evidence."""
         if not members:
             return np.zeros((0, 0)), np.zeros(0), self._evidence
         # A search scans beside a set of members and asks for the evidence of the same set right after it.
@@ -466,11 +458,11 @@ class ModelComparison:
 
 
 def _scanned(forms: _Forms, towards: NDArray[np.float64], left: Sequence[NDArray[np.float64]]) -> Scan:
-    """All forms of causes at all sizes.
+    """Scan all forms at all sizes.
 
     Args:
-        towards: what their columns say of the target beside a hypothesis, shape (q,).
-        left: products of the columns of each form beside it, for each group of forms, shape (m, p, p).
+        towards: shape (q,).
+        left: products beside a hypothesis, by group, shape (m, p, p).
     """
     factors = np.empty((len(forms.weights), len(SCALES)))
     for (numbers, own, plausible, _), products in zip(forms.groups, left, strict=True):
@@ -488,17 +480,16 @@ def _scanned(forms: _Forms, towards: NDArray[np.float64], left: Sequence[NDArray
 
 
 class Around:
-    """Causes beside a hypothesis but for a few of its members.
+    """Causes beside a hypothesis without some members.
 
-    With A the information of all members, P its inverse and C their products with the columns of a cause, what the members but for some,
-    with the columns k, take of that cause is C^T P C - R^T (P_kk)^-1 R with R the rows k of P C [Schur complement; Horn and Johnson, Matrix
-    Analysis, 2nd ed., sec. 0.7.3].
+    With A the members' information, P its inverse and C products with a cause, members without columns k absorb C^T P C -
+    R^T (P_kk)^-1 R, R the rows k of P C [Schur complement; Horn and Johnson, Matrix Analysis, 2nd ed., sec. 0.7.3].
 
     Args:
-        lower: Cholesky factor of the members' information.
-        z: what it makes of the target.
-        across: what it makes of the products of members and causes, shape (p, q).
-        towards: products of the causes' columns with the target, shape (q,).
+        lower: Cholesky factor.
+        z: transformed target.
+        across: transformed products, shape (p, q).
+        towards: shape (q,).
     """
 
     def __init__(
@@ -527,7 +518,7 @@ class Around:
         self._places = {m.cause.name: np.arange(a, b) for m, a, b in zip(members, ends[:-1], ends[1:], strict=True)}
 
     def without(self, names: Collection[str]) -> tuple[Scan, float]:
-        """Every cause beside the members but for these, in their order, and the log evidence of those members."""
+        """Return causes beside members without these, and those members' log evidence."""
         if not names:
             return self._of_absent(_scanned(self._forms, self._towards, self._left), names), self._evidence
         own = np.concatenate([self._places[m.cause.name] for m in self.members if m.cause.name in names])
@@ -542,13 +533,13 @@ class Around:
         return self._of_absent(scan, names), evidence
 
     def _of_absent(self, scan: Scan, names: Collection[str]) -> Scan:
-        """What was found of causes that are none of the members that are left."""
+        """Return the scan without remaining members."""
         there = {m.cause.name for m in self.members} - set(names)
         return scan.of([k for k, cause in enumerate(scan.causes) if cause.name not in there])
 
 
 def _solved(lower: NDArray[np.float64], right: NDArray[np.float64], *, transposed: bool = False) -> NDArray[np.float64]:
-    """Solution of a lower triangle, or of its transposed, without the checks that take longer than a small one."""
+    """Return a triangular solution without slow checks."""
     if not len(lower):
         return right
     found, info = dtrtrs(np.asarray(lower, order="C").T, right, lower=0, trans=0 if transposed else 1)
@@ -558,7 +549,7 @@ def _solved(lower: NDArray[np.float64], right: NDArray[np.float64], *, transpose
 
 
 def _factors(information: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cholesky factors of several, shape (k, p, p), each as `cholesky` has it."""
+    """Return several Cholesky factors, shape (k, p, p), as `cholesky`."""
     try:
         return np.asarray(np.linalg.cholesky(information), dtype=np.float64)
     except np.linalg.LinAlgError:
@@ -566,10 +557,9 @@ def _factors(information: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def cholesky(information: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cholesky factor of the information of amplitudes in units of their priors, shape (p, p).
+    """Return the Cholesky factor of information in prior units, shape (p, p).
 
-    Such information is that of the readings, never negative, and one from the prior: no eigenvalue is below one. Products beside a base
-    are differences of much larger numbers; where their rounding leaves an eigenvalue below zero, eigenvalues below one are one.
+    All eigenvalues are at least one; rounding below is lifted to one.
     """
     try:
         return np.asarray(np.linalg.cholesky(information), dtype=np.float64)
@@ -580,7 +570,7 @@ def cholesky(information: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:
-    """Return the member with the slack that amplitudes of these values have, shape (p,)."""
+    """Return the member with the slack of these amplitudes."""
     if len(member.variant.slack) == 0:
         return member
     size = amplitude_size(member, values)
@@ -588,12 +578,12 @@ def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:
 
 
 def amplitude_size(member: Member, values: NDArray[np.float64]) -> float:
-    """Root mean square of amplitudes of a member, shape (p,), in plausible ones."""
+    """Return a member's rms amplitude, shape (p,), in plausible ones."""
     return float(np.sqrt(np.mean(np.square(values / member.variant.plausible))))
 
 
 def _log_factors(seen: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Log Bayes factors at all scales, shape (m, s), from information and squared target along axes, shape (m, p)."""
+    """Return log Bayes factors at all scales, shape (m, s), from information and squared target, shape (m, p)."""
     squares = SCALES[:, None] ** 2
     information = 1.0 + squares * seen[:, None, :]
     return np.asarray(

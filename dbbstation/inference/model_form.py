@@ -1,7 +1,6 @@
-"""What a real object may do that the formula of a cause does not say: its effect, modulated along what it depends on.
+"""Formula inaccuracy: the effect modulated along its variable.
 
-The effect as fitted times a few smooth functions of its variable stands for all of this [Kennedy and O'Hagan, J. R. Stat.
-Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
+Smooth modulations stand for it [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
 """
 
 from __future__ import annotations
@@ -24,10 +23,7 @@ LATER = 2.0
 
 
 def bernstein(values: NDArray[np.float64], low: float, high: float, degree: int = DEGREE) -> NDArray[np.float64]:
-    """Bernstein polynomials of a degree over a range, shape (..., degree + 1); they add up to one.
-
-    [Farin, Curves and Surfaces for CAGD, 5th ed., eq 5.1]
-    """
+    """Return Bernstein polynomials over a range, shape (..., degree + 1), summing to one [Farin, Curves and Surfaces for CAGD, 5th ed., eq 5.1]."""
     share = np.clip((values - low) / max(high - low, 1e-12), 0.0, 1.0)[..., None]
     k = np.arange(degree + 1)
     return np.asarray(comb(degree, k) * share**k * (1.0 - share) ** (degree - k), dtype=np.float64)
@@ -38,12 +34,12 @@ def modulated(
     along: Sequence[NDArray[np.float64]],
     signs: Sequence[NDArray[np.float64]] | None,
 ) -> NDArray[np.float64]:
-    """Effects of m movers times smooth functions of what each follows, over all runs, shape (n, q).
+    """Return effects of m movers times smooth functions, over all runs, shape (n, q).
 
     Args:
-        effects: per run, what each mover adds to the reading, shape (n, m).
-        along: per run, the variable of each, shape (n, m).
-        signs: per run, the direction of each, where effects may differ by it, shape (n, m); None where not.
+        effects: per run, shape (n, m).
+        along: per run, shape (n, m).
+        signs: direction per run if relevant, shape (n, m); or None.
     """
     effect, values = np.vstack(effects), np.vstack(along)
     ways = [np.ones_like(effect)] if signs is None else [np.vstack(signs) > 0.0, np.vstack(signs) <= 0.0]
@@ -62,11 +58,7 @@ def modulated(
 def _other_transits(
     effects: Sequence[NDArray[np.float64]], signs: Sequence[NDArray[np.float64]], mover: int
 ) -> NDArray[np.float64]:
-    """What a quicker and a later transit after a reversal would change, shape (n, 2).
-
-    The formula says over which way an effect turns to its other side. One column turns it at once; the other one turns it
-    a little later.
-    """
+    """Return changes by faster and later transits after reversals, shape (n, 2)."""
     found = []
     for effect, sign in zip(effects, signs, strict=True):
         own, way = effect[:, mover], np.sign(sign[:, mover])

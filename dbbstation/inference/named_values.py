@@ -1,4 +1,4 @@
-"""Values of a finding by name: amplitudes and nonlinear parameters of a law or a pattern, with unit and uncertainty."""
+"""Named values of a finding with unit and uncertainty."""
 
 from __future__ import annotations
 
@@ -23,13 +23,12 @@ if TYPE_CHECKING:
 def named_values(
     settled: Settled, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
 ) -> dict[str, Value]:
-    """Amplitudes and nonlinear parameters with their uncertainty; what a formula may be off by is part of it.
+    """Return amplitudes and nonlinear parameters, slack included in uncertainty.
 
     Args:
-        settled: what a comparison came to.
-        member: of its hypothesis, or one that is laid beside it.
-        values: of its columns, shape (p,).
-        covariance: of these, shape (p, p).
+        member: of the hypothesis, or beside it.
+        values: shape (p,).
+        covariance: shape (p, p).
     """
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     width = len(member.variant.columns)
@@ -60,10 +59,10 @@ def named_values(
 
 
 def with_jackknife(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:
-    """Values with the larger of their own uncertainty and that from how they move without each part.
+    """Return values with the larger of own and jackknife uncertainty.
 
     Args:
-        found: from all rows, by name.
+        found: from all rows.
     """
     if not found:
         return {}
@@ -89,5 +88,5 @@ _NAMES = {
 
 
 def _unit(unit: str, per: str) -> str:
-    """Unit of an amplitude; one that stands by itself is no quotient of the channel's."""
+    """Return an amplitude's unit."""
     return f"{unit}{per}" if per == "" or per.startswith(("/", " per")) else per

@@ -1,4 +1,4 @@
-"""How large the noise of a channel is, and how much less its samples say where neighbours resemble each other."""
+"""A channel's noise, and the information of correlated samples."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Noise:
     """Noise of one sample.
 
     Attributes:
-        sigma: standard deviation, in the channel's unit.
-        correlation_samples: samples that count as one independent sample; 1 for white noise.
+        sigma: in the channel's unit.
+        correlation_samples: per independent sample; 1 if white.
     """
 
     sigma: float
@@ -30,18 +30,18 @@ class Noise:
 
     @property
     def effective(self) -> float:
-        """Standard deviation of white noise that would leave the same uncertainty of anything smooth."""
+        """Return the white noise of equal effect on smooth quantities."""
         return self.sigma * float(np.sqrt(self.correlation_samples))
 
 
 def noise_of(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> Noise:
-    """Noise from what a fit leaves, runs apart.
+    """Return noise from fit residuals, by run.
 
-    The correlation is the integrated autocorrelation, summed while pairs of neighbouring lags stay positive
-    [Geyer, Practical Markov Chain Monte Carlo, Statistical Science 7 (1992), sec. 3.3].
+    Integrated autocorrelation over positive pairs of lags [Geyer, Practical Markov Chain Monte Carlo, Statistical Science
+    7 (1992), sec. 3.3].
 
     Args:
-        residuals: one array per run, in time order.
+        residuals: per run, in time order.
     """
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)
@@ -57,16 +57,14 @@ def noise_of(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> N
 
 
 def noise_of_turns(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> Noise:
-    """Noise from what a fit leaves of whole turns.
+    """Return noise from residuals of whole turns.
 
-    What a model lacks is smooth along a turn: read off the autocorrelation, it would pass for noise that remembers. What a fit takes out
-    is smooth too, and noise that remembers would seem to remember less. Both leave the harmonics above the low ones alone, so that
-    the noise is read there and continued below (`dbbstation.inference.harmonics`). The residual beyond noise counts as if it were
-    white.
+    Misfit and absorption are smooth, so noise is read in higher harmonics and continued below
+    (`dbbstation.inference.harmonics`). Residual beyond noise counts as white.
 
     Args:
-        residuals: one array per turn, in time order, about equally spaced.
-        freedom_used: degrees of freedom that the fit spent, on smooth columns.
+        residuals: per turn, in time order, about equally spaced.
+        freedom_used: on smooth columns.
     """
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)

@@ -1,8 +1,7 @@
-"""Patterns: effects without physics over the variables of a channel, and how probable each kind is beforehand.
+"""Patterns: effects without physics over variables, with prior odds.
 
-Some are forms with a name that people know: linear, once and twice per turn, hysteresis, a product of two variables, drift.
-Others are any smooth curve, over all rows or by direction of travel. Waves, bumps, steps and pulses are looked for in what a
-fit leaves; see `looks`.
+Some are named forms: linear, per turn, hysteresis, product, drift; others smooth curves, also by direction. Waves, bumps,
+steps and pulses come from `looks`.
 """
 
 from __future__ import annotations
@@ -83,16 +82,15 @@ class Pattern:
     """One effect without physics.
 
     Attributes:
-        variables: that it follows; none for blocks.
-        samples: what each amplitude does, over all rows, shape (n, p), about one at the most.
-        form: of its curve, over the first variable, or over the row number where it follows none; None for a product.
-        units: what one of each amplitude is per what, shape (p,); empty texts are the channel's own unit.
-        per: by what each amplitude is to be divided for that, shape (p,).
-        label: what tells it from others of its family over the same variables.
-        tried: how many independent forms it was picked from.
-        choices: forms of which one is there, where there are several: the columns of each, its log probability, and what tells it
-            from the others.
-        acts_once: no other rows can show it, whatever it follows: a curve that each block has of its own.
+        variables: none for blocks.
+        samples: of amplitudes, all rows, shape (n, p), at most about one.
+        form: over the first variable or row number; None for a product.
+        units: of amplitudes, shape (p,); empty: the channel's.
+        per: divisors for these, shape (p,).
+        label: within its family and variables.
+        tried: independent forms of the choice.
+        choices: alternative forms: columns, log probability, label.
+        acts_once: no other rows can show it.
     """
 
     family: Family
@@ -108,7 +106,7 @@ class Pattern:
 
     @property
     def name(self) -> str:
-        """Unique name, such as `once per turn of q1`."""
+        """Return a unique name, such as `once per turn of q1`."""
         over = " and ".join(variable.name for variable in self.variables)
         text = f"{self.family}{_JOIN.get(self.family, ' over ')}{over}" if over else str(self.family)
         return f"{text}, {self.label}" if self.label else text
@@ -134,12 +132,12 @@ def patterns(
     simulated: Variable | None,
     time_unit: str = "s",
 ) -> list[Pattern]:
-    """Patterns that need no look at the residual.
+    """Return patterns without look.
 
     Args:
-        blocks: rows of each, in time order.
-        time: of the rows, shape (n,); None where their order is unknown: then nothing has a direction or a speed.
-        simulated: what the simulation says; None where it is not asked whether it is late.
+        blocks: in time order.
+        time: shape (n,); None: unordered, without direction and speed.
+        simulated: None: lateness is not tested.
     """
     usable = [v for v in variables if len(np.unique(v.values)) >= 2]  # noqa: PLR2004 - a constant has no effect
     found = [pattern for v in usable for pattern in _over(v)]
@@ -165,22 +163,22 @@ something is called sure. How much depends on it was not measured."""
 
 
 def odds_of_driven(variables: Iterable[Variable]) -> float:
-    """Log odds of a cause over variables for what it follows: less where one of them is driven."""
+    """Return log odds over variables, less for driven ones."""
     return DRIVEN_ODDS if any(variable.driven for variable in variables) else 0.0
 
 
 def log_odds(members: int, tried: float = 1.0) -> float:
-    """Log prior odds of one pattern among so many of its family, picked from so many forms."""
+    """Return log prior odds of one pattern by family size and tries."""
     return FAMILY_ODDS - float(np.log(max(members, 1) * max(tried, 1.0)))
 
 
 def turn(variable: Variable, order: int) -> Wave:
-    """Wave that closes `order` times per turn of an angle."""
+    """Return a wave closing `order` times per turn."""
     return Wave(order / (variable.period or variable.extent))
 
 
 def covers_turns(variable: Variable) -> bool:
-    """Whether it is an angle that covers enough of a turn to show a wave of one turn."""
+    """Return whether an angle covers enough of a turn."""
     return variable.period is not None and variable.extent >= WAVE_SHARE * variable.period
 
 
@@ -200,7 +198,7 @@ def _over(variable: Variable) -> list[Pattern]:
 
 
 def _by_direction(variable: Variable, blocks: Sequence[slice]) -> list[Pattern]:
-    """Patterns that change sign with the direction of travel; none where it goes one way only."""
+    """Return patterns odd in direction of travel."""
     sign = variable.directions(blocks)
     if not (sign > 0.0).any() or not (sign < 0.0).any():
         return []
@@ -212,7 +210,7 @@ def _by_direction(variable: Variable, blocks: Sequence[slice]) -> list[Pattern]:
 
 
 def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: NDArray[np.float64]) -> Pattern:
-    """Plus one way and minus the other way; it turns at once, or over a way after each reversal, as play does."""
+    """Return hysteresis, immediate or over a way as play."""
     widths = [share * variable.extent for share in TRANSITS]
     # A row at which it turns may belong to either way: as it came there, or as it goes on.
     arriving = variable.arriving(blocks)
@@ -235,9 +233,7 @@ TRANSITS = (0.003, 0.01, 0.03, 0.1)
 
 
 def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> NDArray[np.float64]:
-    """Where a thing is within a play, from -1 to 1, as it is pushed to and fro, shape (n,).
-
-    [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]
+    """Return the place within a play, -1 to 1, shape (n,) [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]; each block begins in the middle.
 
     Args:
         blocks: rows of each; each begins in the middle.
@@ -260,7 +256,7 @@ def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> 
 def _speed(
     variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], unit: str, family: Family = Family.SPEED
 ) -> Pattern:
-    """In proportion to how fast it changes; of the simulated value less that, times the delay, is what a lag does."""
+    """Return the rate's pattern; delay times simulated speed is a lag."""
     rate = variable.rates(time, blocks)
     size = float(np.abs(rate).max(initial=0.0)) or 1.0
     if family is Family.LAG:
@@ -269,9 +265,9 @@ def _speed(
 
 
 def _product(one: Variable, other: Variable) -> Pattern:
-    """Product of two variables; of angles, products of their cosines and sines: waves of their sum and difference.
+    """Return two variables' product, for angles products of waves.
 
-    Where a variable has its zero nobody knows: beside the product about the middle of both there is a form with both of them.
+    Since zeros are unknown, a form with both variables is added.
     """
     a, b = (
         turn(v, 1).columns(v.values) if covers_turns(v) else Power(v.low, v.high).columns(v.values)

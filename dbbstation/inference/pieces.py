@@ -1,7 +1,4 @@
-"""Sums over narrow pieces of a variable: any curve over it then costs as much as it has pieces.
-
-What a curve would explain beside a base and causes is still exact but for the width of a piece.
-"""
+"""Sums over narrow pieces of a variable, which make curves cheap; exact within a piece."""
 
 from __future__ import annotations
 
@@ -27,13 +24,13 @@ take 26 µs; 400 take 30 µs. Of 6,000 rows with 40 before each 400 take 104 µs
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """What a fit leaves of rows, and what it can do, in units of noise; all of it whitened.
+    """A whitened residual with the fit's directions, in noise.
 
     Attributes:
-        rest: what it leaves, shape (n,).
-        axes: orthonormal directions of what was fitted, less what priors take of them, shape (n, k).
-        whitening: that made it white, shape (n, n); None where it was.
-        known: what `beside` is, where that is known, shape (n, k).
+        rest: shape (n,).
+        axes: orthonormal fitted directions, less priors, shape (n, k).
+        whitening: shape (n, n), or None.
+        known: `beside` if known, shape (n, k).
     """
 
     rest: NDArray[np.float64]
@@ -52,24 +49,23 @@ class Left:
         coloured: Coloured,
         whitening: csr_array | None,
     ) -> Left:
-        """What whitened columns with Gaussian amplitudes leave of a whitened target.
+        """Return the residual of a whitened target beside Gaussian columns.
 
         Args:
             target: shape (n,).
             columns: shape (n, k).
-            sd: standard deviations of their amplitudes, infinite where nothing is known, shape (k,).
-            whitening: that made it white.
+            sd: prior, infinite if unknown, shape (k,).
         """
         return Fitting.of(columns, sd, coloured, whitening).left(target)
 
     @cached_property
     def towards(self) -> NDArray[np.float64]:
-        """What products with columns that are not whitened give their products with `rest`, shape (n,)."""
+        """Return `rest` transposed-whitened, for unwhitened columns, shape (n,)."""
         return self.transposed(self.rest)
 
     @cached_property
     def beside(self) -> NDArray[np.float64]:
-        """What products with columns that are not whitened give their products with `axes`, shape (n, k)."""
+        """Return `axes` transposed-whitened, for unwhitened columns, shape (n, k)."""
         return self.transposed(self.axes) if self.known is None else self.known
 
     def whitened(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -77,10 +73,10 @@ class Left:
         return rows if self.whitening is None else np.asarray(self.whitening @ rows)
 
     def whitened_part(self, rows: NDArray[np.float64], here: slice, there: slice) -> NDArray[np.float64]:
-        """What rows that are zero but in one place become in another place once their noise is made white.
+        """Return a whitened place of rows that are zero elsewhere.
 
         Args:
-            rows: in that place, shape (b, p).
+            rows: shape (b, p).
         """
         if self.whitening is None:
             return rows
@@ -99,17 +95,17 @@ class Left:
         return np.add.reduceat(taps[:, None] * rows[np.where(inside, column, 0)], ends[:-1] - ends[0], axis=0)
 
     def transposed(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transpose of whitening, applied to whitened rows."""
+        """Return transposed whitening of rows."""
         return rows if self.whitening is None else np.asarray(self.whitening.T @ rows)
 
 
 @dataclass(frozen=True, eq=False)
 class Fitting:
-    """Whitened columns with Gaussian amplitudes, made orthonormal; further ones may stand beside them.
+    """Whitened Gaussian columns made orthonormal; extensible.
 
     Attributes:
-        axes: orthonormal, of rows and of one more row for every amplitude with a prior, shape (n + b, k).
-        whitening: that made it white; None where it was.
+        axes: of rows and one row per prior, shape (n + b, k).
+        whitening: or None.
     """
 
     axes: NDArray[np.float64]
@@ -121,12 +117,12 @@ class Fitting:
     def of(
         cls, columns: NDArray[np.float64], sd: NDArray[np.float64], coloured: Coloured, whitening: csr_array | None
     ) -> Fitting:
-        """Columns by themselves; arguments as of `Left.of`."""
+        """Return columns alone; arguments as of `Left.of`."""
         none = np.zeros((len(columns), 0))
         return cls(none, len(columns), coloured, whitening).beside(columns, sd)
 
     def beside(self, columns: NDArray[np.float64], sd: NDArray[np.float64]) -> Fitting:
-        """These with more columns, shape (n, k), whose amplitudes have standard deviations, infinite where nothing is known."""
+        """Return these with further columns, shape (n, k), priors infinite if unknown."""
         noise = self.coloured.innovation
         bounded = np.flatnonzero(np.isfinite(sd))
         size = np.where(np.isfinite(sd), sd, noise / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
@@ -137,29 +133,27 @@ class Fitting:
         return replace(self, axes=np.hstack([old, np.linalg.qr(new)[0]]))
 
     def without_axes(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Columns in units of noise, shape (n, k), less what these can do of them, shape (n + b, k)."""
+        """Return columns in noise, shape (n, k), less these, shape (n + b, k)."""
         new = np.vstack([columns, np.zeros((len(self.axes) - self.rows, columns.shape[1]))])
         for _ in range(2 if self.axes.shape[1] else 0):  # twice is enough [Giraud et al., Numer. Math. 101 (2005) 87]
             new = new - self.axes @ (self.axes.T @ new)
         return new
 
     def left(self, target: NDArray[np.float64]) -> Left:
-        """What these leave of a whitened target, shape (n,)."""
+        """Return the residual of a whitened target, shape (n,)."""
         noise, axes = self.coloured.innovation, self.axes[: self.rows]
         weighted = target / noise
         return Left(weighted - axes @ (axes.T @ weighted), axes, noise, self.coloured, self.whitening)
 
 
 class LeftBesideOthers:
-    """What a fitting and some columns with priors, but for one of these, leave of a target; columns may change from one to the next.
-
-    What does not change is worked out once: the fitting, and each column beside it.
+    """A fit's residual beside columns but one; repeated parts are cached.
 
     Args:
         fitting: of everything else.
-        sd: standard deviation of the amplitude of each column, shape (k,).
+        sd: of each amplitude, shape (k,).
         target: whitened, shape (n,).
-        whitened: makes the noise of columns white.
+        whitened: function.
     """
 
     def __init__(
@@ -178,10 +172,7 @@ class LeftBesideOthers:
         self._products = np.eye(len(sd))
 
     def __call__(self, but_for: int, own: NDArray[np.float64]) -> Left:
-        """Beside all columns, shape (n, k), not whitened, but one.
-
-        Priors make the products of the columns, in units of these, one and more: their Cholesky factor makes axes of them.
-        """
+        """Return the residual beside unwhitened columns, shape (n, k), but one."""
         changed = np.arange(own.shape[1])
         if len(self._own):
             changed = np.flatnonzero((own != self._own).any(axis=0))
@@ -206,14 +197,14 @@ class LeftBesideOthers:
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """Sums of rows over the pieces of one variable.
+    """Row sums over pieces of a variable.
 
     Attributes:
-        at: mean of the variable in each piece, shape (b,).
-        place: number of each piece, counted from the least value on, shape (b,).
+        at: piece means, shape (b,).
+        place: piece numbers from the least value, shape (b,).
         squares: gain times gain, shape (b,).
-        rest: gain times what a fit leaves, shape (b,).
-        axes: gain times what it can do, shape (b, k).
+        rest: gain times residual, shape (b,).
+        axes: gain times axes, shape (b, k).
     """
 
     at: NDArray[np.float64]
@@ -227,7 +218,7 @@ class Sums:
     def over(
         cls, left: Left, values: NDArray[np.float64], pieces: int, gain: NDArray[np.float64] | None = None
     ) -> Sums:
-        """Add up over so many equal pieces of a variable, shape (n,), where each row answers with a gain, shape (n,)."""
+        """Sum over equal pieces of a variable, shape (n,), with row gains, shape (n,)."""
         low, high = float(values.min()), float(values.max())
         place = np.minimum(((values - low) / max(high - low, 1e-300) * pieces).astype(np.int64), pieces - 1)
         own, number, count = np.unique(place, return_inverse=True, return_counts=True)
@@ -246,11 +237,11 @@ class Sums:
         return cls(at, own, width, squares, added(one * left.towards), added(beside))
 
     def explained(self, curves: NDArray[np.float64], size: float) -> NDArray[np.float64]:
-        """Sum of squares that curves explain, less what their sizes cost, shape (m,).
+        """Return squares explained by curves less their cost, shape (m,).
 
         Args:
-            curves: at the pieces, shape (b, m, p).
-            size: standard deviation of their amplitudes, in units of noise.
+            curves: shape (b, m, p).
+            size: amplitude standard deviation, in noise.
         """
         pieces, many, count = curves.shape
         flat = curves.reshape(pieces, many * count)
@@ -262,12 +253,10 @@ class Sums:
         return np.asarray(np.einsum("mp,mp->m", rest, np.linalg.solve(normal, rest[:, :, None])[:, :, 0]))
 
     def explained_by_waves(self, most: float, size: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Frequencies of waves, half a period over the range apart, and the sum of squares that each explains, shape (m,).
-
-        By Fourier transformation of the sums, as if every piece lay in its middle.
+        """Return wave frequencies, half a period apart, and explained squares, shape (m,), by Fourier transform.
 
         Args:
-            size: standard deviation of amplitudes, in units of noise.
+            size: amplitude standard deviation, in noise.
         """
         length = 2 * (int(self.place[-1]) + 1)
         last = min(int(2.0 * most), length // 4)
@@ -290,12 +279,12 @@ class Sums:
 
 
 def _sides(transform: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Sums with cosine and with sine, shape (m, 2, ...)."""
+    """Return cosine and sine sums, shape (m, 2, ...)."""
     return np.stack([transform.real, -transform.imag], axis=1)
 
 
 def peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
-    """Places that explain more than their neighbours, best first."""
+    """Return local maxima, best first."""
     padded = np.concatenate([[-np.inf], explained, [-np.inf]])
     found = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
     return np.asarray(found[np.argsort(-explained[found])][:most])

@@ -1,8 +1,7 @@
-"""Columns of causes beside a base that is fitted anew with every combination of them.
+"""Causes' columns beside a refitted base.
 
-The base's columns are made orthonormal once; then, for each level of noise, what lies along them is made orthonormal again
-with one more row for each prior. What causes have of them is taken out by projection, which does not square the condition
-number of the base.
+Base columns are orthonormalised once, then per noise level with a row per prior. Projection does not square the base's
+condition.
 """
 
 from __future__ import annotations
@@ -37,18 +36,17 @@ FEW = 0.5
 
 
 class CauseColumns:
-    """Columns of causes over all samples of a channel, beside those of a base; they may become more.
+    """Causes' columns over all samples, extensible.
 
     Args:
-        base: columns of the base, shape (n, k).
-        whitened: makes columns as they are taken in, shape (m, q), those over the samples, shape (n, q); the same if None. It is
-            asked for a column when that is wanted first.
-        room: columns for which room is made at first; more need a copy of all. Room that stays empty takes no memory.
+        base: shape (n, k).
+        whitened: from columns, shape (m, q), to samples, shape (n, q), on demand; None: identity.
+        room: initial columns without copying.
 
     Attributes:
-        numbers: of the columns that products are known of, where these are not all.
-        axes: orthonormal, of all that the base can do, shape (n, k).
-        on_axes: columns of the base along these, shape (k, k).
+        numbers: columns with known products, if not all.
+        axes: of the base, shape (n, k).
+        on_axes: base along these, shape (k, k).
     """
 
     def __init__(
@@ -72,7 +70,7 @@ class CauseColumns:
 
     @property
     def samples(self) -> NDArray[np.float64]:
-        """All columns, shape (n, p)."""
+        """Return all columns, shape (n, p)."""
         if self._waiting:
             self._make_room(self.count)
         while self._waiting:
@@ -83,7 +81,7 @@ class CauseColumns:
         return self._buffer[:, : self.count]
 
     def copy(self) -> CauseColumns:
-        """One that more columns may be added to by itself; those that are there are shared."""
+        """Return an independently extensible copy with shared columns."""
         other: CauseColumns = copy(self)
         other._waiting = list(self._waiting)
         self._free, other._free, other._changed = [], [], list(self._changed)
@@ -92,7 +90,7 @@ class CauseColumns:
         return other
 
     def of(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Some columns, shape (n, q): without making the others where these are few."""
+        """Return some columns, shape (n, q)."""
         if not self._waiting or len(columns) > FEW * self.count:
             return self.samples[:, columns]
         found = np.empty((len(self._buffer), len(columns)), order="F")
@@ -108,7 +106,7 @@ class CauseColumns:
 
     @property
     def gram(self) -> NDArray[np.float64]:
-        """Products of all columns, shape (p, p)."""
+        """Return all products, shape (p, p)."""
         known = len(self._products)
         if known < self.count:
             # Many columns at once take a fraction of the time that they take one after the other.
@@ -121,7 +119,7 @@ class CauseColumns:
         return self._products
 
     def _renew(self) -> None:
-        """Work products and share of the axes out again for columns that took the place of others."""
+        """Recompute products of replaced columns."""
         changed, self._changed = np.array(self._changed, dtype=np.int64), []
         for known, products in ((len(self._products), True), (self._along.shape[1], False)):
             own = changed[changed < known]
@@ -136,7 +134,7 @@ class CauseColumns:
 
     @property
     def along(self) -> NDArray[np.float64]:
-        """What the columns have of the axes of the base, shape (k, p)."""
+        """Return columns along base axes, shape (k, p)."""
         known = self._along.shape[1]
         if known < self.count:
             self._along = np.hstack([self._along, self.axes.T @ self.samples[:, known:]])
@@ -144,7 +142,7 @@ class CauseColumns:
         return self._along
 
     def add(self, columns: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Take in columns, shape (m, q), and return their numbers; they take the places of those that were given back first."""
+        """Add columns, shape (m, q), in freed places first, and return their numbers."""
         taken = np.array(self._free[: columns.shape[1]], dtype=np.int64)
         if len(taken):
             self._free = self._free[len(taken) :]
@@ -163,7 +161,7 @@ class CauseColumns:
         return np.concatenate([taken, np.arange(first, last)])
 
     def give_back(self, columns: NDArray[np.int64]) -> None:
-        """Let columns that nobody asks for any more, shape (q,), be replaced by those that are taken in next."""
+        """Free columns, shape (q,)."""
         if self._whitened is None and not self._shared:
             self._free = sorted({*self._free, *columns.tolist()})
 
@@ -177,39 +175,39 @@ class CauseColumns:
         self._buffer, self._shared = wider, False
 
     def towards(self, target: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Products with a target, shape (n,), of the columns, shape (p,), and of the axes, shape (k,)."""
+        """Return products with a target, shape (n,), of columns, shape (p,), and axes, shape (k,)."""
         return self.samples.T @ target, self.axes.T @ target
 
     def part(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> RowProducts:
-        """What some rows, shape (n,), say of the columns, or of some of them, shape (q,), rising."""
+        """Return what rows, shape (n,), say of all or some columns, shape (q,)."""
         own = np.arange(self.count) if only is None else only
         axes, columns = self.axes[rows], self.samples.T[np.ix_(own, np.flatnonzero(rows))]
         return RowProducts(rows, only, axes.T @ axes, (columns @ axes).T, columns @ columns.T)
 
     def but_for(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> CauseColumns:
-        """The same causes as all other rows show them, the columns themselves shared; targets must be zero in these rows.
+        """Return the causes without some rows, where targets must be zero.
 
         Args:
-            rows: that are held back, shape (n,).
-            only: columns that are asked for, rising, shape (q,); all if None.
+            rows: shape (n,).
+            only: rising, shape (q,); None: all.
         """
         return self.without(self.part(rows, only))
 
     def without(self, part: RowProducts) -> CauseColumns:
-        """The same but for the rows of a part, as `but_for` has it."""
+        """Return the causes without a part, as `but_for`."""
         return _Without(self, part)
 
 
 @dataclass(frozen=True, eq=False)
 class RowProducts:
-    """Products over some rows of a channel, which are taken from those over all of them.
+    """Products over some rows, for subtraction.
 
     Attributes:
-        rows: which, shape (n,).
-        numbers: of the columns, shape (q,); None where these are all.
-        of_axes: of the axes among each other, shape (k, k).
-        across: of the axes with the columns, shape (k, q).
-        of_columns: of the columns among each other, shape (q, q).
+        rows: shape (n,).
+        numbers: shape (q,); None: all.
+        of_axes: shape (k, k).
+        across: axes with columns, shape (k, q).
+        of_columns: shape (q, q).
     """
 
     rows: NDArray[np.bool_]
@@ -219,7 +217,7 @@ class RowProducts:
     of_columns: NDArray[np.float64]
 
     def __add__(self, other: RowProducts) -> RowProducts:
-        """Both parts together; they have no row in common."""
+        """Return disjoint parts together."""
         return RowProducts(
             self.rows | other.rows,
             self.numbers,
@@ -230,11 +228,7 @@ class RowProducts:
 
 
 class _Without(CauseColumns):
-    """All rows of a channel but those of a part.
-
-    The axes, orthonormal over all rows, are made so over the rows that are left: few products of what is held back tell how. What needs
-    them row by row is worked out where it is asked for.
-    """
+    """All rows but a part; axes are renewed from few products."""
 
     def __init__(self, whole: CauseColumns, part: RowProducts) -> None:
         self._whole, self._rows, self.numbers, self.count = whole, part.rows, part.numbers, whole.count
@@ -277,11 +271,9 @@ class BesideBase:
     """Causes beside a base.
 
     Args:
-        known: priors and scales of the base.
-        held: orthonormal rows of fitted directions that the base fit kept at zero, in units of the scales. They have their usual
-            size here: where they are seen at all, as the curvature of a model lets them be beside very little noise, that is no
-            sign of a cause.
-        noise: standard deviation of one sample.
+        held: orthonormal directions kept at zero in the base fit, in scales; here of usual size, so that visible curvature is no
+            cause.
+        noise: of a sample.
     """
 
     def __init__(self, causes: CauseColumns, known: Columns, held: NDArray[np.float64], noise: float) -> None:
@@ -306,7 +298,7 @@ class BesideBase:
 
         Args:
             target: shape (n,).
-            only: columns that are asked for, rising; all if None.
+            only: rising; None: all.
         """
         causes = self._causes
         if only is None:
@@ -324,11 +316,11 @@ class BesideBase:
         return ModelComparison(gram, towards / self._noise**2, causes.numbers if only is None else only)
 
     def left(self, targets: NDArray[np.float64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What base and causes together leave of targets, shape (n, m).
+        """Return the residual of base and causes, shape (n, m).
 
         Args:
             targets: shape (n, m).
-            sd: prior standard deviations of all columns, shape (p,); zero for a column that does not take part.
+            sd: prior of all columns, shape (p,); zero: not used.
         """
         causes, axes = self._causes, self._causes.axes
         used = np.flatnonzero(sd > 0.0)

@@ -1,4 +1,4 @@
-"""How many events stretches of time are: those of one size count once, and more than a few are no events."""
+"""Counting events in time: equal sizes count once, and many are none."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ONE_SIZE = 0.999
 
 
 def too_many(sizes: Sequence[Value]) -> str:
-    """Why stretches of time of such sizes are no events; empty where they may be."""
+    """Return why so many sizes are no events, or an empty text."""
     distinct = distinct_sizes(sizes)
     if distinct <= MOST_PUSHES:
         return ""
@@ -33,12 +33,12 @@ def too_many(sizes: Sequence[Value]) -> str:
 
 
 def within_a_step(sizes: Sequence[Value], step: float) -> str:
-    """Why stretches of time of such sizes may be what was rounded off; empty where one is beyond a step.
+    """Return why sizes may be rounding, or an empty text.
 
-    What rounding does to a value that changes slowly has the same sign in many rows, and may be a half of a step either way.
+    Rounding of slow values keeps its sign over many rows, up to half a step.
 
     Args:
-        step: that measured values are multiples of; zero where there is none.
+        step: zero if none.
     """
     if any(abs(one.value) - step >= OUT * one.uncertainty for one in sizes):
         return ""
@@ -46,12 +46,12 @@ def within_a_step(sizes: Sequence[Value], step: float) -> str:
 
 
 def distinct_sizes(sizes: Sequence[Value]) -> int:
-    """How many sizes stretches of time have, those of one size counted once: what happens again happens as strongly."""
+    """Return the number of distinct sizes."""
     return len(sizes) - max(len(most_of_one_size(sizes)) - 1, 0)
 
 
 def most_of_one_size(sizes: Sequence[Value]) -> list[int]:
-    """Numbers of the most stretches of time that can be of one size together, by chi-square about their weighted mean, rising."""
+    """Return the largest group of equal sizes by chi-square, rising."""
     order = sorted(range(len(sizes)), key=lambda k: sizes[k].value)
     best: range = range(0)
     for first in range(len(order)):
@@ -67,7 +67,7 @@ def _is_one(sizes: Sequence[Value]) -> bool:
 
 
 def pooled(sizes: Sequence[Value]) -> Value:
-    """Weighted mean of sizes, with the larger of the uncertainties from theirs and from their scatter [ISO 13528; Birge 1932]."""
+    """Return the weighted mean with the larger of stated and scatter uncertainty [ISO 13528; Birge 1932]."""
     values, sigmas = (np.array([getattr(one, name) for one in sizes]) for name in ("value", "uncertainty"))
     weights = 1.0 / np.square(sigmas)
     mean = float(weights @ values / weights.sum())

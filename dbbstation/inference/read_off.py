@@ -1,4 +1,4 @@
-"""Findings of a channel, read off the probabilities of sets of causes: verdict, size with uncertainty, place, equivalents."""
+"""Findings from probabilities of sets: verdict, size, place, equivalents."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class Span:
     """Where an effect is.
 
     Attributes:
-        low: from here on [unit].
-        high: up to here [unit].
+        low: [unit].
+        high: [unit].
     """
 
     variable: str
@@ -59,27 +59,25 @@ class Span:
 
 @dataclass(frozen=True)
 class CauseFinding:
-    """What is said of one cause.
+    """Finding on one cause.
 
     Attributes:
-        family: kind of effect; None for a law.
-        label: which of its forms, such as which strut; empty where it has one.
-        rms: of its effect, that the base cannot take up, root mean square over rows where it is there; in the unit of the
-            residual.
-        sigmas: norm of that effect over its standard deviation.
-        confounded: share of that which the base parameters can take up, R².
-        values: amplitudes and nonlinear parameters, by name.
-        spans: of variables, where it is at least half as large as at its largest.
-        rows_there: number of rows where it is so; 0 where that is not asked.
-        rows: first and last row of each stretch of time, where it is one in time; empty otherwise.
-        blocks: root mean square of it in each block.
-        equivalent: causes that nothing measured here tells from it, itself first; empty where there are none.
-        ambiguous_with: causes of which one is there for sure, if not this one.
-        text: why, in a sentence; empty where the verdict says it all.
-        acts: whether other rows can show it again.
-        gains: in held-out parts; None where these were not asked for.
-        persists: a step in time, or a law that acts once, that held-out parts tell of, too.
-        recurs: a wave over the time that predicts held-out parts, found anew without each of them.
+        family: None for a law.
+        label: form, such as a strut; may be empty.
+        rms: beyond the base, over its rows; in the residual's unit.
+        sigmas: norm over standard deviation.
+        confounded: R² on base parameters.
+        spans: variables' ranges of at least half size.
+        rows_there: number; 0 if not asked.
+        rows: first and last of each stretch; may be empty.
+        blocks: rms in each.
+        equivalent: indistinguishable causes, itself first; may be empty.
+        ambiguous_with: one is present if not this.
+        text: reason; may be empty.
+        acts: whether other rows can show it.
+        gains: held-out; None if not tested.
+        persists: a single event that held-out parts confirm.
+        recurs: a wave over time, found anew without each predicted part.
     """
 
     name: str
@@ -109,12 +107,12 @@ class CauseFinding:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What parts of the rows say of the findings from all of them.
+    """Evidence of parts on findings.
 
     Attributes:
-        held_out: predictions of each part, everything chosen anew without it; None where these were not asked for.
-        refits: values of base and members without each part [`refits_without`]; none: uncertainties are the model's.
-        is_worse_here: whether what was found leaves more of the rows themselves than the reference does; asked without held-out parts.
+        held_out: predictions, chosen anew; None if not tested.
+        refits: [`refits_without`]; none: model uncertainties.
+        is_worse_here: worse than the reference on the rows themselves, without held-out parts.
     """
 
     held_out: HeldOutError | ChosenAnew | None = None
@@ -123,16 +121,15 @@ class Trial:
 
     @property
     def is_worse(self) -> bool:
-        """Whether what was found predicts worse than the reference."""
+        """Return whether the findings predict worse than the reference."""
         return self.is_worse_here if self.held_out is None else self.held_out.is_worse
 
 
 def read_off(settled: Settled, trial: Trial | None = None) -> tuple[CauseFinding, ...]:
-    """One finding per law and per pattern, those that are there first, largest first.
+    """Return a finding per law and pattern, present ones first, by size.
 
     Args:
-        settled: what the comparison came to.
-        trial: what parts of the rows say; None: the client judges what is sure itself [`claim`], which is called identified here.
+        trial: None: the client judges [`claim`]; sure ones are identified here.
     """
     judge = _Judge(settled, trial)
     found = [judge.finding(cause) for cause in settled.causes]
@@ -169,7 +166,7 @@ class _Judge:
         self._beside = {c.name: (float(g), m) for c, g, m in zip(scan.causes, scan.log_factor, scan.best, strict=True)}
 
     def refused(self, name: str, why: str) -> CauseFinding:
-        """Finding of a law that would have to be what it cannot be."""
+        """Return the finding of an impossible law."""
         blocks = (0.0,) * len(self._settled.channel.blocks)
         return CauseFinding(
             name, Verdict.RULED_OUT, None, "", (), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {}, (), (), blocks, text=why
@@ -231,13 +228,13 @@ class _Judge:
         )
 
     def _gains(self, name: str) -> Gains | None:
-        """What a member and its class brought in held-out parts."""
+        """Return held-out gains of a member and its class."""
         if self._trial is None or self._trial.held_out is None:
             return None
         return self._trial.held_out.gains_of({self._settled.bank.kind_of(one) for one in self._pooled(name)})
 
     def _acts(self, name: str) -> Acts:
-        """Whether other rows can show an effect again: not what follows the time alone, nor offsets and curves of single runs."""
+        """Return whether other rows can show it: not time, offsets or curves of single runs."""
         pattern, law = self._settled.bank.patterns.get(name), self._settled.bank.laws.get(name)
         if pattern is None:
             return Acts.ONCE if law is not None and law.acts_once else Acts.ALWAYS
@@ -246,14 +243,14 @@ class _Judge:
         return Acts.ONCE if once else Acts.ALWAYS
 
     def _is_a_step(self, rows: tuple[tuple[int, int], ...]) -> bool:
-        """Whether stretches of rows are a single one that a block begins or ends with, but for fewer rows than a stretch has."""
+        """Return whether stretches form one that begins or ends a block."""
         if len(rows) != 1:
             return False
         (first, last), blocks = rows[0], self._settled.channel.blocks
         return any(0 <= first - b.start < SHORTEST or 0 <= b.stop - 1 - last < SHORTEST for b in blocks)
 
     def _named(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> dict[str, Value]:
-        """Amplitudes and nonlinear parameters, with the larger of the model's uncertainty and that of a jackknife over parts."""
+        """Return parameters with the larger of model and jackknife uncertainty."""
         found = named_values(self._settled, member, values, covariance)
         own = self._own.get(member.cause.name)
         if own is None or self._trial is None or not self._trial.refits:
@@ -264,10 +261,9 @@ class _Judge:
         return with_jackknife(found, [named_values(self._settled, member, *part) for part in parts])
 
     def _pooled(self, name: str) -> tuple[str, ...]:
-        """A cause and its class, and what would be the same to its user.
+        """Return a cause, its class and what is equal to its user.
 
-        Of stretches of time that are other choices of stretches, which begin or end elsewhere; of what is in proportion to a variable,
-        the same with a delay too short to be seen.
+        Other choices of stretches or undetectably short delays count as equal.
         """
         equal = self._classes.get(name, (name,))
         kind = self._kinds.get(name)
@@ -312,7 +308,7 @@ class _Judge:
         return self._absent(cause, probability)
 
     def _unless_late(self, name: str) -> str:
-        """That these rows do not tell whether something linear comes late, where they do not."""
+        """Return that lateness of a linear effect is undecided, if so."""
         late = [
             n for n in self._pooled(name) if n not in self._classes.get(name, (name,)) and self._kinds[n][0] in LATE
         ]
@@ -321,7 +317,7 @@ class _Judge:
         return "These rows do not tell whether it comes late."
 
     def _certain(self, name: str, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
-        """Verdict of what is there for sure beside the most probable noise."""
+        """Return the verdict of a sure cause."""
         if probability < SURE:
             return Verdict.AMBIGUOUS, (), "Noise whose neighbours resemble each other explains it as well."
         if sigmas < OUT:
@@ -345,7 +341,7 @@ class _Judge:
 
     @cached_property
     def _refuted(self) -> bool:
-        """Whether something that acts always is a member and predicts no held-out parts."""
+        """Return whether a permanent member fails to predict held-out parts."""
         every = [self._gains(name) for name in self._members if self._acts(name) is Acts.ALWAYS]
         return any(gains is not None and not gains.predicts for gains in every)
 
@@ -355,7 +351,7 @@ class _Judge:
 
     @cached_property
     def _pushes(self) -> dict[str, list[Value]]:
-        """Sizes of all stretches of time, by member."""
+        """Return sizes of stretches by member."""
         unit, found = self._settled.channel.unit, {}
         for name in self._in_time:
             values, covariance = self._values[name]
@@ -364,7 +360,7 @@ class _Judge:
         return found
 
     def _impossible_in_place(self, cause: Cause) -> str:
-        """Why a law cannot stand in the place of what nothing measured tells from it; empty where it can."""
+        """Return why a law cannot replace its equivalent; may be empty."""
         law = self._settled.bank.laws.get(cause.name)
         if law is None or not any(law.positive):
             return ""
@@ -389,7 +385,7 @@ class _Judge:
         return Verdict.RULED_OUT, (), "It would have been seen at its plausible size and was not needed."
 
     def _seen(self, cause: Cause, others: tuple[Member, ...], *, base: bool = True) -> float:
-        """Standard deviations by which its plausible size stands out, in the middle of its directions."""
+        """Return the median standing of its plausible size, in standard deviations."""
         variant = max(cause.variants, key=lambda v: len(v.columns))
         if base:
             products = self._settled.comparison.beside(others, variant.columns)
@@ -399,11 +395,11 @@ class _Judge:
         return float(np.median(standing_out(products, variant.plausible)))
 
     def _sigmas(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
-        """By how many standard deviations the norm of an effect beside the base is out."""
+        """Return an effect's norm beside the base in standard deviations."""
         return norm_over_sigma(self._settled.comparison.beside((), member.columns), values, covariance)
 
     def _concealed(self, effect: NDArray[np.float64]) -> tuple[float, float, float]:
-        """Root mean square of an effect about its mean, that of what the base leaves of it, and the share that this takes up."""
+        """Return an effect's rms, its rms beyond the base, and the absorbed share."""
         kept = effect[self._settled.channel.kept]
         whole = _rms(kept - kept.mean())
         fitted = self._settled.bank.base_values(-effect) - self._without
@@ -413,7 +409,7 @@ class _Judge:
 
 
 def _at_half(effect: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Rows where an effect, about its median, is at least half as large as anywhere."""
+    """Return rows at half of the largest effect, about its median."""
     away = np.abs(effect - np.median(effect))
     return np.asarray(away >= HALF * away.max())
 

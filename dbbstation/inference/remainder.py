@@ -1,8 +1,7 @@
-"""What a model leaves, tested against noise in more ways than by its sum of squares: where it is, and how large.
+"""Where and how a residual differs from noise: harmonic, run, pulse.
 
-A sum of squares over all low harmonics of all runs hides a single fine wave, one bad run, or a pulse of a few samples.
-Each of these is asked for by itself. The probability of the largest of many is that of one, times their number
-[Bonferroni; Miller, Simultaneous Statistical Inference, 2nd ed., sec. 1.3].
+A global sum of squares hides single features. Probabilities are multiplied by the number of looks [Bonferroni; Miller,
+Simultaneous Statistical Inference, 2nd ed., sec. 1.3].
 """
 
 from __future__ import annotations
@@ -25,12 +24,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Largest:
-    """The largest of many things that a model leaves.
+    """The largest of many features.
 
     Attributes:
-        probability: that noise alone has one as large among all of them.
-        place: number of it: of the harmonic, or of the run, counted from 0.
-        rms: of it, beyond noise, in the unit of the channel.
+        probability: by noise among all.
+        place: harmonic, or run from 0.
+        rms: beyond noise, in the channel's unit.
     """
 
     probability: float
@@ -43,8 +42,8 @@ class Remainder:
     """What a model leaves, by its harmonics, by its runs and by its samples.
 
     Attributes:
-        run: the one that stands out most over all low harmonics.
-        pulse: run with the stretch that stands out most, one of `PULSES` of a turn.
+        run: worst over low harmonics.
+        pulse: run with the worst stretch, one of `PULSES` per turn.
     """
 
     harmonic: Largest
@@ -54,7 +53,7 @@ class Remainder:
 
     @property
     def probability(self) -> float:
-        """That noise alone leaves as much in any of these ways."""
+        """Return the probability by noise of any feature."""
         return min(1.0, 3.0 * min(one.probability for one in (self.harmonic, self.run, self.pulse)))
 
 
@@ -68,11 +67,11 @@ def remainder(
     groups: Sequence[object],
     noise: Spectrum,
 ) -> Remainder:
-    """Look for the harmonic, the run and the stretch that stand out most.
+    """Find the worst harmonic, run and stretch.
 
     Args:
-        residuals: what the model leaves of whole periods, one per run.
-        groups: what each run shares its first harmonic with; a common shift there counts as nothing.
+        residuals: one period per run.
+        groups: sharing the first harmonic.
         noise: measured elsewhere.
     """
     low, _ = bands(min(len(residual) for residual in residuals))
@@ -106,7 +105,7 @@ def remainder(
 
 
 def _largest(squares: Sequence[tuple[float, int]], freedom: float) -> tuple[int, float]:
-    """Number of the sum of squares that is least probable by chance, and that probability."""
+    """Return the least probable sum's number and probability."""
     chances = [float(f_distribution.sf(square / count, count, freedom)) for square, count in squares]
     at = int(np.argmin(chances))
     return at, chances[at]
@@ -115,7 +114,7 @@ def _largest(squares: Sequence[tuple[float, int]], freedom: float) -> tuple[int,
 def _stretches(
     residual: NDArray[np.float64], phase_rad: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], int]:
-    """Means and numbers of samples of narrow stretches of a turn, and the stretch that stands out most."""
+    """Return means and counts of narrow stretches, and the worst."""
     place = np.floor(np.mod(phase_rad, 2.0 * np.pi) / (2.0 * np.pi) * PULSES).astype(np.int64) % PULSES
     counts = np.bincount(place, minlength=PULSES)
     means = np.bincount(place, residual, minlength=PULSES) / np.maximum(counts, 1)

@@ -1,4 +1,4 @@
-"""What stands out of what base and members leave: the looks of a comparison, and edges in time at their best places."""
+"""Outstanding features beside base and members."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MOVED = (*IN_TIME, *PLACED)
 
 
 def seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Pattern]:
-    """Patterns that stand out of what base and members leave."""
+    """Return patterns that stand out."""
     channel = bank.channel
     left = _left(bank, *_fitted(bank, members))
     size = channel.size / left.noise
@@ -43,7 +43,7 @@ def seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Patter
 
 
 def _fitted(bank: Bank, members: Sequence[Member]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Whitened columns of base and members, and the standard deviations of their amplitudes, shape (m, k) and (k,)."""
+    """Return whitened columns of base and members, and prior standard deviations, shape (m, k) and (k,)."""
     known, held = bank.channel.known, bank.channel.held
     fixed, random = np.flatnonzero(~known.random), np.flatnonzero(known.random)
     base = bank.base
@@ -60,7 +60,7 @@ def _left(bank: Bank, columns: NDArray[np.float64], sd: NDArray[np.float64]) -> 
 
 
 def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) -> tuple[Member, ...]:
-    """Members with the places and ends of what was looked for where they explain most beside the others, in the noise there is."""
+    """Return members with re-optimised places in present noise."""
     channel = bank.channel
     members = list(members)
     for number, member in enumerate(members):
@@ -96,7 +96,7 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
 
 
 def _in_time(left: Left, channel: Channel, size: float) -> list[Pattern]:
-    """Stretches of time that stand out of what a fit leaves, and those in which it turns with the direction of travel."""
+    """Return outstanding stretches in time, also odd in direction."""
     by = None
     if channel.time is not None and channel.direction is not None:
         by = (Variable("time", channel.time_unit, Kind.TIME, channel.time), channel.direction)

@@ -1,4 +1,4 @@
-"""How often the same causes are chosen from other parts of the measurement."""
+"""How often causes are chosen from subsets."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def selection_frequency(
     begin: Sequence[Member] = (),
     most_members: int | None = None,
 ) -> dict[str, float]:
-    """Share of draws in which each cause belongs to the most probable hypothesis.
+    """Return each cause's share of selections.
 
-    Every draw keeps seven tenths of the groups, without putting any back: a group counted twice would share its
-    random effects and look surer than it is. [Meinshausen and Bühlmann, J. R. Stat. Soc. B 72 (2010) 417, sec. 2, draw
-    halves for the same purpose]
+    Each draw keeps seven tenths of groups without replacement, lest repeated groups look certain [Meinshausen and
+    Bühlmann, J. R. Stat. Soc. B 72 (2010) 417, sec. 2, draw halves]. `blocks` have base, then causes' columns; `groups`
+    are kept together, such as a test; `held` directions stay zero; `noise` is a measurement's.
 
     Args:
         blocks: compressed runs: columns of the base, then those of the causes, numbered as the causes have them.
@@ -79,7 +79,7 @@ def selection_frequency(
 
 
 def renumbered(causes: Sequence[Cause]) -> tuple[NDArray[np.int64], list[Cause]]:
-    """Columns that causes have, rising, and the same causes with these numbered from zero on."""
+    """Return causes' columns, rising, and the causes renumbered."""
     every = [part for c in causes for v in c.variants for part in (v.columns, v.slack, v.whole)]
     wanted = np.unique(np.concatenate(every))
 

@@ -1,4 +1,4 @@
-"""Which set of laws and patterns explains a channel: compare, scan the residual, lay out anew, until nothing changes."""
+"""The set of laws and patterns that explains a channel: compare, look, refine, repeat."""
 
 from __future__ import annotations
 
@@ -58,22 +58,19 @@ def settle(
     rivals: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
-    """Compare sets of laws and patterns on a channel.
+    """Compare sets of laws and patterns.
 
-    The noise is part of what is compared. It is measured beside one of several beginnings, then on what the best hypothesis of that
-    beginning leaves, until neither changes. The most probable outcome is returned, noise included, with the others in it.
+    Noise is part of the comparison: measured from several beginnings, then on the best hypothesis, until stable. The most
+    probable outcome is returned with the others.
 
     Args:
-        look: look for waves, bumps, steps, and pulses in time that nobody named.
-        static: compare with the patterns that need no look, too.
-        most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
-        most_looks: scans of the residual, one beside what the other brought, at the most.
-        in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
-        thorough: begin from several places, and look once more beside what a search ends at; False: begin with nothing and search
-            once, where a selection is repeated many times and may be somewhat worse.
-        rivals: let noise of any colour compete; False: it is of first order, measured beside everything, and nothing competes
-            with it.
-        progress: called with what is being done.
+        look: search waves, bumps, steps and pulses.
+        static: include patterns without look.
+        most_expanded: hypotheses expanded per search.
+        most_looks: successive residual looks.
+        in_time: search steps and pulses in time; False if blocks have own curves.
+        thorough: several starts and a final look; False: one fast search.
+        rivals: noise of any colour competes; False: first order beside everything.
     """
     options = _Options(
         look=look,
@@ -106,7 +103,7 @@ def settle(
 
 
 def _may_have_long_tails(laid_out: Bank, found: Sequence[Settled]) -> bool:
-    """Whether what is new in a row has long tails beside what was found, or beside nothing: what was found may be such rows."""
+    """Return whether innovations have long tails beside the findings or nothing."""
     if any(one.bank.may_have_long_tails(one.best.members) for one in found):
         return True
     bank = laid_out.copy()
@@ -128,7 +125,7 @@ def _from(
     progress: Callable[[str], None],
     known: Sequence[Settled],
 ) -> Settled:
-    """What the comparison comes to from members whose noise is measured beside them; one that is known where it meets that."""
+    """Return the outcome of one start, or a known one if met."""
     bank.measures_beside_members, bank.long_tails = True, beginning in LONG_TAILS
     settled = _settled(bank, options, progress, members, refused, known)
     if any(settled is one for one in known):
@@ -137,12 +134,12 @@ def _from(
 
 
 def _known_as(settled: Settled, known: Sequence[Settled]) -> Settled:
-    """What another beginning came to where that is met; else the same."""
+    """Return another beginning's outcome if met."""
     return next((one for one in known if _meets(settled, one)), settled)
 
 
 def _meets(one: Settled, other: Settled) -> bool:
-    """Whether a comparison goes on as another did: causes of the same kind do the same, so that the noise beside them is the same."""
+    """Return whether two comparisons have equal causes and noise."""
     kinds = [sorted(each.bank.kind_of(name) for name in each.best.names) for each in (one, other)]
     if kinds[0] != kinds[1] or one.bank.long_tails != other.bank.long_tails:
         return False
@@ -161,7 +158,7 @@ class _Options:
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
-    """Patterns of a channel that need no look; the same whatever rows are held back."""
+    """Return patterns without look, independent of held-back rows."""
     return tuple(patterns(channel.variables, channel.blocks, channel.time, channel.simulated, channel.time_unit))
 
 
@@ -181,13 +178,12 @@ def _settled(
     impossible: Mapping[str, str] | None = None,
     known: Sequence[Settled] = (),
 ) -> Settled:
-    """Look, compare, lay out anew, until nothing changes.
+    """Look, compare and refine until stable.
 
     Args:
-        bank: of columns; they become more.
-        progress: called with what is being done.
-        impossible: laws that cannot be what they would have to be, and why.
-        known: what other beginnings came to; where one is met, it is returned.
+        bank: grows.
+        impossible: refused laws with reasons.
+        known: other outcomes, returned if met.
     """
     channel, look = bank.channel, options.look
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
@@ -242,14 +238,14 @@ def _settled(
 
 
 def _placed(bank: Bank, members: tuple[Member, ...]) -> tuple[Member, ...]:
-    """Members with what was looked for moved to better places, found in less noise than before; none where none is better."""
+    """Return members at better places in less noise, or none."""
     named = {member.cause.name for member in members} & bank.looked_for
     better = places_anew(bank, members, {name for name in named if bank.patterns[name].family in MOVED})
     return better if [one.cause.name for one in better] != [one.cause.name for one in members] else ()
 
 
 def _would_be_the_same(compared: Settled, bank: Bank, best: Sequence[Member], refused: Mapping[str, str]) -> bool:
-    """Whether a search would compare what it compared before: nothing more stood out, and the noise is as it was."""
+    """Return whether a search would repeat the last."""
     there = {cause.name: cause.variants for cause in bank.but_for(refused)}
     before = {cause.name: cause.variants for cause in compared.causes}
     same = {member.cause.name for member in best} == compared.best.names and there == before
@@ -265,11 +261,7 @@ def _looked(
     *,
     in_time: bool = True,
 ) -> tuple[Member, ...]:
-    """Scan the residual, take in what is worth it, and look again beside that, until nothing more stands out.
-
-    Args:
-        progress: called with what is being done.
-    """
+    """Look repeatedly, adding worthy patterns."""
     before = log_probability(bank, members)
     for number in range(most_looks):
         known = set(bank.patterns)
@@ -302,7 +294,7 @@ def _looked_about(
     *,
     first: bool,
 ) -> tuple[tuple[Member, ...], list[tuple[Member, ...]]]:
-    """Members with what stands out beside them; the first time, other places for a search to start from, too."""
+    """Return members with outstanding features, first with further starts."""
     starts: list[tuple[Member, ...]] = []
     if first and options.in_time and options.thorough:
         # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
@@ -316,7 +308,7 @@ def _looked_about(
 
 
 def log_probability(bank: Bank, members: Sequence[Member]) -> float:
-    """Of the noise that there is and members together, but for what is the same for all of a channel."""
+    """Return the log probability of noise and members, up to a constant."""
     odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
     own = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
     evidence = bank.beside().comparison(bank.target, np.unique(own)).log_evidence(members)
@@ -324,12 +316,10 @@ def log_probability(bank: Bank, members: Sequence[Member]) -> float:
 
 
 def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[Member] = ()) -> tuple[Member, ...]:
-    """Causes taken in one after the other, the one that is worth most beside the others first; a start for a search.
-
-    What the others make up for in the end is left out again.
+    """Return greedily grown causes, pruned at the end.
 
     Args:
-        start: members to begin with; those of causes that are no longer there are left out.
+        start: initial members; missing ones are skipped.
     """
     there = {cause.name: cause for cause in causes}
     members = [
@@ -362,7 +352,7 @@ def _grown_in(bank: Bank) -> tuple[Member, ...]:
 
 
 def _laws_of(settled: Settled) -> list[Member]:
-    """Laws of the best hypothesis, and those that do best in the place of each member."""
+    """Return the best hypothesis's laws and best replacements."""
     best, laws = settled.best, settled.bank.laws
     found = [m for m in best.members if m.cause.name in laws]
     rivals = [cause for cause in settled.causes if cause.name in laws]
@@ -397,10 +387,7 @@ def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Membe
 
 
 def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], member: Member) -> tuple[float, ...]:
-    """Where a law of one nonlinear parameter explains most, between the neighbours of the point of its grid where it stands.
-
-    Tangents lead no further than to where an effect bends: a variable that jumps, late by a time, bends at each row.
-    """
+    """Return a one-parameter law's best place between grid neighbours, beyond bends that limit tangents."""
     law, target = bank.laws[member.cause.name], bank.target
     if others:
         columns = np.concatenate([one.columns for one in others])
@@ -433,11 +420,11 @@ of `tests/inference/test_memory.py` are within 3 u of the truth as well."""
 
 
 def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.0) -> tuple[float, ...]:
-    """Nonlinear parameters of a law, moved along their tangents by the values of a member, within their grids.
+    """Return nonlinear parameters moved along tangents within grids.
 
     Args:
-        values: of its columns, shape (p,).
-        per: what a step of one along a tangent counts: `growth` where tangents were made for another form or hypothesis.
+        values: shape (p,).
+        per: `growth` for tangents of another form.
     """
     nonlinear = list(member.variant.nonlinear)
     if len(member.variant.slack):
@@ -448,7 +435,7 @@ def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.
 
 
 def growth(member: Member, values: NDArray[np.float64]) -> float:
-    """Amplitudes of a member over those that its tangents were made for; a tangent times this is what a step of one does."""
+    """Return a member's amplitudes over those of its tangents."""
     if not len(member.variant.slack):
         return 1.0
     size = amplitude_size(member, values[: len(member.variant.columns)])
@@ -460,7 +447,7 @@ STEPS = 3
 
 
 def _negative(settled: Settled) -> dict[str, str]:
-    """Laws of the best hypothesis whose values are negative beyond their uncertainty though they cannot be."""
+    """Return significantly negative laws that cannot be."""
     members = settled.best.members
     if not members:
         return {}

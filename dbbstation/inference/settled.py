@@ -1,4 +1,4 @@
-"""What a comparison came to: the most probable hypothesis, the noise beside it, and what other beginnings of the noise came to."""
+"""The outcome of a comparison with noise and other beginnings."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ MOST_EXPANDED = 8
 
 
 class Beginning(Enum):
-    """What the noise is measured beside at first.
+    """What noise is first measured beside.
 
-    Beside everything that a channel has, noise that wanders looks like curves. Beside nothing, what is smooth looks like noise.
-    With long tails from the start, pulses look like outliers. So each is tried, and the most probable outcome is taken.
+    Beside everything, wandering noise looks like curves; beside nothing, smooth effects look like noise; with long tails,
+    pulses look like outliers. All are tried.
     """
 
     EVERYTHING = "everything"
@@ -43,13 +43,10 @@ class Settled:
     """What the comparison came to.
 
     Attributes:
-        bank: columns and causes.
-        noise: of one row, from what everything together leaves.
-        posterior: over sets of causes.
-        refused: laws that would have to be what they cannot be, and why.
-        beginning: what the noise was measured beside at first.
-        log_probability: of the noise and the best hypothesis together, but for what is the same for all of a channel.
-        others: what other beginnings came to, most probable first.
+        noise: of a row.
+        refused: impossible laws with reasons.
+        log_probability: of noise and best hypothesis, up to a constant.
+        others: most probable first.
     """
 
     channel: Channel
@@ -69,7 +66,7 @@ class Settled:
         return self.posterior.best
 
     def effect(self, names: Sequence[str] | None = None) -> NDArray[np.float64]:
-        """What members of the best hypothesis do, over all rows, in the unit of the residual, shape (n,)."""
+        """Return best members' effect over all rows, in the residual's unit, shape (n,)."""
         total = np.zeros(len(self.channel.residual))
         values = self.comparison.estimates(self.best.members).values if self.best.members else np.zeros(0)
         for member in self.best.members:
@@ -79,19 +76,19 @@ class Settled:
         return total
 
     def base_values(self, effect: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-        """Values of the base columns beside an effect, that of all members if None, shape (k,)."""
+        """Return base values beside an effect; None: of all members, shape (k,)."""
         return self.bank.base_values(self.effect() if effect is None else effect)
 
     def predicted(self) -> NDArray[np.float64]:
-        """What base and members say of the residual, over all rows, shape (n,)."""
+        """Return base and members over all rows, shape (n,)."""
         effect = self.effect()
         return np.asarray(effect + self.channel.base.samples @ self.base_values(effect), dtype=np.float64)
 
     def averaged(self, probability: float, names: Collection[str]) -> float:
-        """Probability of causes over all beginnings of the noise.
+        """Return causes' probability over all beginnings.
 
         Args:
-            names: of them; of effects that were looked for, others of the same family over the same variables count as the same.
+            names: picked effects of one family and variables count alike.
         """
         if not self.others:
             return probability
@@ -105,5 +102,5 @@ class Settled:
         return float(weights @ np.array(every) / weights.sum())
 
     def second_start(self) -> Hypothesis:
-        """The most probable hypothesis that a search comes to that begins with nothing."""
+        """Return the best hypothesis of a search from nothing."""
         return search(self.comparison, self.causes, (), MOST_EXPANDED).best

@@ -1,10 +1,7 @@
-"""Linear least squares with random effects, in square-root form.
+"""Linear least squares with random effects in square-root form.
 
-A channel of measurements is target = J x + noise, cut into blocks (runs) that each touch few of the columns
-of x. Every block is compressed to a small triangle by orthogonal transformation, which loses nothing of what it
-says about x and never squares the condition number; all further work is on the triangles. Columns with a
-stated standard deviation are random effects: their prior is one more row. [Bierman, Factorization Methods for
-Discrete Sequential Estimation, 1977, ch. II and V]
+target = J x + noise in blocks of few columns. Orthogonal compression to triangles keeps information and condition. Stated
+priors are further rows. [Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, ch. II and V]
 """
 
 from __future__ import annotations
@@ -32,13 +29,13 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Spreads:
-    """A covariance as what groups of random effects have alone, and what they share with the fitted columns.
+    """A covariance as shared and own parts of random effects.
 
     Attributes:
-        shared: a root of the shared part, shape (k, q).
-        own: columns of each group, shape (j,), and a root of what it has alone, shape (j, j).
-        alone: columns that nothing was said of, shape (a,).
-        prior: their standard deviations, shape (a,).
+        shared: root, shape (k, q).
+        own: columns, shape (j,), and root, shape (j, j), per group.
+        alone: untouched columns, shape (a,).
+        prior: of these, shape (a,).
     """
 
     shared: NDArray[np.float64]
@@ -48,7 +45,7 @@ class Spreads:
 
     @cached_property
     def variance(self) -> NDArray[np.float64]:
-        """Of each column, shape (k,)."""
+        """Return each column's variance, shape (k,)."""
         variance = np.einsum("kq,kq->k", self.shared, self.shared)
         variance[self.alone] = self.prior**2
         for columns, root in self.own:
@@ -57,7 +54,7 @@ class Spreads:
 
     @cached_property
     def covariance(self) -> NDArray[np.float64]:
-        """Of all columns, shape (k, k)."""
+        """Return the covariance, shape (k, k)."""
         covariance: NDArray[np.float64] = self.shared @ self.shared.T
         covariance[self.alone, self.alone] = self.prior**2
         for columns, root in self.own:
@@ -65,7 +62,7 @@ class Spreads:
         return covariance
 
     def times(self, factor: NDArray[np.float64]) -> Spreads:
-        """The same with each standard deviation so many times as large, shape (k,); correlations stay."""
+        """Return standard deviations scaled by factors, shape (k,)."""
         return Spreads(
             factor[:, None] * self.shared,
             tuple((columns, factor[columns, None] * root) for columns, root in self.own),
@@ -74,7 +71,7 @@ class Spreads:
         )
 
     def square_of(self, columns: NDArray[np.int64], rows: NDArray[np.float64]) -> float:
-        """Trace of rows over some of the columns, shape (r, j), times their covariance times the rows."""
+        """Return the trace of rows, shape (r, j), times covariance times rows."""
         square = float(np.sum((rows @ self.shared[columns]) ** 2))
         for group, root in self.own:
             _, place, within = np.intersect1d(columns, group, assume_unique=True, return_indices=True)
@@ -85,10 +82,10 @@ class Spreads:
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """Directions of the fitted columns, in units of their scales, from best seen to worst.
+    """Directions of fitted columns in scales, best seen first.
 
     Attributes:
-        singular: information along each, one over its standard deviation, shape (f,).
+        singular: one over standard deviation, shape (f,).
         vectors: orthonormal rows, shape (f, f).
     """
 
@@ -101,12 +98,12 @@ class Solution:
     """Result of `solve`.
 
     Attributes:
-        x: all columns, shape (k,).
-        directions: what the measurement sees of the fitted columns, the random ones averaged over.
-        held: orthonormal rows of directions, in units of the scales, that were held at zero, shape (h, f).
-        chi2: weighted sum of squares that remains, priors included.
-        stated_chi2: the part of it that comes from what is stated: priors, and blocks with a noise of their own.
-        freedom_used: degrees of freedom that the fit spent on measurements of the channel's own noise.
+        x: shape (k,).
+        directions: of fitted columns, random ones averaged.
+        held: rows held at zero, in scales, shape (h, f).
+        chi2: weighted residual squares with priors.
+        stated_chi2: part of priors and blocks with own noise.
+        freedom_used: on measurements of the channel's noise.
     """
 
     x: NDArray[np.float64]
@@ -119,12 +116,12 @@ class Solution:
 
     @property
     def variance(self) -> NDArray[np.float64]:
-        """Of each column, shape (k,): the diagonal of the covariance, without the work of the rest."""
+        """Return variances, shape (k,), without the full covariance."""
         return self.spreads.variance
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Of all columns, shape (k, k); zero along directions that were held."""
+        """Return the covariance, shape (k, k), zero along held directions."""
         return self.spreads.covariance
 
 
@@ -134,13 +131,11 @@ def solve(
     noise: float,
     held: NDArray[np.float64] | None = None,
 ) -> Solution:
-    """Best linear unbiased estimate of the fitted columns and best prediction of the random ones.
+    """Return best estimates of fitted and predictions of random columns.
 
     Args:
-        blocks: compressed runs.
-        known: priors and scales.
-        noise: standard deviation of one measurement, where a block does not state its own.
-        held: orthonormal rows of fitted directions, in units of the scales, to keep at zero, shape (h, f).
+        noise: unless a block states its own.
+        held: rows kept at zero, in scales, shape (h, f).
     """
     arrow = arrow_of(blocks, known, noise)
     random, fitted = arrow.random, arrow.fitted
@@ -199,13 +194,12 @@ def chi2_without(
     held: NDArray[np.float64],
     parts: Sequence[Sequence[int]],
 ) -> list[float]:
-    """Weighted sum of squares that a fit without the blocks of a part leaves, priors included, for each part.
+    """Return chi-square without each part's blocks, priors included.
 
     Args:
-        blocks: compressed runs.
-        noise: standard deviation of one measurement, where a block does not state its own.
-        held: orthonormal rows of fitted directions, in units of the scales, to keep at zero, shape (h, f).
-        parts: places of the blocks that are left out.
+        noise: unless a block states its own.
+        held: rows kept at zero, in scales, shape (h, f).
+        parts: omitted blocks.
     """
     towards = known.scale[~known.random][:, None] * complement(held).T
     found = []
@@ -217,7 +211,7 @@ def chi2_without(
 
 
 def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> NDArray[np.float64]:
-    """Orthonormal rows of fitted directions, in units of the scales, that the blocks leave uncertain by more than 1."""
+    """Return orthonormal directions, in scales, more uncertain than 1."""
     arrow = arrow_of(blocks, known, noise)
     directions = directions_of(arrow.root_of_fitted * known.scale[arrow.fitted])
     return directions.vectors[directions.singular < 1.0 - ROUNDING]
@@ -226,16 +220,15 @@ def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> ND
 def unseen_combinations(
     blocks: Sequence[Block], known: Columns, noise: float, held: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Combinations of the columns that the blocks cannot determine, each as large as its scales, shape (h, k).
+    """Return combinations that blocks cannot determine, at scale size, shape (h, k).
 
-    A direction that is lost where a problem is linearised first is not quite the one that is lost at the solution. Here it is
-    what the other columns do, by least squares, where a held direction moves. The combinations are orthonormal in units of the
-    scales, so that each is one standard deviation of a prior as wide as the scales. Random effects are zero in them.
+    A direction lost at the first linearisation differs at the solution: here other columns follow by least squares.
+    Combinations are orthonormal in scales, with zero random effects.
 
     Args:
-        blocks: compressed runs, linearised at the solution.
-        noise: standard deviation of one measurement, where a block does not state its own.
-        held: orthonormal rows of fitted directions that were kept at zero, in units of the scales, shape (h, f).
+        blocks: linearised at the solution.
+        noise: unless a block states its own.
+        held: rows kept at zero, in scales, shape (h, f).
     """
     combinations = np.zeros((len(held), len(known.prior)))
     if len(held):
@@ -249,7 +242,7 @@ def unseen_combinations(
 
 
 def directions_of(seen: NDArray[np.float64]) -> Directions:
-    """Singular directions of a scaled information root, shape (r, f), best seen first."""
+    """Return directions of a scaled information root, shape (r, f), best seen first."""
     _, singular, vectors = np.linalg.svd(seen, full_matrices=True)
     padded = np.zeros(seen.shape[1])
     padded[: len(singular)] = singular
@@ -257,7 +250,7 @@ def directions_of(seen: NDArray[np.float64]) -> Directions:
 
 
 def complement(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Orthonormal rows of everything orthogonal to orthonormal rows."""
+    """Return the orthonormal complement."""
     if len(rows) == 0:
         return np.eye(rows.shape[1])
     _, _, vt = np.linalg.svd(rows, full_matrices=True)
@@ -265,7 +258,7 @@ def complement(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def free_directions(base: Columns, fitted: NDArray[np.int64], held: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Fitted columns in units of their scales, along the directions that are not held, shape (f, free)."""
+    """Return fitted columns along free directions, in scales, shape (f, free)."""
     if len(held) == 0:
         return np.diag(base.scale[fitted])
     return base.scale[fitted][:, None] * complement(held).T

@@ -1,7 +1,6 @@
-"""Steps, pulses and other transients in time: stretches of rows over which all of a residual is higher or lower.
+"""Steps and pulses in time: stretches with a shifted residual.
 
-All stretches of many lengths are tried at every place of every block; the best is taken in, and the look goes on beside it.
-Nobody says when something began or how long it took. A stretch that goes on to the end of its block is a step.
+All lengths and places are tried; the best is added, and the look repeats. A stretch to a block's end is a step.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ SHORTEST = 3
 
 @dataclass(frozen=True)
 class _Window:
-    """Rows of a stretch, first and one behind the last, and the log Bayes factor of one value there."""
+    """First row, one behind the last, and log Bayes factor."""
 
     first: int
     last: int
@@ -55,15 +54,15 @@ def stretches(
     clock: Clock | None = None,
     by: tuple[Variable, NDArray[np.float64]] | None = None,
 ) -> list[Pattern]:
-    """Stretches of rows that stand out, as patterns of one, two and more of them; none where none does.
+    """Return outstanding stretches as patterns of one, two and more.
 
     Args:
-        left: what a fit leaves of the rows that were kept.
-        blocks: rows of each block, in time order.
-        kept: which rows were fitted, shape (n,).
-        size: of an effect, one standard deviation, in units of noise.
-        clock: of all rows; they follow each other without a gap and show a step at once if None.
-        by: time, and the direction of travel of all rows, shape (n,), where effects are looked for that turn with it, too.
+        left: of kept rows.
+        blocks: in time order.
+        kept: shape (n,).
+        size: one standard deviation, in noise.
+        clock: None: gapless with immediate steps.
+        by: time, and direction, shape (n,), for odd effects.
     """
     clock = Clock.plain(len(kept)) if clock is None else clock
     kinds: list[tuple[Family, tuple[Variable, ...], NDArray[np.float64]]] = [(Family.PULSES, (), np.ones(len(kept)))]
@@ -98,11 +97,11 @@ def refined(
     clock: Clock | None = None,
     direction: NDArray[np.float64] | None = None,
 ) -> Pattern:
-    """The first stretches of a pattern with their ends where they explain most beside everything else, one after the other.
+    """Return a pattern's first stretches with re-optimised ends.
 
     Args:
-        lefts: the residual beside everything but one of them, given its number and the columns of all, shape (n, count).
-        direction: of travel, shape (n,), where the pattern turns with it.
+        lefts: residual without one, by number and all columns, shape (n, count).
+        direction: shape (n,), if odd in it.
     """
     clock = Clock.plain(len(kept)) if clock is None else clock
     factor = np.ones(len(kept)) if direction is None else direction
@@ -147,7 +146,7 @@ def _pattern(
     factor: NDArray[np.float64],
     tried: float,
 ) -> Pattern:
-    """Stretches of one kind: one, two and more of them, the best first."""
+    """Return stretches of one kind: one, two and more, best first."""
     form = Stretches(tuple(a for a, _ in found), tuple(b for _, b in found), clock.response)
     width = len(found)
     # A pattern of k stretches is one of tried**k / k! [k places, in whatever order].
@@ -177,7 +176,7 @@ def _label(found: Sequence[tuple[float, float]]) -> str:
 
 
 class _Look:
-    """Sums over windows of rows: first over pieces, then every row of the best one's ends by itself."""
+    """Sums over windows: by pieces, then rows at the best ends."""
 
     def __init__(
         self,
@@ -204,7 +203,7 @@ class _Look:
         self.tried = max(float(len(self._windows)) / INDEPENDENT, 1.0)
 
     def _all_windows(self) -> NDArray[np.int64]:
-        """First row of each window and the one behind its last, shape (w, 2)."""
+        """Return each window's first row and one behind its last, shape (w, 2)."""
         per = max(1, int(np.ceil(len(self._rows) / PIECES)))
         found = [np.zeros((0, 2), dtype=np.int64)]
         for first, last in self._blocks:
@@ -223,7 +222,7 @@ class _Look:
         return np.column_stack([starts, ends])[ends - starts < len(self._rows)]
 
     def _information(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Sums of squares of whitened windows beside what was fitted."""
+        """Return whitened windows' squares beside the fit."""
         own, along = self._whole[ends] - self._whole[starts] + self._edges[ends - starts], self._along_axes.columns
         for many in range(0, len(starts), AT_ONCE):
             rows = slice(many, many + AT_ONCE)
@@ -231,7 +230,7 @@ class _Look:
         return np.asarray(own)
 
     def best(self) -> _Window | None:
-        """The window that stands out most, its ends moved to where it stands out more."""
+        """Return the best window, ends refined."""
         if not len(self._windows):
             return None
         along = self._total[self._windows[:, 1]] - self._total[self._windows[:, 0]]
@@ -256,7 +255,7 @@ class _Look:
         return 0, len(self._rows)
 
     def _worth_between(self, edge: int, others: slice) -> NDArray[np.float64]:
-        """Log Bayes factor of each window between one edge and others that follow one another, all before it or all behind it."""
+        """Return log Bayes factors of windows from one edge to consecutive others."""
         way, along = 1.0 if others.start > edge else -1.0, self._along_axes.columns
         own = way * (self._whole[others] - self._whole[edge])
         own += self._edges[np.abs(np.arange(others.start, others.stop) - edge)]
@@ -264,13 +263,13 @@ class _Look:
         return self._worth(self._total[others] - self._total[edge], own)
 
     def _worth(self, along: NDArray[np.float64], own: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Log Bayes factor of each window, less what it costs to be picked from all of them."""
+        """Return log Bayes factors less the cost of the choice."""
         information = np.maximum(own, 0.0) + 1.0 / self._size**2
         occam = 0.5 * np.log(information * self._size**2)
         return np.asarray(0.5 * along**2 / information - occam - np.log(self.tried))
 
     def edges_of(self, window: _Window) -> tuple[float, float]:
-        """Times in rows between which a stretch explains most."""
+        """Return a stretch's edges in rows."""
         first, last = window.first, window.last
         begins = float(0.5 * (self._at[first - 1] + self._at[first])) if first > 0 else -np.inf
         ends = float(0.5 * (self._at[last - 1] + self._at[last])) if last < len(self._at) else np.inf
@@ -282,7 +281,7 @@ class _Look:
         return begins, ends
 
     def take(self, window: _Window) -> tuple[float, float]:
-        """Go on beside a stretch, and return the times in rows between which it explains most."""
+        """Add a stretch and return its edges in rows."""
         begins, ends = self.edges_of(window)
         column = self._left.whitened(self._columns(np.array([begins]), np.array([ends])))[:, 0]
         axes = self._axes.columns
@@ -300,7 +299,7 @@ class _Look:
         return begins, ends
 
     def _best_edges(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> tuple[float, float]:
-        """Those edges of some between which one value explains most; the middle ones where they are alike."""
+        """Return the best edges, central among equals."""
         # Stretches differ about the edge that moves only, and what is alike in them is whitened and multiplied once, where it is not zero.
         rings, reach = self._left.coloured.order, self._clock.reach
         moving = begins if begins[0] < begins[-1] else ends
@@ -330,19 +329,19 @@ class _Look:
     def _columns(
         self, begins: NDArray[np.float64], ends: NDArray[np.float64], rows: slice = slice(None)
     ) -> NDArray[np.float64]:
-        """Columns of stretches, shape (m, p)."""
+        """Return columns of stretches, shape (m, p)."""
         at = self._at[rows, None]
         return (self._clock.response(at - begins) - self._clock.response(at - ends)) * self._factor[rows, None]
 
 
 class _Growing:
-    """Columns, shape (n, k), that become more, one after the other, without a copy of all each time."""
+    """Columns, shape (n, k), growing without copies."""
 
     def __init__(self, columns: NDArray[np.float64]) -> None:
         self.columns, self._room = columns, columns
 
     def add(self, column: NDArray[np.float64]) -> None:
-        """Add one, shape (n,)."""
+        """Add a column, shape (n,)."""
         count = self.columns.shape[1]
         if count == self._room.shape[1]:
             self._room = np.empty((len(column), count + MOST))
@@ -368,21 +367,21 @@ ALIKE = 1e-12
 
 
 def _squares(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sum of squares of each row, shape (w,)."""
+    """Return rows' squares, shape (w,)."""
     return np.asarray(np.einsum("wk,wk->w", rows, rows), dtype=np.float64)
 
 
 def _cumulative(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sums of all rows before each, and of all of them, shape (n + 1, ...)."""
+    """Return cumulative sums, shape (n + 1, ...)."""
     found = np.zeros((len(rows) + 1, *rows.shape[1:]))
     np.cumsum(rows, axis=0, out=found[1:])
     return found
 
 
 def _squares_of_edges(noise: Coloured, longest: int) -> NDArray[np.float64]:
-    """What two edges of a stretch of ones add to its sum of squares once whitened, by its length, 0 to `longest`.
+    """Return two edges' squares after whitening, by stretch length 0 to `longest`.
 
-    The filter has not yet seen its beginning, and goes on behind its end until it has forgotten it.
+    The filter starts at the begin and rings behind the end.
     """
     taps = noise.filter
     step = np.concatenate([np.cumsum(taps), np.full(longest, taps.sum())])

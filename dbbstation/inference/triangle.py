@@ -1,4 +1,4 @@
-"""Upper triangles of many rows, by orthogonal transformation."""
+"""Upper triangles of many rows."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ SLAB = 512
 
 
 def triangle_of(stacked: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Upper triangle of the QR factors, without signs; NaN and infinity are refused.
+    """Return the QR triangle without signs; refuse NaN and infinity.
 
-    Slabs of rows that stay in the processor's cache come first, then the triangles that they leave: the same
-    orthogonal transformation in another order, three times as fast as on all rows at once. [Demmel, Grigori, Hoemmen
-    and Langou, SIAM J. Sci. Comput. 34 (2012) A206]
+    Cache-sized slabs first, three times as fast [Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34 (2012)
+    A206].
     """
     columns = stacked.shape[1]
     slab = max(SLAB, 4 * columns)  # each round leaves a quarter of the rows at most

@@ -1,4 +1,4 @@
-"""Noise that is not the same in all rows: its variance grows with something, or what is new in a row has long tails."""
+"""Uneven noise: growing variance or long-tailed innovations."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ TAIL_ROUNDS = 12
 def most_probable_variance(
     powers: NDArray[np.float64], even: NDArray[np.float64], grows: NDArray[np.float64], odds: float
 ) -> tuple[float, NDArray[np.float64]]:
-    """Cost of the variance of each row that makes squares most probable, and that variance [Schwarz 1978].
+    """Return the cost and the most probable variance of each row [Schwarz 1978].
 
     Args:
-        powers: squares of rows, shape (m,).
-        even: variance that does not grow, up to a factor, shape (m,).
-        grows: parts that may, shape (m, k).
-        odds: log of the number of candidates that this one is of.
+        powers: squares, shape (m,).
+        even: constant variance up to a factor, shape (m,).
+        grows: candidates, shape (m, k).
+        odds: log number of candidates.
     """
     squares = grows / np.maximum(np.mean(grows, axis=0), 1e-300)
     every = np.array(list(product(GROWN, repeat=squares.shape[1])))
@@ -45,11 +45,11 @@ def most_probable_variance(
 
 
 def spread_by_kind(powers: NDArray[np.float64], kinds: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Standard deviation of each row, over that of all, where each kind of rows has its own, shape (m,).
+    """Return rows' relative standard deviations by kind, shape (m,).
 
     Args:
-        powers: squares of rows, shape (m,).
-        kinds: number of the kind of each row, from 0, shape (m,).
+        powers: squares, shape (m,).
+        kinds: from 0, shape (m,).
     """
     count = np.maximum(np.bincount(kinds), 1)
     mean = np.bincount(kinds, powers) / count
@@ -62,10 +62,10 @@ QUIET = 1e-4
 
 
 def most_probable_tails(new: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Root of the weight of each row, shape (m,), and degrees of freedom of Student's t that what is new in rows follows best.
+    """Return root weights, shape (m,), and best Student's t degrees of innovations.
 
     Args:
-        new: in units of its standard deviation, shape (m,).
+        new: standardised, shape (m,).
     """
     squares = np.square(new)
     best, found = -np.inf, (np.ones(len(new)), np.inf)
@@ -78,10 +78,10 @@ def most_probable_tails(new: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
 
 
 def student_likelihood(new: NDArray[np.float64], tails: float) -> float:
-    """Log likelihood of Student's t of its most probable scale, over the height of the normal density.
+    """Return Student's t log likelihood at best scale, over the normal density's height.
 
     Args:
-        new: in units of its standard deviation, shape (m,). A normal distribution has -m / 2.
+        new: standardised, shape (m,); a normal distribution has -m / 2.
         tails: degrees of freedom.
     """
     return _likelihood(new, tails, _scale_of(np.square(new), tails))
@@ -92,7 +92,7 @@ def _likelihood(new: NDArray[np.float64], tails: float, scale: float) -> float:
 
 
 def _scale_of(squares: NDArray[np.float64], tails: float) -> float:
-    """Square of the most probable scale, by expectation and maximisation [Lange, Little and Taylor, JASA 84 (1989) 881]."""
+    """Return the best squared scale by expectation and maximisation [Lange, Little and Taylor, JASA 84 (1989) 881]."""
     scale = 1.0
     for _ in range(TAIL_ROUNDS):
         weight = (tails + 1.0) / (tails + squares / scale)
@@ -101,7 +101,7 @@ def _scale_of(squares: NDArray[np.float64], tails: float) -> float:
 
 
 def has_long_tails(new: NDArray[np.float64]) -> bool:
-    """Whether what is new in rows, shape (m,), is more probable with long tails than without, each with its most probable scale."""
+    """Return whether innovations, shape (m,), favour long tails at best scales."""
     if not np.any(new):
         return False
     scaled = new / np.sqrt(np.mean(np.square(new)))
@@ -113,10 +113,10 @@ def has_long_tails(new: NDArray[np.float64]) -> bool:
 
 
 def log_student(new: NDArray[np.float64], tails: float) -> NDArray[np.float64]:
-    """Log density of Student's t of so many degrees of freedom, over the height of the normal density, shape (m,).
+    """Return Student's t log density over the normal density's height, shape (m,).
 
     Args:
-        new: in units of the scale, shape (m,).
+        new: in scales, shape (m,).
     """
     height = gammaln(0.5 * (tails + 1.0)) - gammaln(0.5 * tails) - 0.5 * np.log(0.5 * tails)
     return np.asarray(height - 0.5 * (tails + 1.0) * np.log1p(new**2 / tails))

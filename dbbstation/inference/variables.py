@@ -1,7 +1,6 @@
-"""Variables of a channel: what an error of it may follow, and which way each was moving.
+"""Variables that an error may follow, with direction of motion.
 
-A variable is a column of values in time order, with the blocks (runs, files, days) that it was recorded in. It has a kind,
-which says what makes sense over it: only angles have turns, only times have an order of their own.
+A variable is a column in time order by blocks; its kind decides what makes sense: turns for angles, order for times.
 """
 
 from __future__ import annotations
@@ -46,11 +45,11 @@ class Variable:
     """What an error may follow.
 
     Attributes:
-        name: unique in its channel.
-        unit: of its values; empty where none is known.
-        values: in row order, shape (n,).
-        period: of an angle, one turn, in its unit; None for all others.
-        driven: whether it results from what is simulated, so that the difference may cause it and not the other way round.
+        name: unique.
+        unit: may be empty.
+        values: shape (n,).
+        period: one turn of an angle, in its unit; else None.
+        driven: results from the simulation, so may be caused by the difference.
     """
 
     name: str
@@ -77,41 +76,41 @@ class Variable:
 
     @property
     def scaled(self) -> NDArray[np.float64]:
-        """Values from -1 at the least to 1 at the greatest, shape (n,)."""
+        """Return values scaled to -1..1, shape (n,)."""
         return np.asarray((self.values - 0.5 * (self.low + self.high)) / (0.5 * self.extent), dtype=np.float64)
 
     @property
     def half_range(self) -> float:
-        """What one unit of `scaled` is, in the unit of the variable."""
+        """Return one unit of `scaled` in the variable's unit."""
         return 0.5 * self.extent
 
     def travel(self, rows: slice) -> NDArray[np.float64]:
-        """Values over rows that follow one another; an angle that is given within one turn goes on beyond it."""
+        """Return values over consecutive rows, angles unwrapped."""
         own = self.values[rows]
         if self.period is None or self.extent > self.period:
             return own
         return np.asarray(np.unwrap(own, period=self.period), dtype=np.float64)
 
     def is_path(self, blocks: Sequence[slice]) -> bool:
-        """Whether it moves on from row to row, as along a path, rather than from pose to pose."""
+        """Return whether it moves continuously, as along a path."""
         steps = [np.abs(np.diff(self.travel(rows))) for rows in blocks]
         every = np.concatenate([np.zeros(0), *steps])
         return len(every) > 0 and float(np.median(every)) < CONTINUOUS * self.extent
 
     def directions(self, blocks: Sequence[slice]) -> NDArray[np.float64]:
-        """Direction of travel at each row: 1 up, -1 down, shape (n,).
+        """Return each row's direction: 1 up, -1 down, shape (n,).
 
-        Along a path that of its speed there; from pose to pose that in which it arrived. What rests keeps the direction in which
-        it came; before the first move of a block it has that of the move.
+        Along a path by speed; between poses by arrival. Resting rows keep their direction; before a block's first move it
+        is that move's.
         """
         return _signs(self, blocks, _central if self.is_path(blocks) else _arriving)
 
     def arriving(self, blocks: Sequence[slice]) -> NDArray[np.float64]:
-        """The same from the row before alone: near a turn, a row along a path may belong to either way."""
+        """Return directions by the previous row alone, for ambiguous turns."""
         return _signs(self, blocks, _arriving)
 
     def rates(self, time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
-        """Change per unit of time, central differences within blocks, shape (n,); zero where time does not run on."""
+        """Return central differences per time within blocks, shape (n,); zero if time stands."""
         found = np.zeros(len(self.values))
         for rows in blocks:
             own, at = self.travel(rows), time[rows]
@@ -131,7 +130,7 @@ def _central(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _signs(
     variable: Variable, blocks: Sequence[slice], change_of: Callable[[NDArray[np.float64]], NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Sign of a change by row, kept while nothing changes."""
+    """Return signs by row, kept while constant."""
     found = np.zeros(len(variable.values))
     for rows in blocks:
         change = change_of(variable.travel(rows))

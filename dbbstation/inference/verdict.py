@@ -55,12 +55,12 @@ class Verdict(StrEnum):
 
     @property
     def rank(self) -> int:
-        """Place in the order of listing."""
+        """Return the place in listings."""
         return tuple(Verdict).index(self)
 
 
 class Acts(StrEnum):
-    """When a cause is at work: whether other rows or tests can show it again."""
+    """Whether other rows or tests can show a cause again."""
 
     ALWAYS = auto()
     ONCE = auto()
@@ -68,12 +68,11 @@ class Acts(StrEnum):
 
 @dataclass(frozen=True)
 class Gains:
-    """What an effect brought in each held-out part, everything chosen anew without that part.
+    """An effect's gain in each held-out part, chosen anew.
 
     Attributes:
-        parts: sum of squares of the errors of prediction of a part without the effect, what else was chosen refitted, less that with it,
-            in the squared unit of what is predicted. Zero where the effect was not chosen.
-        rows: of each part; none where all have as many.
+        parts: squared errors without less with it, others refitted, in squared units; zero if not chosen.
+        rows: of each part; none if equal.
     """
 
     parts: tuple[float, ...]
@@ -82,7 +81,7 @@ class Gains:
     @computed_field  # type: ignore[prop-decorator]
     @property
     def with_gain(self) -> int:
-        """Parts in which it brought something."""
+        """Return the number of parts with gain."""
         return sum(part > 0.0 for part in self.parts)
 
     @computed_field  # type: ignore[prop-decorator]
@@ -93,61 +92,59 @@ class Gains:
 
     @property
     def counted(self) -> str:
-        """In how many parts of how many it gains, as tables print it."""
+        """Return the count of gains, as printed."""
         return f"{self.with_gain} of {len(self.parts)}"
 
     @property
     def share_with_gain(self) -> float:
-        """Share of the rows that are in such parts."""
+        """Return the share of rows in gaining parts."""
         rows = self.rows or (1,) * len(self.parts)
         return sum(count for part, count in zip(self.parts, rows, strict=True) if part > 0.0) / max(sum(rows), 1)
 
     @property
     def without_best(self) -> float:
-        """Over all parts but the best."""
+        """Return the sum without the best part."""
         return self.total - max(self.parts, default=0.0)
 
     @computed_field  # type: ignore[prop-decorator]
     @property
     def predicts(self) -> bool:
-        """Whether it brought something in enough parts, and in sum without the best part."""
+        """Return whether enough parts gain, and the sum without the best."""
         return self.share_with_gain >= PARTS_WITH_GAIN and self.without_best > 0.0
 
 
 @dataclass(frozen=True)
 class DensityGains(Gains):
-    """What an effect brought in each held-out part, where the density of the prediction is known.
+    """An effect's gain in predictive density.
 
-    Its logarithm has a scale of its own: a part that hardly shows the effect brings hardly anything, whatever its sign, and the sum over
-    parts is evidence [Good, J. R. Stat. Soc. B 14 (1952) 107]. So parts need not be counted.
+    Parts that hardly show it bring little, and the sum is evidence [Good, J. R. Stat. Soc. B 14 (1952) 107], so parts
+    need not be counted.
 
     Attributes:
-        parts: log density of the prediction of a part with the effect less that without it, what else was chosen refitted. Zero where the
-            effect was not chosen.
+        parts: log density with less without it, others refitted; zero if not chosen.
     """
 
     @property
     def predicts(self) -> bool:
-        """Whether the parts but the best prefer the effect by the odds at which something is sure."""
+        """Return whether parts without the best favour it surely."""
         return self.without_best >= math.log(SURE / ABSENT)
 
 
 def is_worse(corrected: float, reference: float) -> bool:
-    """Whether a corrected prediction is worse than that of the reference, both as root mean square errors of the same held-out rows.
+    """Return whether a correction predicts worse than the reference, by rms on held-out rows.
 
-    The reference is, for tables and simulators, the values as simulated; for circles the kinematic calibration; for drives the law
-    with mass and friction; for two sessions the first one.
+    References: simulated values, kinematic calibration, mass and friction, or the first session.
     """
     return corrected > (1.0 + SEEN_WORSE) * reference
 
 
 def claim(probability: float, sigmas: float, acts: Acts, gains: Gains | None, *, worse: bool = False) -> Verdict:
-    """Verdict of a cause that the most probable hypothesis has.
+    """Return the verdict of a cause of the most probable hypothesis.
 
     Args:
-        sigmas: norm of its effect over its standard deviation.
-        gains: in held-out parts; None: these were not asked for.
-        worse: whether everything together predicts worse than the reference [`is_worse`]; then nothing is identified.
+        sigmas: norm over standard deviation.
+        gains: None: not tested.
+        worse: [`is_worse`]; then nothing is identified.
     """
     if not (probability >= SURE and sigmas >= OUT):
         return Verdict.AMBIGUOUS

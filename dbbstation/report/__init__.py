@@ -1,1 +1,1 @@
-"""Figures of results, for people and reports."""
+"""Figures and pages of results."""

@@ -1,4 +1,4 @@
-"""Figure of a calibration: circles before and after, what is left, centres and balls on the plate, what tests bring."""
+"""Figure of a calibration: circles before and after, residuals, centres, balls, leverages."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
 def calibration_figure(calibration: Calibration, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
-    """Draw circles before and after, residuals, centres and balls on the plate, and leverages, as SVG."""
+    """Draw the figure as SVG."""
     with in_style():
         return in_format(draw_calibration(calibration), wanted)
 
 
 def draw_calibration(calibration: Calibration) -> Figure:
-    """Lay the parts out one below the other."""
+    """Draw all parts, one below the other."""
     tests = circle_tests(calibration)
     rows = -(-len(tests) // COLUMNS)
     heights = [2.3 * rows + 0.3, 1.2 + ROW_IN * len(tests), 4.3]
@@ -82,7 +82,7 @@ def _circles(part: SubFigure, tests: Sequence[CircleTest], rows: int) -> None:
 
 
 def _circle(axes: Axes, test: CircleTest, ring: float) -> None:
-    """Deviations about a circle four rings wide; Cartesian axes, since polar ones take long to lay out."""
+    """Draw deviations about a circle, Cartesian for speed."""
     zero = 4.0 * ring
     for k in range(1, 7):
         style: Any = {"color": "black", "linewidth": 0.7} if k == 4 else {"color": "#cccccc", "linewidth": 0.4}  # noqa: PLR2004
@@ -121,7 +121,7 @@ def _leverage(axes: Axes, leverage: Mapping[str, float]) -> None:
 
 
 def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> None:
-    """Arrows from the balls towards the circles' centres, magnified, seen from above."""
+    """Draw magnified arrows from balls to circle centres, from above."""
     where = np.array([test.ball_mm for test in tests])
     shift = np.array([test.centre_um[k] for test in tests])
     longest = float(np.hypot(*shift.T).max()) or 1.0
@@ -151,7 +151,7 @@ def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> Non
 
 
 def _balls(axes: Axes, balls: Sequence[BallShift]) -> None:
-    """Balls off their stated places, with the circle that two stated standard deviations make."""
+    """Draw balls off their stated places, with circles of two standard deviations."""
     axes.set_title("balls off their stated places, bars ±2σ")
     if not balls:
         axes.text(0.5, 0.5, "no ball of known place", ha="center", va="center", transform=axes.transAxes)
@@ -176,6 +176,6 @@ def _balls(axes: Axes, balls: Sequence[BallShift]) -> None:
 
 
 def _round(value: float) -> float:
-    """Return 1, 2 or 5 times a power of ten, the largest that is no more than a positive value."""
+    """Return the largest of 1, 2, 5 times a power of ten up to a value."""
     decade = 10.0 ** np.floor(np.log10(value))
     return float(max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1.0 + 1e-9)) * decade)

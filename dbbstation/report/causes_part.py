@@ -1,4 +1,4 @@
-"""What a report says of causes: ranked by what they contribute, and the circles as they would be if the first were cured."""
+"""Causes in a report by contribution, and circles without the first."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_DRAWN = 6
 
 
 class CauseRow(NamedTuple):
-    """A row of the table of causes, as texts; pairs are a contribution and its expanded uncertainty."""
+    """A row of texts; pairs are contribution and expanded uncertainty."""
 
     cause: str
     verdict: str
@@ -72,7 +72,7 @@ def cause_rows(ranked: Ranked, coverage_factor: float) -> list[CauseRow]:
 
 
 def cured_polars(ranked: Ranked) -> list[TitledPolar]:
-    """Return drawings of the circles as measured and as they would be if the first cause were cured."""
+    """Return circles as measured and without the first cause."""
     if not ranked.effects:
         return []
     first = ranked.effects[0]
@@ -102,6 +102,6 @@ def _drawn(one: CuredCircle) -> Polar:
 
 
 def _path(one: CuredCircle, length_mm: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Angles [deg] and deviations [µm] from the least-squares circle, up to 30 undulations per revolution."""
+    """Return angles [deg] and deviations [µm] up to 30 undulations per revolution."""
     path = path_about_ball(one.raw.theta_deg, horizontal_radius_mm(one.raw, smooth_lengths_mm(one.raw, length_mm)))
     return path.theta_deg, 1e3 * path.deviation_mm

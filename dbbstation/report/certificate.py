@@ -1,4 +1,4 @@
-"""Whether a report is a certificate: what one needs, and what of it the sessions do not say."""
+"""Whether a report is a certificate, and what is missing."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Certified:
     """What a report is.
 
     Attributes:
-        lacking: what a certificate needs and this report has not, in few words each; empty where it is one.
-        place: where it was measured; empty where nobody says.
+        lacking: missing parts; empty for a certificate.
+        place: may be empty.
     """
 
     lacking: tuple[str, ...]
@@ -30,7 +30,7 @@ class Certified:
 
     @property
     def title(self) -> str:
-        """What stands at the top: `Certificate of circular tests`, or `Not a certificate: operator unknown, ...`."""
+        """Return `Certificate of circular tests`, or `Not a certificate: operator unknown, ...`."""
         if not self.lacking:
             return "Certificate of circular tests"
         more = len(self.lacking) - MOST_NAMED
@@ -39,13 +39,12 @@ class Certified:
 
 
 def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolerances: bool) -> Certified:
-    """Return what a report of some sessions lacks to be a certificate.
+    """Return what a report needs to be a certificate.
 
     Args:
-        sessions: whose circles it shows.
-        job: what was measured for, as typed for this report; empty: as the sessions say.
-        place: where it was measured; empty where nobody says.
-        tolerances: whether circles are held against any.
+        job: typed; empty: the sessions'.
+        place: may be empty.
+        tolerances: whether there are any.
     """
     lacking = dict.fromkeys(text for session in sessions for text in _lacking(session, job))
     if not place:

@@ -1,4 +1,4 @@
-"""Figure of a comparison: where two sessions differ, and the runs that differ most."""
+"""Figure of a comparison: where sessions and runs differ."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ COLOUR_A, COLOUR_B = AFTER, BEFORE
 
 
 def compare_figure(found: Comparison, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
-    """Draw maps of the difference over test and angle, and the worst runs of three tests, as SVG."""
+    """Draw maps over test and angle, and the worst runs of three tests, as SVG."""
     tests = list(dict.fromkeys((run.pair.test, run.pair.number) for run in found.runs))
     with in_style():
         figure = Figure(figsize=(11.0, 6.0 + 0.2 * len(tests)), layout="constrained")

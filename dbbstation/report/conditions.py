@@ -1,4 +1,4 @@
-"""Under which conditions a session was measured, as rows of a table."""
+"""Conditions of a session as table rows."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _NOT_NOTED = "not noted"
 
 
 def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: str) -> tuple[tuple[str, str], ...]:
-    """Return name and value of each condition; what nobody noted is said to be not noted.
+    """Return name and value of each condition, or "not noted".
 
     Args:
-        circles: its runs that are shown, of which dates and temperatures are given.
-        job: what it was measured for, as typed; empty: what the session says.
+        circles: shown runs.
+        job: typed; empty: the session's.
     """
     compensated = sum(1 for run in session.in_state(RunState.ACCEPTED) if run.program is not None)
     accepted = len(session.in_state(RunState.ACCEPTED))
@@ -48,7 +48,7 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
 
 
 def identity(session: SessionFolder) -> tuple[tuple[str, str], ...]:
-    """Return in a few words what a first page has to say of a session: machine, operator, bar, temperature, seal."""
+    """Return a session's identity in short: machine, operator, bar, temperature, seal."""
     bar = session.bar
     when = bar is not None and bar.calibrated is not None
     calibrated = f", calibrated {bar.calibrated:%Y-%m-%d}" if bar is not None and bar.calibrated is not None else ""
@@ -67,7 +67,7 @@ ANCHOR_SHOWN = 16
 
 
 def when_measured(runs: Iterable[RunEntry]) -> str:
-    """Return the starts of the first and the last of some runs, in words."""
+    """Return first and last start, in words."""
     moments = [run.started for run in runs if run.started is not None]
     if not moments:
         return _NOT_NOTED
@@ -76,7 +76,7 @@ def when_measured(runs: Iterable[RunEntry]) -> str:
 
 
 def _instrument(session: SessionFolder) -> str:
-    """What read the circles that count, each once."""
+    """Return the instruments of counted circles."""
     read = [run.instrument for run in session.in_state(RunState.ACCEPTED)]
     told = dict.fromkeys(
         "virtual: " * one.virtual + one.text for one in read or [session.instrument] if one is not None
@@ -126,7 +126,7 @@ def _degc(value: float | None) -> str:
 
 
 def _logged(circles: Sequence[MeasuredCircle]) -> str:
-    """Range of every thermometer over the accepted runs."""
+    """Return every thermometer's range over accepted runs."""
     ranges: dict[str, tuple[float, float]] = {}
     for one in circles:
         logged = {} if one.analysis is None else one.analysis.raw.temperature_degc

@@ -1,4 +1,4 @@
-"""What a report says: its numbers, and with conditions and drawings what its template names."""
+"""Content of a report: numbers, conditions, drawings."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class Modelled:
     """A model beside the circles.
 
     Attributes:
-        evaluation: what it leaves; None where that could not be worked out.
-        problem: why it could not; empty where it could.
+        evaluation: None if impossible.
+        problem: may be empty.
     """
 
     identified: IdentifiedModel
@@ -60,16 +60,16 @@ class Modelled:
 
 @dataclass(frozen=True, eq=False)
 class Reported:
-    """What goes into a report.
+    """Parts of a report.
 
     Attributes:
-        found: circles as measured, with findings.
-        settings: of the shop, with its tolerances.
-        before: circles measured before; None where none are given.
-        modelled: a model beside them; None where none is given.
-        job: what was measured for; empty where not said.
-        ranked: causes of the model beside the circles; None without a model.
-        place: where it was measured; empty where nobody says.
+        found: with findings.
+        settings: with tolerances.
+        before: None if not given.
+        modelled: None if not given.
+        job: may be empty.
+        ranked: None without a model.
+        place: may be empty.
     """
 
     found: Circled
@@ -84,11 +84,7 @@ class Reported:
 
 
 def numbers_of(reported: Reported, page: str) -> ReportResult:
-    """Return the numbers of a report: what its command prints as JSON, and its template shows.
-
-    Args:
-        page: file that it is written to.
-    """
+    """Return the numbers of a report for JSON and template."""
     tolerances, coverage_factor = reported.settings.tolerances, reported.coverage_factor
     now = tolerated_circles(reported.found.circles, tolerances)
     now_both = (*now, *tolerated_pairs(reported.found.pairs, tolerances))
@@ -122,14 +118,14 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
 
 
 def certified_of(reported: Reported) -> Certified:
-    """Return what a report lacks to be a certificate."""
+    """Return what a report needs to be a certificate."""
     found = reported.found
     shown = [session for session in found.sessions if any(c.session == session.name for c in found.circles)]
     return certified(shown, reported.job, reported.place, tolerances=bool(reported.settings.tolerances))
 
 
 def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance) -> ReportContent:
-    """Return what the template of a report names beside its numbers."""
+    """Return the template's content beside numbers."""
     found, modelled = reported.found, reported.modelled
     bad = {one.worst.test for one in numbers.tolerances if one.worst is not None and not one.within}
     bad |= {one.entry.test for one in found.circles if one.problem or (one.judgement and one.judgement.wrong)}
@@ -166,7 +162,7 @@ def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance
 
 
 def _sessions(reported: Reported, bad: set[str]) -> Iterable[ShownSession]:
-    """Yield the sessions that have circles; `bad` names tests that need attention."""
+    """Yield sessions with circles; `bad` names tests that need attention."""
     for session in reported.found.sessions:
         circles = [one for one in reported.found.circles if one.session == session.name]
         tests = list(dict.fromkeys(one.entry.test for one in circles))
@@ -221,7 +217,7 @@ def _polars(reported: Reported) -> list[TitledPolar]:
 
 
 def _findings(found: Circled) -> ShownFindings:
-    """Return findings that are wrong, run by run, and those that cannot be decided, by what they are."""
+    """Return wrong findings by run, and undecided ones by kind."""
     wrong, undecided, good = [], dict[tuple[str, str], list[str]](), 0
     for one in found.circles:
         for finding in () if one.judgement is None else one.judgement.findings:
@@ -253,7 +249,7 @@ def _why_not(circles: CirclesResult) -> list[str]:
 
 
 def _files(reported: Reported, provenance: Provenance) -> Iterable[tuple[str, str]]:
-    """Yield name and SHA-256 of every file that the report rests on, recordings too."""
+    """Yield name and SHA-256 of every underlying file."""
     yield from provenance.inputs.items()
     for found in (reported.found, *(() if reported.before is None else (reported.before,))):
         for one in found.circles:

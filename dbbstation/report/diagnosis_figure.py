@@ -1,4 +1,4 @@
-"""Figure of a diagnosis: where the misfit was, which errors were found, what naming them gained."""
+"""Figure of a diagnosis: misfit, found errors, gains."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
 def diagnosis_figure(diagnosis: Diagnosis, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
-    """Draw maps of the misfit, errors over what organises them and what has no name, traces and gains, as SVG."""
+    """Draw maps, errors over their variables, traces and gains, as SVG."""
     with in_style():
         return in_format(draw_diagnosis(diagnosis), wanted)
 
 
 def draw_diagnosis(diagnosis: Diagnosis) -> Figure:
-    """Lay the parts out one below the other; parts that have nothing to show are left out."""
+    """Draw all non-empty parts, one below the other."""
     found = diagnosis.after is not diagnosis.before
     curves, gains, unnamed = source_curves(diagnosis), gains_by_test(diagnosis), diagnosis.unexplained.curve
     heights = [1.0 + ROW_IN * len(gains), *(2.1 for _ in curves), *([2.1] if unnamed else []), 4.6, 2.4]

@@ -1,4 +1,4 @@
-"""What the figures share: one style, maps over test and angle."""
+"""Common style, and maps over test and angle."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ def in_style() -> AbstractContextManager[None]:
 
 
 def draw_maps(panels: Sequence[Axes], titles: Sequence[str], maps: Sequence[ResidualMap], noise_um: float) -> QuadMesh:
-    """Draw maps side by side, both directions of each, with one scale whose zero is white.
+    """Draw maps by direction with one scale, white at zero.
 
     Args:
-        noise_um: of one reading: the scale reaches that far at least, so that noise does not shout [µm].
+        noise_um: of a reading, the least range of the scale.
     """
     reach = max(noise_um, *(one.reach_um for one in maps))
     drawn = [(title, one, direction) for title, one in zip(titles, maps, strict=True) for direction in Direction]

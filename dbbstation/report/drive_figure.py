@@ -1,4 +1,4 @@
-"""Figure of one drive: force over time as measured and modelled, what is left, friction against speed."""
+"""Figure of one drive: measured and modelled force, residual, friction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A figure's bytes in the format that the name of its file asks for."""
+"""A figure's bytes by file extension."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PNG_DOTS_PER_INCH = 200
 
 
 class FigureFormat(StrEnum):
-    """Formats of figures, by the ending of the file."""
+    """Formats by extension."""
 
     SVG = ".svg"
     PNG = ".png"
@@ -28,10 +28,10 @@ class FigureFormat(StrEnum):
 
 @dataclass(frozen=True)
 class Stamped:
-    """A format together with where the figure comes from.
+    """A format with provenance.
 
     Attributes:
-        provenance: kept in the metadata of the file.
+        provenance: for the metadata.
     """
 
     format: FigureFormat
@@ -39,15 +39,15 @@ class Stamped:
 
 
 def figure_format(wanted: object) -> FigureFormat | Stamped:
-    """Return a format, also from the ending of a file's name, such as `.svg`."""
+    """Return a format, also from an extension such as `.svg`."""
     return wanted if isinstance(wanted, Stamped) else FigureFormat(str(wanted))
 
 
 def in_format(figure: Figure, wanted: FigureFormat | Stamped) -> bytes:
-    """Return the figure's bytes: the same for the same figure and provenance, without a date.
+    """Return the figure's bytes, reproducible and without date.
 
     Args:
-        wanted: format, with where the figure comes from; that goes into the metadata that the format has for it.
+        wanted: format, with provenance for its metadata.
     """
     kind = wanted.format if isinstance(wanted, Stamped) else wanted
     metadata = _metadata(wanted.provenance, kind) if isinstance(wanted, Stamped) else {}
@@ -62,7 +62,7 @@ def in_format(figure: Figure, wanted: FigureFormat | Stamped) -> bytes:
 
 
 def _metadata(provenance: Provenance, kind: FigureFormat) -> dict[str, object]:
-    """Program, command and inputs under the names that each format has for them."""
+    """Return program, command and inputs by each format's names."""
     names = {
         FigureFormat.SVG: ("Creator", "Description"),  # Dublin Core, in RDF
         FigureFormat.PNG: ("Software", "Description"),  # text chunks of the PNG specification

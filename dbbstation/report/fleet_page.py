@@ -1,4 +1,4 @@
-"""A fleet as one HTML file: what is unlike, a row for each machine, causes, what failed."""
+"""A fleet as one HTML file."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ REACH = 6.0
 
 @dataclass(frozen=True)
 class MachineRow:
-    """What the page says of one machine.
+    """A machine on the page.
 
     Attributes:
-        name: serial number, or the name in its machine file.
-        session: that is shown: the last one that was done, or one that failed.
-        others: how many further sessions it has.
-        marks: places of the scores of the others on the strip.
-        marked: places of those that are unlike.
-        words: the strip, for those who do not see it.
+        name: serial number or name.
+        session: shown one: the last done, or a failed one.
+        others: number of further sessions.
+        marks: places of like scores.
+        marked: places of unlike scores.
+        words: the strip in words.
     """
 
     name: str
@@ -45,7 +45,7 @@ class MachineRow:
 
 
 def fleet_html(result: FleetResult, provenance: Provenance) -> bytes:
-    """Return a fleet as HTML: one file without script; it links only to results that lie beside it."""
+    """Return a fleet as HTML without script, linking only to its results."""
     machines: dict[str, list[FleetSession]] = {}
     for session in result.sessions:
         machines.setdefault(session.machine or session.session, []).append(session)
@@ -66,7 +66,7 @@ def fleet_html(result: FleetResult, provenance: Provenance) -> bytes:
 
 
 def headline_of(result: FleetResult) -> str:
-    """Return in one sentence what came of a fleet."""
+    """Return a fleet's result in a sentence."""
     failed = len(result.failed)
     done = f"{len(result.sessions) - failed} of {len(result.sessions)} sessions done"
     if failed:
@@ -80,7 +80,7 @@ def headline_of(result: FleetResult) -> str:
 
 
 def _digits(one: Scored) -> tuple[str, ...]:
-    """Return value, u, usual value, scatter and smallest departure that is seen, all to the decimals that u, or else scatter, gives."""
+    """Return value, u, usual value, scatter and smallest departure, with decimals by u or scatter."""
     sure = one.uncertainty or one.scatter
     numbers = (one.value, one.uncertainty, one.usual, one.scatter, one.smallest_seen)
     form = f".{decimals_of(sure)}f" if sure else ".4g"

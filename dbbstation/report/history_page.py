@@ -1,4 +1,4 @@
-"""Histories as one HTML file: what changed, a table, and a drawing of every quantity."""
+"""Histories as one HTML file: changes, table, drawings."""
 
 from __future__ import annotations
 
@@ -36,13 +36,11 @@ _DAY_S = 86400.0
 
 @dataclass(frozen=True)
 class TrendMark:
-    """A tick, or an event.
+    """A tick or an event.
 
     Attributes:
-        at: its place along its axis, in units of the drawing.
-        label: what stands beside it.
-        kind: verdict of an event, in one word; empty for a tick.
-        y: height of an event's point.
+        at: along its axis, in drawing units.
+        kind: verdict of an event; empty for a tick.
     """
 
     at: float
@@ -53,13 +51,12 @@ class TrendMark:
 
 @dataclass(frozen=True)
 class Drawing:
-    """One quantity over time as what an SVG needs.
+    """One quantity over time for SVG.
 
     Attributes:
-        points: one short stroke for each value, round.
-        levels: of the stretches between changes.
-        limits: heights of the limits inside the field.
-        words: what it shows, for those who do not see it.
+        points: short round strokes.
+        limits: heights within the field.
+        words: the drawing in words.
     """
 
     name: str
@@ -75,10 +72,10 @@ class Drawing:
 
 
 def history_html(history: HistoryResult, provenance: Provenance, tolerances_from: str = "") -> bytes:
-    """Return histories as HTML: one file without script that refers to nothing outside it, the same for the same content.
+    """Return reproducible HTML without script or outside references.
 
     Args:
-        tolerances_from: file with the shop's tolerances; empty where there is none.
+        tolerances_from: may be empty.
     """
     k = history.coverage_factor
     machines = [
@@ -144,7 +141,7 @@ def _scale(low: float, high: float, start: float, end: float) -> Callable[[float
 
 
 def _reach(values: Sequence[HistoryValue], k: float, limit: float | None) -> tuple[float, float]:
-    """Return lowest and highest value of a field: all values with their U, and a limit that is not far from them."""
+    """Return a field's range: all values with U, and a near limit."""
     low = min(value.value - k * (value.u or 0.0) for value in values)
     high = max(value.value + k * (value.u or 0.0) for value in values)
     span = (high - low) or abs(high) or 1.0

@@ -1,4 +1,4 @@
-"""What terminal and page say of a history."""
+"""Words of a history for terminal and page."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ DASH = "–"
 
 
 def rounded(value: float | None, u: float | None, coverage_factor: float) -> str:
-    """Return a number with as many decimals as its uncertainty gives a meaning: one, or two digits of a smaller U.
+    """Return a number with decimals by its uncertainty.
 
     Args:
-        u: its standard uncertainty; None where not known.
+        u: standard; None if unknown.
     """
     if value is None:
         return DASH
@@ -37,7 +37,7 @@ def rounded(value: float | None, u: float | None, coverage_factor: float) -> str
 
 
 def verdict_in_words(one: QuantityHistory) -> str:
-    """Return the verdict of a quantity, with what it lacks."""
+    """Return a quantity's verdict with what it lacks."""
     if one.why_not:
         return one.why_not if one.limit is not None or one.figure == "C" else f"{one.verdict}: {one.why_not}"
     lacking = one.sessions_lacking
@@ -49,7 +49,7 @@ def verdict_in_words(one: QuantityHistory) -> str:
 
 
 def headline(machine: MachineHistoryResult) -> str:
-    """Return how many changes a machine shows, in one line."""
+    """Return the number of a machine's changes."""
     if not machine.changes:
         if any(one.watched_sessions for one in machine.quantities):
             return "Nothing changed beyond scatter and uncertainty"
@@ -62,7 +62,7 @@ def headline(machine: MachineHistoryResult) -> str:
 
 
 def changes_in_words(machine: MachineHistoryResult, coverage_factor: float) -> Iterator[str]:
-    """Yield what changed on a machine: one line for each session that showed something, with its largest quantities."""
+    """Yield a line per session with changes, largest quantities first."""
     for change in machine.changes:
         found, since = change.found, change.since
         when = f"{found.name} ({found.date})"

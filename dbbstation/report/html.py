@@ -1,4 +1,4 @@
-"""Pages as one HTML file: everything that is not markup is escaped by the template engine."""
+"""Pages as one HTML file; the template engine escapes all text."""
 
 from __future__ import annotations
 
@@ -18,13 +18,9 @@ if TYPE_CHECKING:
 
 
 def report_html(numbers: ReportResult, content: ReportContent) -> bytes:
-    """Return a report as HTML: one file that refers to nothing outside it, the same for the same content.
+    """Return a reproducible report without outside references.
 
-    Its one script enlarges polar traces and reads them off; the page says everything without it. By its own policy the
-    page runs no other script, whatever people typed.
-
-    Args:
-        content: what the page shows beside them.
+    Its one script enlarges polar traces; its policy forbids others.
     """
     script = files("dbbstation.report").joinpath("templates", "polar.js").read_text("utf-8").strip()
     digest = b64encode(sha256(script.encode()).digest()).decode()
@@ -34,7 +30,7 @@ def report_html(numbers: ReportResult, content: ReportContent) -> bytes:
 
 
 def environment() -> jinja2.Environment:
-    """Return the template engine of every page: what a text holds is escaped, a name that is not given is an error."""
+    """Return the template engine: texts are escaped, missing names are errors."""
     made = jinja2.Environment(
         loader=jinja2.PackageLoader("dbbstation.report"),
         autoescape=True,
@@ -50,7 +46,7 @@ def environment() -> jinja2.Environment:
 
 
 def _um(value: float | None, decimals: int = 1) -> str:
-    """Return a length with its decimals, zero without a sign; a dash where there is none."""
+    """Return a length with decimals, zero unsigned; a dash for None."""
     if value is None:
         return DASH
     return f"{round(value, decimals) + 0.0:.{decimals}f}"

@@ -1,4 +1,4 @@
-"""Where labels go so that none covers another: boxes in inches, no drawing."""
+"""Place labels without overlap, in inches."""
 
 from __future__ import annotations
 
@@ -18,14 +18,7 @@ _AROUND = np.radians(np.arange(0.0, 360.0, 22.5))
 
 @dataclass(frozen=True)
 class Box:
-    """A rectangle.
-
-    Attributes:
-        left: of its lower left corner [inch].
-        bottom: of the same [inch].
-        width: to the right [inch].
-        height: upwards [inch].
-    """
+    """A rectangle [inch]."""
 
     left: float
     bottom: float
@@ -33,7 +26,7 @@ class Box:
     height: float
 
     def meets(self, other: Box) -> bool:
-        """Whether both have a point in common; edges that touch do not."""
+        """Return whether both overlap; touching edges do not count."""
         return (
             self.left < other.left + other.width
             and other.left < self.left + self.width
@@ -42,7 +35,7 @@ class Box:
         )
 
     def holds(self, other: Box) -> bool:
-        """Whether the other lies within this one."""
+        """Return whether the other lies within."""
         return (
             self.left <= other.left
             and self.bottom <= other.bottom
@@ -57,12 +50,12 @@ def place_labels(
     within: Box,
     keep_off: Sequence[Box] = (),
 ) -> list[Box | None]:
-    """Return where each label goes: as near to its place as it can without covering what is there.
+    """Return each label's place, as near as possible.
 
     Args:
-        anchors: places that the labels belong to [inch].
-        sizes: width and height of each label [inch].
-        within: what labels must not leave.
+        anchors: [inch].
+        sizes: width and height [inch].
+        within: bounds.
 
     Returns:
         A box for each; None where no room is left for it.
@@ -78,7 +71,7 @@ def place_labels(
 
 
 def _tried(anchor: tuple[float, float], size: tuple[float, float], within: Box) -> list[Box]:
-    """Boxes round a place, the nearest first, that do not leave what they must stay in."""
+    """Return boxes round a place within bounds, the nearest first."""
     width, height = size
     steps = int(np.hypot(within.width, within.height) / STEP_IN) + 1
     boxes = (

@@ -1,4 +1,4 @@
-"""The three levels in sentences, for terminal and page."""
+"""The three levels in sentences."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ WAYS = {"value": "by value", "direction": "by direction of travel", "late": "lat
 
 
 def level_sentences(levels: Levels, unit: str) -> list[str]:
-    """Sentences of an answer: whether anything differs, what it follows and which law it is, and whether to correct.
+    """Return sentences on existence, variables and law of a difference, and correction.
 
     Args:
-        unit: of measured and simulated values; empty where it has none.
+        unit: may be empty.
     """
     found = [*_difference(levels.differs, unit)]
     for one in levels.follows:

@@ -1,4 +1,4 @@
-"""Figure of a table's mismatch: what differs over each variable that leads it, before and after, and the held-out error."""
+"""Figure of a table's mismatch over its leading variables."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FEWEST_IN_BIN = 3
 
 
 def mismatch_figure(found: Mismatch, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
-    """Draw measured less simulated over the variables that lead it, over the rows, and the held-out error of every part."""
+    """Draw the difference over variables and rows, and each part's held-out error."""
     names = [share.variable for share in found.shares[:MOST_VARIABLES]]
     variables = [v for name in names for v in found.settled.channel.variables if v.name == name]
     wide = max(len(variables), 2)

@@ -1,4 +1,4 @@
-"""What a model adds to a report: what it leaves, its parameters with U, and what its recordings could not see."""
+"""A model in a report: residual, parameters with U, invisible directions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tuple[str, str, str, str, str], ...]:
-    """Return source, parameter, value, U and unit of every parameter of the machine; U is a dash where it is not known."""
+    """Return source, parameter, value, U and unit; a dash for unknown U."""
     u = identified.uncertainties
     rows = []
     for fitted in identified.model.sources:
@@ -27,7 +27,7 @@ def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tup
 
 
 def quality_of_fit(identified: IdentifiedModel) -> str:
-    """Return what the fit of a model left beside the noise of its readings, in words; empty where the model does not say."""
+    """Return a fit's residual beside noise, in words; may be empty."""
     report = identified.report
     keys = ("nominal_rms_um", "residual_within_mounting_rms_um", "noise_um")
     nominal, left, noise = (report.get(key) for key in keys)
@@ -40,7 +40,7 @@ def quality_of_fit(identified: IdentifiedModel) -> str:
 
 
 def not_visible(identified: IdentifiedModel) -> tuple[str, ...]:
-    """Return what the recordings of a model could not see, and what they saw least, in words."""
+    """Return what a model's recordings could not see, or saw least."""
     lost = [f"Not visible, held at nominal: {text}." for text in identified.directions_lost]
     seen = identified.report.get("observability")
     weak: Any = seen.get("weak_directions", []) if isinstance(seen, Mapping) else []

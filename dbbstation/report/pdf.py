@@ -1,4 +1,4 @@
-"""A report as PDF, printed by a Chromium that is installed."""
+"""Print a report as PDF with an installed Chromium."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BOUNDS = ProgramBounds(time_s=120.0, memory_mb=8000.0, output_mb=1000.0)
 
 
 def chromium() -> str:
-    """Return the Chromium that prints.
+    """Return the Chromium.
 
     Raises:
         StationError: none is installed.
@@ -46,7 +46,7 @@ def printed(html: bytes, browser: str) -> bytes:
     """Return a report as PDF.
 
     Raises:
-        StationError: the browser fails, with what it said last.
+        StationError: the browser fails, with its last message.
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         page, out = Path(folder) / "report.html", Path(folder) / "report.pdf"

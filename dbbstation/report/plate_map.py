@@ -1,4 +1,4 @@
-"""Places of the tests of a plan on the table, as what an SVG needs."""
+"""Places of a plan's tests for SVG."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _SAME_MM = 1.0
 
 @dataclass(frozen=True)
 class MapPlace:
-    """Where balls stand, one above another.
+    """Balls at one place.
 
     Attributes:
-        label: bore, or X and Y where there is none.
-        marked: whether one of them needs attention.
+        label: bore, else X and Y.
+        marked: needs attention.
     """
 
     x: float
@@ -36,10 +36,10 @@ class MapPlace:
 
 
 def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tuple[MapPlace, ...]:
-    """Return the places of tests; +X is to the right, +Y up.
+    """Return places of tests; +X is right, +Y up.
 
     Args:
-        marked: names of those that need attention.
+        marked: names needing attention.
     """
     at: dict[tuple[int, int], list[PlannedTest]] = {}
     for test in tests.values():

@@ -1,4 +1,4 @@
-"""One figure of measured circles alone, with a title block: what `plot` writes."""
+"""One figure of measured circles with title block, for `plot`."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _GAP_IN = 0.2
 
 
 class PlotKind(StrEnum):
-    """What a figure shows."""
+    """Kinds of figures."""
 
     POLAR = "polar"
     DEVIATION = "deviation"
@@ -60,10 +60,10 @@ TITLES = {
 
 @dataclass(frozen=True, eq=False)
 class PlotPanel:
-    """Runs that are drawn in one picture: both directions of one test in one session.
+    """Runs of one picture: both directions of a test in a session.
 
     Attributes:
-        drawn: runs in drawing order, each with whether it is thin.
+        drawn: in order, each with whether it is thin.
     """
 
     session: str
@@ -74,12 +74,10 @@ class PlotPanel:
 
 @dataclass(frozen=True, eq=False)
 class Plotted:
-    """What goes onto a sheet.
+    """Content of a sheet.
 
     Attributes:
-        kind: what is shown of the circles.
-        found: the circles, of one or more sessions.
-        program: name and version of the program that draws.
+        program: name and version.
     """
 
     kind: PlotKind
@@ -88,10 +86,10 @@ class Plotted:
     program: str
 
     def panels(self) -> list[PlotPanel]:
-        """Return what is drawn, session by session.
+        """Return panels by session.
 
         Raises:
-            StationError: no run shows a circle; sessions are to be compared and only one has circles.
+            StationError: no run shows a circle; a comparison has only one session with circles.
         """
         shown = [one for one in self.found.circles if one.analysis is not None]
         if not shown:
@@ -112,13 +110,13 @@ class Plotted:
         return PlotPanel(session, test, tuple(drawn), len(runs) - len(drawn))
 
     def on_sheet(self) -> list[MeasuredCircle]:
-        """Return the runs that are drawn: of a map all that show a circle, since it draws their mean."""
+        """Return the drawn runs; a map averages all circles."""
         if self.kind is PlotKind.MAP:
             return [one for one in self.found.circles if one.analysis is not None]
         return [one for panel in self.panels() for one, _ in panel.drawn]
 
     def result(self, figure: str) -> PlotResult:
-        """Return what the figure shows: what its command prints as JSON."""
+        """Return the figure's JSON."""
         panels = self.panels()
         return PlotResult(
             figure=figure,
@@ -133,10 +131,10 @@ class Plotted:
 
 
 def plot_figure(plotted: Plotted, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
-    """Return a sheet as a file's bytes, the same for the same circles.
+    """Return a reproducible sheet as bytes.
 
     Raises:
-        StationError: no run shows a circle; sessions are to be compared and only one has circles.
+        StationError: no run shows a circle; a comparison has only one session with circles.
     """
     with in_style(), warnings.catch_warnings():
         # A name in letters that no font here has becomes boxes in PNG and PDF; in SVG the viewer's fonts have them.
@@ -148,7 +146,7 @@ def draw_plot(plotted: Plotted) -> Figure:
     """Draw a sheet.
 
     Raises:
-        StationError: no run shows a circle; sessions are to be compared and only one has circles.
+        StationError: no run shows a circle; a comparison has only one session with circles.
     """
     panels = plotted.panels()
     match plotted.kind:
@@ -171,7 +169,6 @@ def _grid(
     most_columns: int,
     height_over_width: float,
 ) -> Figure:
-    """Panels side by side, row by row."""
     columns = min(most_columns, len(panels))
     rows = -(-len(panels) // columns)
     width_in = NARROW_IN if len(panels) == 1 else WIDE_IN
@@ -187,7 +184,7 @@ def _grid(
 
 
 def _compare(plotted: Plotted, panels: Sequence[PlotPanel]) -> Figure:
-    """Row by row a test: polar traces of each session to one scale, and below them the last runs of all over the angle."""
+    """Draw test by test: sessions' polar traces to one scale, and last runs over the angle."""
     tests = {panel.test: [other for other in panels if other.test == panel.test] for panel in panels}
     columns = max(len(of) for of in tests.values())
     width_in = NARROW_IN if columns <= 2 else WIDE_IN  # noqa: PLR2004 - two stand side by side upright
@@ -233,7 +230,7 @@ def _sheet(plotted: Plotted, width_in: float, room_in: float, panels: Sequence[P
 
 
 def _keys(plotted: Plotted, panels: Sequence[PlotPanel]) -> list[Key]:
-    """Legend: the directions that are drawn, and repeats where there are any."""
+    """Return the legend of directions and repeats."""
     if plotted.kind is PlotKind.MAP:
         return [
             Key("ball", {"color": "#555555", "marker": "o", "markersize": 4.0, "linewidth": 0.0}),
@@ -304,7 +301,6 @@ def _reach_um(drawn: Sequence[Drawn]) -> float:
 
 
 def _drawn(one: MeasuredCircle) -> DrawnCircle:
-    """Figures of a run that stand on the sheet."""
     if one.analysis is None:
         raise ValueError("a run without a circle is on no sheet")
     x, y = one.analysis.centre_mm

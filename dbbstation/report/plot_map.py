@@ -1,4 +1,4 @@
-"""Centres of circles on the table, as arrows from their balls; labels keep off one another."""
+"""Centres of circles as arrows from balls, with separate labels."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ _FAR_IN = 0.25
 def draw_map(
     sheet: Sheet, box: Box, name: str, tests: Mapping[str, PlannedTest], circles: Sequence[MeasuredCircle]
 ) -> None:
-    """Draw the balls of tests and the mean centre of the circles about each; +X is to the right, +Y up.
+    """Draw balls and mean circle centres; +X is right, +Y up.
 
     Args:
-        name: of the panel; empty for none.
-        tests: of the plan, by name.
+        name: of the panel; may be empty.
+        tests: by name.
         circles: of one session, with figures.
     """
     centres_um = _centres_um(circles)
@@ -97,7 +97,7 @@ def _arrow(axes: Axes, tail: np.ndarray, along: np.ndarray, colour: str) -> None
 
 
 def _centres_um(circles: Sequence[MeasuredCircle]) -> dict[str, np.ndarray]:
-    """Mean least-squares centre less the ball of each test, shape (2,) [µm]."""
+    """Return each test's mean centre less ball, shape (2,) [µm]."""
     by_test: dict[str, list[tuple[float, float]]] = {}
     for one in circles:
         if one.analysis is not None:
@@ -106,7 +106,7 @@ def _centres_um(circles: Sequence[MeasuredCircle]) -> dict[str, np.ndarray]:
 
 
 def _places(area: Box, balls_mm: np.ndarray) -> np.ndarray:
-    """Balls on the sheet, to one scale in X and Y, shape (n, 2) [inch]."""
+    """Return balls on the sheet, shape (n, 2) [inch]."""
     middle_mm = 0.5 * (balls_mm.min(axis=0) + balls_mm.max(axis=0))
     spread_mm = max(float(np.ptp(balls_mm, axis=0).max()), 1.0)
     scale = (min(area.width, area.height) - 2.0 * _ROOM_IN) / spread_mm

@@ -1,4 +1,4 @@
-"""Panels of a sheet: both directions of one test, polar, over the angle, and as undulations."""
+"""Panels of a test: polar, over the angle, undulations."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ _SIDE_IN, _FOOT_IN = 0.55, 0.42
 
 
 def draw_polar(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn], reach_um: float | None = None) -> None:
-    """Draw traces about their least-squares circles; rings are one division apart.
+    """Draw traces about least-squares circles; rings are a division apart.
 
     Args:
-        drawn: runs with figures.
-        reach_um: deviation that reaches as far as a trace may; None for the greatest of these [µm].
+        drawn: with figures.
+        reach_um: largest drawn deviation; None: the greatest.
     """
     found = [(one.analysis, thin) for one, thin in drawn if one.analysis is not None]
     most_um = reach_um or max(float(np.abs(analysis.residual_um).max()) for analysis, _ in found)
@@ -88,7 +88,7 @@ def draw_deviation(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) ->
 
 
 def draw_together(sheet: Sheet, box: Box, name: str, runs: Mapping[str, Sequence[MeasuredCircle]]) -> None:
-    """Draw the runs of several sessions over the angle, a colour for each session."""
+    """Draw sessions' runs over the angle, a colour each."""
     axes = _chart(sheet, box, [name], "deviation, µm")
     for colour, (session, of) in zip(_colours(len(runs)), runs.items(), strict=True):
         for k, one in enumerate(of):
@@ -108,7 +108,7 @@ def draw_together(sheet: Sheet, box: Box, name: str, runs: Mapping[str, Sequence
 
 
 def draw_spectrum(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) -> None:
-    """Draw amplitudes by undulations per revolution, and what noise alone would show."""
+    """Draw undulation amplitudes, and noise."""
     spectra = [(one.analysis, spectrum_of(one.analysis), thin) for one, thin in drawn if one.analysis is not None]
     noise = [each.noise_um for _, each, _ in spectra if np.isfinite(each.noise_um)]
     noise_um = float(np.sqrt(np.mean(np.square(noise)))) if noise else float("nan")
@@ -151,7 +151,7 @@ def _turn(axes: Axes) -> None:
 
 
 def _caption(sheet: Sheet, box: Box, lines: Sequence[str]) -> float:
-    """Write lines at the top of a box; return where they end [inch]."""
+    """Write lines at a box's top; return their end [inch]."""
     y = box.bottom + box.height
     for k, line in enumerate(lines):
         size = SMALL_PT if k else TEXT_PT
@@ -162,7 +162,7 @@ def _caption(sheet: Sheet, box: Box, lines: Sequence[str]) -> float:
 
 
 def _figures(drawn: Sequence[Drawn]) -> str:
-    """G of the last run of each direction, in words."""
+    """Return G of each direction's last run, in words."""
     last = [one for one, thin in drawn if not thin and one.analysis is not None]
     return ", ".join(
         f"{budget_of(one.analysis, BudgetQuantity.G, one.known).value_um:.1f} {str(one.entry.direction).upper()}"
@@ -183,12 +183,12 @@ def _style(analysis: CircleAnalysis, *, thin: bool) -> dict[str, Any]:
 
 
 def _colours(count: int) -> list[str]:
-    """As many colours as are needed, none of a direction's; of more than there are some come again."""
+    """Return colours other than the directions', repeated if needed."""
     free = [colour for colour in SET if colour not in {AFTER, BEFORE}]
     return [free[k % len(free)] for k in range(count)]
 
 
 def _written(axes: Axes, x: float, y: float, text: str, ha: str) -> None:
-    """A small text that stays readable over lines."""
+    """Write small text readable over lines."""
     box: Any = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}
     axes.text(x, y, text, fontsize=6.0, ha=ha, va="center", bbox=box, parse_math=False)

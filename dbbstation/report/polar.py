@@ -1,4 +1,4 @@
-"""Polar traces of measured circles as what an SVG needs: points, rings and their labels."""
+"""Polar traces for SVG: points, rings, labels."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ _STEPS = (1.0, 2.0, 5.0)
 
 @dataclass(frozen=True)
 class PolarTrace:
-    """One run as drawn.
+    """One drawn run.
 
     Attributes:
-        points: of the path, as SVG takes them.
+        points: SVG path.
         direction: `ccw` or `cw`.
-        thin: whether it is a repeat of one that is drawn already.
-        name: of the run, in few letters.
-        title: what is shown where the pointer rests on it.
+        thin: a repeat.
+        name: short.
+        title: shown under the pointer.
     """
 
     points: str
@@ -59,15 +59,15 @@ class PolarTrace:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A path to be drawn.
+    """A path to draw.
 
     Attributes:
-        theta_deg: angles, shape (n,) [deg].
-        deviation_um: from its least-squares circle, shape (n,) [µm].
+        theta_deg: shape (n,).
+        deviation_um: from the least-squares circle, shape (n,).
         direction: `ccw` or `cw`.
-        name: in few letters.
-        title: what is shown where the pointer rests on it.
-        thin: whether it is a repeat of one that is drawn already.
+        name: short.
+        title: shown under the pointer.
+        thin: a repeat.
     """
 
     theta_deg: NDArray[np.float64]
@@ -88,7 +88,7 @@ class Ring:
 
     @property
     def label(self) -> str:
-        """The deviation with its sign."""
+        """Return the signed deviation."""
         return f"{self.um:+g}" if self.um else "0"
 
 
@@ -97,9 +97,9 @@ class Polar:
     """The circles of one test.
 
     Attributes:
-        traces: in drawing order.
+        traces: in order.
         rings: nominal circle and one division either way.
-        scale: units of the figure per µm.
+        scale: units per µm.
     """
 
     test: str
@@ -112,10 +112,10 @@ class Polar:
 
 
 def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCircle] = ()) -> Polar:
-    """Return the circles of a test about their least-squares centres, before and now to one scale.
+    """Return a test's circles about their centres, before and now to one scale.
 
     Args:
-        now: its runs with figures, in the order in which they were measured; at least one.
+        now: with figures, in order; at least one.
     """
     drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in chosen(runs)]
     analysed = [(one, one.analysis, former, thin) for one, former, thin in drawn if one.analysis is not None]
@@ -135,10 +135,10 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
 
 
 def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int = 0) -> Polar:
-    """Return any paths of one circle to one scale.
+    """Return paths of one circle to one scale.
 
     Args:
-        paths: in drawing order; at least one.
+        paths: in order; at least one.
     """
     most_um = max(float(np.abs(one.deviation_um).max()) for one in paths)
     scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
@@ -167,17 +167,17 @@ def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int =
 
 
 def step_of(most_um: float) -> float:
-    """Return the largest of 1, 2, 5, 10, ... that is no larger than a deviation [µm]; 0.001 at the least."""
+    """Return the largest of 1, 2, 5, 10, ... up to a deviation [µm], at least 0.001."""
     most_um = max(most_um, 1e-3)
     power = 10.0 ** np.floor(np.log10(most_um))
     return float(max(step for step in _STEPS if step * power <= most_um * (1.0 + 1e-9)) * power)
 
 
 def chosen(runs: Sequence[MeasuredCircle], most: int = MOST_DRAWN) -> list[tuple[MeasuredCircle, bool]]:
-    """Return the runs that are drawn, each with whether it is thin: the last of a direction is not, those before it are.
+    """Return drawn runs; all but a direction's last are thin.
 
     Args:
-        runs: of one test, in the order in which they were measured.
+        runs: of one test, in order.
     """
     drawn: list[tuple[MeasuredCircle, bool]] = []
     for direction in dict.fromkeys(one.entry.direction for one in runs):
@@ -187,7 +187,7 @@ def chosen(runs: Sequence[MeasuredCircle], most: int = MOST_DRAWN) -> list[tuple
 
 
 def _points(theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64], scale: float) -> str:
-    """Return the closed path of a turn; Y is up in the machine and down in SVG."""
+    """Return a turn's closed path, Y inverted for SVG."""
     angle_deg, deviation = thinned(theta_deg, deviation_um)
     theta, radius = np.radians(angle_deg), CIRCLE + scale * deviation
     middle = SIZE / 2
@@ -198,11 +198,11 @@ def _points(theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64], s
 def thinned(
     theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what an eye can see of a turn, in the order of its angles: greatest and least deviation of each stretch.
+    """Return each stretch's extremes, in order of angle.
 
     Args:
-        theta_deg: shape (n,) [deg].
-        deviation_um: shape (n,) [µm].
+        theta_deg: shape (n,).
+        deviation_um: shape (n,).
     """
     order = np.argsort(theta_deg, kind="stable")
     theta, deviation = theta_deg[order], deviation_um[order]
@@ -211,7 +211,7 @@ def thinned(
 
 
 def _extremes(theta: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return where each stretch has its greatest and its least deviation, in the order of the turn."""
+    """Return places of each stretch's extremes in order."""
     stretch = np.minimum((theta / (2.0 * np.pi) * BINS).astype(np.intp), BINS - 1)
     by_size = np.lexsort((deviation, stretch))
     first = np.flatnonzero(np.diff(stretch[by_size], prepend=-1))

@@ -1,4 +1,4 @@
-"""A sheet with one figure: title, legend, room for panels, title block. Places are inches from the lower left corner."""
+"""A sheet with one figure; places in inches from the lower left."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Cell:
     """One cell of a title block.
 
     Attributes:
-        share: of the sheet's width, beside the other cells of its row.
+        share: of the width within its row.
     """
 
     name: str
@@ -52,8 +52,7 @@ class Key:
     """One entry of a legend.
 
     Attributes:
-        text: what the line stands for.
-        style: of the line, as Matplotlib takes it.
+        style: of the line, for Matplotlib.
     """
 
     text: str
@@ -61,16 +60,15 @@ class Key:
 
 
 class Sheet:
-    """A sheet that grows with what stands on it."""
+    """A sheet that grows with its content."""
 
     def __init__(
         self, width_in: float, room_in: float, title: str, keys: Sequence[Key], block: Sequence[Sequence[Cell]]
     ) -> None:
-        """Lay out everything but the panels.
+        """Lay out all but the panels.
 
         Args:
-            width_in: of the sheet [inch].
-            room_in: height that the panels take [inch].
+            room_in: height of panels.
         """
         self.width_in = width_in
         self.inner_in = width_in - 2.0 * MARGIN_IN
@@ -94,7 +92,7 @@ class Sheet:
     def text(
         self, x_in: float, y_in: float, text: str, size_pt: float = TEXT_PT, va: str = "top", color: str = "black"
     ) -> None:
-        """Write a text as it is: dollar signs are no formula."""
+        """Write text literally, dollar signs included."""
         place = x_in / self.width_in, y_in / self.height_in
         self.figure.text(*place, text, fontsize=size_pt, va=va, color=color, parse_math=False)
 
@@ -127,23 +125,21 @@ class Sheet:
 
 
 def line_in(size_pt: float) -> float:
-    """Height of a line of text [inch]."""
+    """Return a line's height [inch]."""
     return _LINE * size_pt / POINTS_PER_INCH
 
 
 def width_of_in(text: str, size_pt: float) -> float:
-    """Width of a text [inch]."""
+    """Return a text's width [inch]."""
     width, _, _ = text_to_path.get_text_width_height_descent(text, FontProperties(size=size_pt), ismath=False)
     return float(width) / POINTS_PER_INCH
 
 
 def wrapped(text: str, size_pt: float, width_in: float, most: int) -> list[str]:
-    """Return a text in lines no wider than a width, the last with an ellipsis where more is left.
+    """Return a text in lines, cut with an ellipsis.
 
     Args:
-        text: of one paragraph; white space of any kind is a space.
-        size_pt: of its letters [pt].
-        width_in: of the lines [inch].
+        text: one paragraph.
     """
     rest, lines = " ".join(text.split()), list[str]()
     while rest and len(lines) < most:
@@ -181,7 +177,7 @@ def _rows(keys: Sequence[Key], width_in: float) -> list[list[tuple[float, Key]]]
 
 
 def _cells(row: Sequence[Cell], width_in: float) -> tuple[float, list[tuple[float, float, str, list[str]]]]:
-    """Height of a row, and place, width, name and lines of its cells."""
+    """Return a row's height, and place, width, name and lines of its cells."""
     whole = sum(cell.share for cell in row)
     x, cells = 0.0, list[tuple[float, float, str, list[str]]]()
     for cell in row:

@@ -1,4 +1,4 @@
-"""What the page of a report shows beside its numbers."""
+"""The report page's content beside numbers."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class ShownSession:
     """A session as the page shows it.
 
     Attributes:
-        identity: what machine, bar and the like are, each with its name.
-        known: whether the places of the balls are.
+        identity: machine, bar and others, by name.
+        known: whether ball places are known.
     """
 
     name: str
@@ -36,9 +36,9 @@ class ShownCauses:
     """Causes as the page shows them.
 
     Attributes:
-        session: whose circles they act on.
-        why_not: why there are none; empty where there are.
-        polars: circles without the first cause.
+        session: of the circles.
+        why_not: may be empty.
+        polars: without the first cause.
     """
 
     session: str
@@ -52,9 +52,9 @@ class ShownFindings:
     """Findings as the page shows them.
 
     Attributes:
-        wrong: session, run and finding of each that is beyond its limit.
-        undecided: name, text and runs of those that cannot be decided.
-        good: how many keep their limits.
+        wrong: session, run and finding.
+        undecided: name, text and runs.
+        good: number.
     """
 
     wrong: Sequence[tuple[str, str, Finding]]
@@ -67,9 +67,9 @@ class ShownModel:
     """A model as the page shows it.
 
     Attributes:
-        problem: why it could not be evaluated; empty where it could.
-        failed: whether physics is missing from it.
-        parameters: rows of their table.
+        problem: may be empty.
+        failed: whether physics is missing.
+        parameters: rows.
     """
 
     problem: str
@@ -81,16 +81,15 @@ class ShownModel:
 
 @dataclass(frozen=True, eq=False)
 class ReportContent:
-    """What the template of a report names beside its numbers.
+    """Content of the report's template.
 
     Attributes:
-        virtual: names of sessions of a virtual machine.
-        reasons_shown: how many reasons of the verdict the first page has.
-        ranking: causes; None without a model.
-        before_name: session that was measured before; empty for none.
-        several: whether there is more than one session.
-        modelled: a model beside the circles; None for none.
-        files: name and SHA-256 of every file that the report rests on.
+        virtual: names of virtual sessions.
+        reasons_shown: on the first page.
+        ranking: None without a model.
+        before_name: earlier session; may be empty.
+        modelled: or None.
+        files: name and SHA-256 of every underlying file.
     """
 
     machine: str

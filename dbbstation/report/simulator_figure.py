@@ -1,4 +1,4 @@
-"""Figure of a simulator in the loop: what it leaves before and after, over time and over the leading signal, and held-out errors."""
+"""Figure of a simulator: residual before and after, and held-out errors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_POINTS = 2000
 
 
 def simulator_figure(answer: SimulatorComparison, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
-    """Draw measured less simulated values, refitted and corrected, and the held-out error of every part."""
+    """Draw refitted and corrected differences, and each part's held-out error."""
     with in_style():
         figure = Figure(figsize=(7.2, 6.4), layout="constrained")
         grid = figure.add_gridspec(2, 2)
@@ -43,7 +43,7 @@ def _over_time(axes: Axes, answer: SimulatorComparison) -> None:
 
 
 def _over_signal(axes: Axes, answer: SimulatorComparison) -> None:
-    """Over the signal that leads the first term; over the simulated value where the port is not called at the rows."""
+    """Draw over the first term's signal, or the simulated value."""
     name, values = "simulated value", answer.work.measured - answer.as_simulated * answer.work.scale
     if answer.terms and answer.terms[0].signals:
         term = answer.terms[0]

@@ -1,4 +1,4 @@
-"""A figure's bytes as SVG: the same for the same figure, and no longer than what the eye can see needs."""
+"""Reproducible SVG bytes no longer than visible."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _NUMBER = re.compile(rb"-?\d+\.\d+")
 
 
 def as_svg(figure: Figure, metadata: Mapping[str, Any] | None = None) -> bytes:
-    """Return the figure's bytes, the same for the same figure.
+    """Return reproducible bytes.
 
-    Straight paths and places are given to a tenth of a point, round ones to a hundredth. The layout's solver rounds as
-    memory happens to lie; clipping frames, whose names are hashes of all digits, are therefore counted in their order.
+    Straight paths are rounded to a tenth of a point, round ones to a hundredth. Clipping frames, named by hashes of all
+    digits, are renumbered, since the layout's rounding varies.
 
     Args:
-        metadata: as Matplotlib takes it for SVG: names of Dublin Core.
+        metadata: Dublin Core names for Matplotlib.
     """
     out = io.BytesIO()
     figure.savefig(out, format="svg", metadata={"Date": None, **(metadata or {})})
@@ -45,16 +45,16 @@ def _rounded(number: re.Match[bytes]) -> bytes:
 
 
 def _shorter(path: bytes) -> bytes:
-    """Rewrite a path of straight pieces as steps from point to point; others keep their form."""
+    """Rewrite straight paths as steps."""
     if not _POLYGON.fullmatch(path):
         return _FURTHER_DIGITS.sub(rb"\1", path)
     return "".join(_steps(path.decode().split())).replace(" -", "-").encode()
 
 
 def _steps(words: list[str]) -> Iterator[str]:
-    """Steps between rounded points, so that roundings do not add up; points that fall together are one.
+    """Return steps between rounded points, without repeated points.
 
-    The letter of a step holds for those that follow; a path of one point keeps a step to itself, which is a dot.
+    A step's letter holds for the next ones; a single point keeps a step as a dot.
     """
     at, before, k = (0, 0), "", 0
     while k < len(words):

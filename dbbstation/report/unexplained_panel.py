@@ -1,4 +1,4 @@
-"""Panel of an unmodelled effect: its curve with a band of two standard uncertainties."""
+"""An unmodelled effect's curve with a band of two standard uncertainties."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SENSES = {-1.0: "shortening", 1.0: "lengthening"}
 
 
 def draw_unexplained(part: SubFigure, curve: Curve) -> None:
-    """Draw one curve; two signs of travel are two points with bars, nothing lies between them."""
+    """Draw one curve; signs of travel are two points with bars."""
     axes: Axes = part.subplots()
     at, value, sigma = _between(curve)
     if curve.unit == "sign":
@@ -54,7 +54,7 @@ WHOSE = {EVERY: EVERY, SIGNED: EVERY, PULL: "every strut by a pull", TOWARDS: "e
 
 
 def _between(curve: Curve) -> tuple[NDArray[np.float64], ...]:
-    """Places, values and uncertainties to draw, shape (n,) each: those of the points, of a wave also between them [µm]."""
+    """Return places, values and uncertainties, shape (n,) each, interpolated for waves [µm]."""
     at, value, sigma = np.array([(p.at, p.value_um, p.uncertainty_um) for p in curve.points]).T
     if curve.period_mm is None or len(at) < 3:  # noqa: PLR2004 (amplitudes need as many points)
         return at, value, sigma

@@ -1,4 +1,4 @@
-"""What every new run of a session is held against: the runs before it, and where its circle should lie."""
+"""Judge new runs against earlier ones and expectation."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class JudgedRun:
-    """What a run of the session says, and the verdict on it.
+    """A run's content and verdict.
 
     Attributes:
         completed: figures and findings.
-        reason: why it does not; empty where it does.
+        reason: of a rejection; may be empty.
     """
 
     completed: events.RunCompleted
@@ -42,12 +42,12 @@ class JudgedRun:
 
 
 class RunJudge:
-    """Judges runs beside those that count; an observer of the station, which learns of verdicts.
+    """Judges runs beside counted ones; an observer of the station.
 
     Args:
-        writer: of the session; its accepted and rejected runs are read and analysed now.
-        programs: NC program by test and direction.
-        model: of the machine, which says where circles are expected; None: the nominal machine does.
+        writer: its judged runs are read now.
+        programs: by test and direction.
+        model: gives expected circles; None: the nominal machine.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class RunJudge:
                 self._read(entry, kept[entry.state])
 
     def __call__(self, event: Event) -> None:
-        """Learn which runs count."""
+        """Note which runs count."""
         if not isinstance(event, events.RunAccepted | events.RunRejected):
             return
         key = _key(event.run)
@@ -85,7 +85,7 @@ class RunJudge:
                     self._rejected[key] = known.pop(key)
 
     def known(self) -> tuple[JudgedRun, ...]:
-        """Return what judged runs say, from disk: figures and findings of each beside those that count."""
+        """Return figures and findings of judged runs from disk."""
         together = SessionRuns(list(self._counting.values()), self._together)
         found = []
         for entry in self._writer.runs:
@@ -102,10 +102,10 @@ class RunJudge:
         return tuple(found)
 
     def judge(self, run: RunId, recording: Recording) -> tuple[Finding, ...]:
-        """Return all findings of a run that has just been recorded.
+        """Return a new run's findings.
 
         Args:
-            run: which run; storage may not have heard of it yet.
+            run: storage may not know it yet.
         """
         entry = RunEntry(
             test=run.test,
@@ -127,7 +127,7 @@ class RunJudge:
         return self._together.judge(new).findings
 
     def _read(self, entry: RunEntry, into: dict[tuple[str, Direction, int], Seen]) -> None:
-        """Take in a run that was recorded before; one that cannot be read is told of by who reads it for its figures."""
+        """Take in a recorded run; unreadable ones are reported elsewhere."""
         try:
             recording = self._writer.session.load(entry).recording
         except InputError:

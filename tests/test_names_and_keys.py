@@ -81,13 +81,17 @@ def test_counts_find_what_they_look_for():
 
 
 def starts_the_command_line(tree):
-    """Whether a list of words begins a process of the command line: `python -m dbbstation`."""
-    words = [
-        [one.value for one in node.elts if isinstance(one, ast.Constant)]
+    """Whether a process of the command line is begun: `python -m dbbstation`, or `python_module("dbbstation")`."""
+    lists = [node.elts for node in ast.walk(tree) if isinstance(node, ast.List | ast.Tuple)]
+    calls = [
+        node.args
         for node in ast.walk(tree)
-        if isinstance(node, ast.List | ast.Tuple)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "python_module"
     ]
-    return any("-m" in one and "dbbstation" in one for one in words)
+    words = [{one.value for one in found if isinstance(one, ast.Constant)} for found in lists]
+    return any(one >= {"-m", "dbbstation"} for one in words) or any(
+        isinstance(one, ast.Constant) and one.value == "dbbstation" for found in calls for one in found
+    )
 
 
 def test_nobody_but_the_demonstration_starts_the_command_line(trees):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.nc.curve import Behind
+    from dbbstation.nc.curve import SpanBehind
     from dbbstation.nc.planner import Planner
     from dbbstation.nc.toolpath import Toolpath
 
@@ -133,7 +133,7 @@ def compensate_toolpath(
     whole = np.zeros(len(toolpath), dtype=np.bool_)
     if keep_arcs and toolpath.arc is not None:
         whole = toolpath.arc[:, 2] != 0.0
-    before: Behind | None = None
+    before: SpanBehind | None = None
     short: dict[int, float] = {}
     tilt_left_mm = 0.0
     parts = []

@@ -28,7 +28,7 @@ HOLDING = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Behind:
+class SpanBehind:
     """What a part of a toolpath leaves to the next one.
 
     Attributes:
@@ -59,7 +59,7 @@ class CommandCurve:
         started_s: float | None,
         *,
         hold_tilt: bool = False,
-        before: Behind | None = None,
+        before: SpanBehind | None = None,
     ) -> None:
         self.toolpath = toolpath
         self._model = model
@@ -124,7 +124,7 @@ class CommandCurve:
             parts.append(part)
         commands = np.concatenate(parts)
         if passed is not None:
-            self.behind = Behind(commands[-1], passed)
+            self.behind = SpanBehind(commands[-1], passed)
         return commands
 
     def _stretch(self, passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64], Passed]:

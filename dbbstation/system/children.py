@@ -18,11 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-_APART: dict[str, Any] = (
-    {"start_new_session": True}
-    if hasattr(os, "setsid")
-    else {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
-)
+_SESSION = hasattr(os, "setsid")
+_FLAGS = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 """A group of its own, so that Ctrl-C at the terminal reaches only those who end the group."""
 
 _LOOK_S = 0.2
@@ -52,7 +49,7 @@ class ProgramBounds:
 
 
 @dataclass(frozen=True)
-class Ended:
+class ProgramEnd:
     """How a program ended.
 
     Attributes:
@@ -82,7 +79,7 @@ def python_module(name: str, *words: str) -> list[str]:
     return [sys.executable, "-P", "-m", name, *words]
 
 
-def run_bounded(command: Sequence[str], folder: Path, bounds: ProgramBounds) -> Ended:
+def run_bounded(command: Sequence[str], folder: Path, bounds: ProgramBounds) -> ProgramEnd:
     """Run a program to its end.
 
     Args:
@@ -95,7 +92,13 @@ def run_bounded(command: Sequence[str], folder: Path, bounds: ProgramBounds) -> 
         OSError: it cannot be started.
     """
     process = subprocess.Popen(  # noqa: S603 - what the user named, or a browser
-        command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **_APART
+        command,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=_SESSION,
+        creationflags=_FLAGS,
     )
     outputs = [_Output(stream, bounds.output_mb) for stream in (process.stdout, process.stderr) if stream is not None]
     try:
@@ -104,7 +107,7 @@ def run_bounded(command: Sequence[str], folder: Path, bounds: ProgramBounds) -> 
         end_tree(process)
         for output in outputs:
             output.close()
-    return Ended(process.returncode, outputs[-1].tail.decode("utf-8", "replace"))
+    return ProgramEnd(process.returncode, outputs[-1].tail.decode("utf-8", "replace"))
 
 
 def _watch(process: subprocess.Popen[bytes], folder: Path, bounds: ProgramBounds, outputs: Sequence[_Output]) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dbbstation.circles.strip import strip_widths
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
@@ -32,6 +33,7 @@ def prepare() -> None:
     for one in (MachineModel(machine), model):
         one.actual(motion)
         one.bar(motion).by_source(joints.source, machine, joints.values)
+    strip_widths(np.ones((1, 8)), np.zeros((1, 8)), np.arange(0.0, 360.0, 45.0))
 
 
 if __name__ == "__main__":

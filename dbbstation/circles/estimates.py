@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.circles.extremes import (
     DrawnPath,
     Estimate,
-    drawn_path,
+    drawn_paths,
     estimated,
     farthest_of,
     greatest_of,
@@ -46,12 +46,10 @@ def estimate_of(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate | Non
 
 
 _FOUND: WeakKeyDictionary[CircleAnalysis, dict[BudgetQuantity, Estimate]] = WeakKeyDictionary()
-_DRAWN: WeakKeyDictionary[CircleAnalysis, dict[int, tuple[NDArray[np.float64], DrawnPath]]] = WeakKeyDictionary()
-"""Worked out once: tables, budgets and tolerances ask for them."""
 
 
 def _estimate(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate:
-    _, drawn = _drawn(one, OF_A_CIRCLE)
+    drawn = _drawn(one).alone
     radius_um, deviation_um = one.radius_error_um, 1e3 * one.path.least_squares.deviation_mm
     match quantity:
         case BudgetQuantity.G:
@@ -102,21 +100,30 @@ OF_A_CIRCLE = 2
 """Lines of the spectrum that the least-squares circle takes: radius and centre, whose noise the deviations from it do not have."""
 
 
-def _drawn(one: CircleAnalysis, taken: int) -> tuple[NDArray[np.float64], DrawnPath]:
-    """Return a circle's form, shape (n,) [µm], and drawn noise, independent by direction.
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """Form by samples, shape (n,) [µm], and drawn noise of a circle: about its own least-squares circle, and about that of both directions."""
 
-    Args:
-        taken: noise lines from 0 that fits removed.
-    """
-    known = _DRAWN.setdefault(one, {})
-    if taken not in known:
+    form_um: NDArray[np.float64]
+    alone: DrawnPath
+    beside: DrawnPath
+
+
+def _drawn(one: CircleAnalysis) -> _Drawn:
+    """Draw noise of a circle: each direction has draws of its own, as both stand beside each other in a pair."""
+    if one not in _DRAWN:
         apart = _apart(one)
         form_um = _filtered(apart.form_um, one.chosen)
         passed = one.chosen.passed(np.arange(len(form_um) // 2 + 1.0))
-        passed[:taken] = 0.0
         seed = int(one.raw.circle.direction.sign > 0)
-        known[taken] = form_um, drawn_path(replace(apart, form_um=form_um), one.path.theta_deg, passed, seed)
-    return known[taken]
+        own = replace(apart, form_um=form_um)
+        alone, beside = drawn_paths(own, one.path.theta_deg, passed, seed, (OF_A_CIRCLE, 0))
+        _DRAWN[one] = _Drawn(form_um, alone, beside)
+    return _DRAWN[one]
+
+
+_DRAWN: WeakKeyDictionary[CircleAnalysis, _Drawn] = WeakKeyDictionary()
+"""Worked out once: tables, budgets and tolerances ask for it."""
 
 
 def pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate | None:
@@ -138,10 +145,10 @@ def _pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate:
     paths = []
     split = np.split(1e3 * pair.together.least_squares.deviation_mm, [len(pair.one.raw)])
     for one, deviation_um in zip((pair.one, pair.other), split, strict=True):
-        form_um, drawn = _drawn(one, 0)
+        drawn = _drawn(one)
         # Seen from the circle of both, radius and centre of each are form.
         beside_um = deviation_um - 1e3 * one.path.least_squares.deviation_mm
-        paths.append(drawn.with_form(form_um + beside_um))
+        paths.append(drawn.beside.with_form(drawn.form_um + beside_um))
     if quantity is BudgetQuantity.G_BOTH:
         return estimated(paths, strip_widths, pair.g_um)
     return estimated(paths, range_of, pair.g_least_squares_um)
@@ -163,4 +170,4 @@ def _hysteresis(pair: PairAnalysis) -> Estimate:
     chosen = pair.one.chosen
     passed = chosen.passed(np.arange(len(theta_deg) // 2 + 1.0))
     own = replace(apart, form_um=_filtered(apart.form_um, chosen))
-    return estimated([drawn_path(own, theta_deg, passed, 2)], farthest_of, pair.h_um)
+    return estimated(drawn_paths(own, theta_deg, passed, 2), farthest_of, pair.h_um)

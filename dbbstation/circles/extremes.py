@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.circles.form import drawn_noise
+from dbbstation.circles.form import drawn_lines
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
@@ -92,46 +92,76 @@ class DrawnPath:
         return replace(self, form_um=_means(form_um, self.order, self.starts))
 
 
-def drawn_path(
-    apart: FormAndNoise, theta_deg: NDArray[np.float64], passed: NDArray[np.float64], seed: int
-) -> DrawnPath:
-    """Draw noise of a path.
+def drawn_paths(
+    apart: FormAndNoise,
+    theta_deg: NDArray[np.float64],
+    passed: NDArray[np.float64],
+    seed: int,
+    taken: Sequence[int] = (0,),
+) -> tuple[DrawnPath, ...]:
+    """Draw noise of a path: the same draws less their first lines, for each of several numbers of these.
 
     Args:
-        apart: form, already filtered, and noise, in time order.
-        theta_deg: shape (n,).
-        passed: transmitted amplitude of noise by line, shape (n // 2 + 1,).
+        apart: form and noise of its deviations, in time order; the form filtered already.
+        theta_deg: angles of its samples, shape (n,) [deg].
+        passed: share of the noise's amplitude that the figure's filter lets pass, by line, shape (n // 2 + 1,).
+        taken: lines of the noise, from 0, that are taken out of the deviations.
     """
     count = len(theta_deg)
-    power = apart.power_um2 * passed**2
+    order, starts, middle_deg = _sectors(theta_deg, passed)
+    rng = np.random.default_rng([SEED, seed])
+    extremes: list[list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = [[] for _ in taken]
+    for _ in range(BLOCKS):  # long recordings would take much memory at once
+        lines = drawn_lines(apart, passed, DRAWS // BLOCKS, rng)
+        noise = np.fft.irfft(lines, count, axis=1)[:, order]
+        for each, first in zip(extremes, taken, strict=True):
+            left = noise - _waves(lines[:, :first], order, count) if first else noise
+            each.append((np.maximum.reduceat(left, starts, axis=1), np.minimum.reduceat(left, starts, axis=1)))
+    found = []
+    for each, first in zip(extremes, taken, strict=True):
+        left_passed = np.where(np.arange(len(passed)) < first, 0.0, passed)
+        power = apart.power_um2 * left_passed**2
+        found.append(
+            DrawnPath(
+                form_um=_means(apart.form_um, order, starts),
+                highest_um=np.concatenate([highest for highest, _ in each]),
+                lowest_um=np.concatenate([lowest for _, lowest in each]),
+                theta_deg=middle_deg,
+                sigma_um=float(np.sqrt((2.0 * power.sum() - power[0]) / count)),
+                least=_least_share(apart.power_um2, left_passed),
+                order=order,
+                starts=starts,
+            )
+        )
+    return tuple(found)
+
+
+def _sectors(
+    theta_deg: NDArray[np.float64], passed: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return samples by angle, where each sector begins among them, and its middle; arguments as of `drawn_paths`."""
+    count = len(theta_deg)
     # Undulations up to which the filter passes a hundredth of the noise's power.
     points = POINTS_PER_UNDULATION * int(np.flatnonzero(passed > PASSED).max(initial=1))
     theta = np.mod(theta_deg, FULL_TURN_DEG)
     if points < min(count, SECTORS):
         order = np.arange(0, count, count // points)
         order = order[np.argsort(theta[order], kind="stable")]
-        starts, middle_deg = np.arange(len(order)), theta[order]
-    else:
-        sectors = min(SECTORS, count)
-        order = np.argsort(theta, kind="stable")
-        sector = np.minimum((theta[order] * (sectors / FULL_TURN_DEG)).astype(np.int64), sectors - 1)
-        starts = np.flatnonzero(np.diff(sector, prepend=-1))
-        middle_deg = (sector[starts] + 0.5) * (FULL_TURN_DEG / sectors)
-    rng = np.random.default_rng([SEED, seed])
-    highest, lowest = [], []
-    for _ in range(BLOCKS):  # long recordings would take much memory at once
-        noise = drawn_noise(apart, passed, DRAWS // BLOCKS, rng)[:, order]
-        highest.append(np.maximum.reduceat(noise, starts, axis=1))
-        lowest.append(np.minimum.reduceat(noise, starts, axis=1))
-    return DrawnPath(
-        form_um=_means(apart.form_um, order, starts),
-        highest_um=np.concatenate(highest),
-        lowest_um=np.concatenate(lowest),
-        theta_deg=middle_deg,
-        sigma_um=float(np.sqrt((2.0 * power.sum() - power[0]) / count)),
-        least=_least_share(apart.power_um2, passed),
-        order=order,
-        starts=starts,
+        return order, np.arange(len(order)), theta[order]
+    sectors = min(SECTORS, count)
+    order = np.argsort(theta, kind="stable")
+    sector = np.minimum((theta[order] * (sectors / FULL_TURN_DEG)).astype(np.int64), sectors - 1)
+    starts = np.flatnonzero(np.diff(sector, prepend=-1))
+    return order, starts, (sector[starts] + 0.5) * (FULL_TURN_DEG / sectors)
+
+
+def _waves(lines: NDArray[np.complex128], at: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+    """Return what the first lines of spectra, as of `numpy.fft.rfft`, add to some of their n samples, shape (draws, samples)."""
+    undulations = np.arange(lines.shape[1])
+    angles = np.outer(undulations, at) * (2.0 * np.pi / count)
+    share = np.where(undulations > 0, 2.0, 1.0) / count
+    return np.asarray(
+        np.hstack([share * lines.real, -share * lines.imag]) @ np.vstack([np.cos(angles), np.sin(angles)])
     )
 
 

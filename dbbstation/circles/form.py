@@ -130,18 +130,17 @@ def _averaged(power: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(of > 0.0, total / np.maximum(of, 1.0), everywhere)
 
 
-def drawn_noise(
+def drawn_lines(
     apart: FormAndNoise, passed: NDArray[np.float64], draws: int, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    """Return drawn noise, shape (draws, n) [µm].
+) -> NDArray[np.complex128]:
+    """Draw spectra of noise that the readings may have, as of `numpy.fft.rfft`, shape (draws, n // 2 + 1) [µm].
 
     Args:
-        passed: transmitted amplitude by line, shape (n // 2 + 1,).
+        passed: share of the amplitude that a filter lets pass, by line, shape (n // 2 + 1,).
     """
-    count = len(apart.form_um)
-    lines = np.fft.rfft(apart.pushes.drawn(rng, draws, count), axis=1)
+    lines = np.fft.rfft(apart.pushes.drawn(rng, draws, len(apart.form_um)), axis=1)
     below = apart.continued.drawn(rng, draws)
     seen = below.shape[1]
     lines[:, :seen] *= np.sqrt(below) * passed[:seen]
     lines[:, seen:] *= np.sqrt(apart.power_um2[seen:]) * passed[seen:]
-    return np.asarray(np.fft.irfft(lines, count, axis=1))
+    return lines

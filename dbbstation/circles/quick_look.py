@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.optimize import minimize_scalar
 
 from dbbstation.circles.noise import LEAST_UM
 from dbbstation.circles.signatures import Signature, SignatureColumn, cyclic_shapes, shapes_of
@@ -290,6 +289,8 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
     coarse = max((trial(float(periods)) for periods in PERIODS), key=lambda one: one.gained)
     near = diameter_mm / coarse.period_mm
     step = float(PERIODS[1] - PERIODS[0])
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415 - takes a quarter of a second; few ask for a quick look
+
     fine = minimize_scalar(lambda periods: -trial(periods).gained, bounds=(near - step, near + step), method="bounded")
     found = max(coarse, trial(float(fine.x)), key=lambda one: one.gained)
     gained, size, waves, beside = found.gained, found.size, found.waves, found.beside

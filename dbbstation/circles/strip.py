@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.machine.compiled import compiled, inlined
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -31,27 +33,75 @@ def strip_widths(
         theta_deg: rising, shape (angles,).
     """
     theta = np.radians(theta_deg)
-    waves = np.vstack([np.ones(len(theta)), np.cos(theta), np.sin(theta)])
     points = _first_points(outer, inner, theta_deg)
-    signs = np.array([1.0, -1.0, 1.0, -1.0])
     width = np.full(len(outer), np.inf)
-    going = np.arange(len(outer))  # draws whose bounds are still apart
-    for _ in range(MOST_ROUNDS):
-        rows = np.arange(len(going))
-        heights = np.where(signs > 0.0, outer[rows[:, None], points], inner[rows[:, None], points])
-        columns = np.concatenate([waves.T[points], np.broadcast_to(signs, (len(rows), 4))[:, :, None]], axis=2)
-        found = np.linalg.solve(columns, heights[:, :, None])[:, :, 0]
-        circle = found[:, :3] @ waves
-        above, below = outer - circle, circle - inner
-        highest, lowest = above.argmax(axis=1), below.argmax(axis=1)
-        out, into = above[rows, highest], below[rows, lowest]
-        width[going] = np.minimum(width[going], out + into)
-        apart = width[going] - 2.0 * found[:, 3] > REACHED * width[going]
-        if not apart.any():
-            break
-        points = _exchanged(points, np.where(out > into, highest, lowest), out > into)[apart]
-        going, outer, inner = going[apart], outer[apart], inner[apart]
+    _exchange(np.ascontiguousarray(outer), np.ascontiguousarray(inner), np.cos(theta), np.sin(theta), points, width)
     return width
+
+
+@compiled
+def _exchange(
+    outer: NDArray[np.float64],
+    inner: NDArray[np.float64],
+    cosine: NDArray[np.float64],
+    sine: NDArray[np.float64],
+    points: NDArray[np.int64],
+    width: NDArray[np.float64],
+) -> None:
+    """Exchange points of each draw, shape (draws, 4), until both bounds agree; its width, shape (draws,), is written."""
+    above, below = np.empty(len(cosine)), np.empty(len(cosine))
+    rows = np.empty((4, 5))
+    for draw in range(len(outer)):
+        high, low, four = outer[draw], inner[draw], points[draw]
+        for _ in range(MOST_ROUNDS):
+            for k in range(4):
+                point, side = four[k], 1.0 - 2.0 * (k % 2)
+                rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = 1.0, cosine[point], sine[point], side
+                rows[k, 4] = high[point] if side > 0.0 else low[point]
+            _solve(rows)
+            for k in range(len(cosine)):
+                circle = rows[0, 4] + rows[1, 4] * cosine[k] + rows[2, 4] * sine[k]
+                above[k], below[k] = high[k] - circle, circle - low[k]
+            highest, lowest = np.argmax(above), np.argmax(below)
+            out, into = above[highest], below[lowest]
+            width[draw] = min(width[draw], out + into)
+            if not width[draw] - 2.0 * rows[3, 4] > REACHED * width[draw]:
+                break
+            _put(four, int(highest if out > into else lowest), 0 if out > into else 1)
+
+
+@inlined
+def _solve(rows: NDArray[np.float64]) -> None:
+    """Solve four linear equations with four unknowns, whose right side is the last column: the solution takes its place."""
+    for column in range(4):
+        best = column
+        for row in range(column + 1, 4):
+            if abs(rows[row, column]) > abs(rows[best, column]):
+                best = row
+        for k in range(5):
+            rows[column, k], rows[best, k] = rows[best, k], rows[column, k]
+        for row in range(4):
+            if row != column:
+                share = rows[row, column] / rows[column, column]
+                for k in range(column, 5):
+                    rows[row, k] -= share * rows[column, k]
+    for row in range(4):
+        rows[row, 4] /= rows[row, row]
+
+
+@inlined
+def _put(four: NDArray[np.int64], new: int, kind: int) -> None:
+    """Put a new point in the place of the one of its kind, 0 outside, 1 inside, with which no point of the other kind lies between."""
+    first, second = four[1 - kind], four[3 - kind]
+    most = new
+    for k in range(4):
+        if four[k] == new:
+            return
+        most = max(most, four[k])
+    # Whether it lies on the arc from the first of the other kind to the second, in the order of the angles round the turn.
+    size = 1 + most
+    is_inside = (new - first) % size <= (second - first) % size
+    four[(2 if is_inside else 0) if kind == 0 else (1 if is_inside else 3)] = new
 
 
 def _first_points(
@@ -70,17 +120,3 @@ def _first_points(
             for k in range(4)
         ]
     )
-
-
-def _exchanged(points: NDArray[np.int64], new: NDArray[np.int64], outside: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Exchange a new point for its kind's adjacent one."""
-    other_low = np.where(outside, points[:, 1], points[:, 0])
-    other_high = np.where(outside, points[:, 3], points[:, 2])
-    # Whether it lies on the arc from the first of the other kind to the second, in the order of the angles round the turn.
-    size = 1 + np.maximum(points.max(axis=1), new)
-    inside = np.mod(new - other_low, size) <= np.mod(other_high - other_low, size)
-    place = np.where(outside, np.where(inside, 2, 0), np.where(inside, 1, 3))
-    place_is_free = ~np.any(points == new[:, None], axis=1)
-    changed = points.copy()
-    changed[np.flatnonzero(place_is_free), place[place_is_free]] = new[place_is_free]
-    return changed

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.circles.analysis import analyse, analyse_pair
+from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import SetUpKnowledge
 from dbbstation.circles.path import Filter
 from dbbstation.errors import InputError, Problem, TraceError
@@ -165,9 +165,13 @@ def _measured(
     session: SessionFolder, run: RunEntry, recording: Recording, chosen: Filter, judgement: Judgement | None
 ) -> MeasuredCircle:
     known = _known(session, run, recording)
+    corrected = _corrected(session, recording)
     try:
-        named = replace(_corrected(session, recording), name=run.label)
-        analysis = analyse(cut(named, session.circle(run)), named, chosen)
+        if judgement is not None and judgement.analysis is not None and corrected is recording:
+            analysis = refiltered(judgement.analysis, chosen)
+        else:
+            named = replace(corrected, name=run.label)
+            analysis = analyse(cut(named, session.circle(run)), named, chosen)
     except TraceError as error:
         problem = f"{error.what}; {error.remedy}" if error.remedy else error.what
         return MeasuredCircle(session.name, run, None, problem, known, judgement)

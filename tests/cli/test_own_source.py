@@ -18,7 +18,7 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.base import Mechanism
-from tests.plant.plan import table_ii_plan
+from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record, true_runs
 
 EXAMPLE = shipped_folder("fixtures") / "sources" / "scale_bow.py"
@@ -38,10 +38,10 @@ class BowedScales(Mechanism):
         return 1e-3 * BOW_UM * ((driven_mm - 840.0) / 540.0) ** 2  # travel of the reference machine: 300 to 1380 mm
 
 
-@pytest.fixture(scope="module")
-def bowed(tmp_path_factory):
+@pytest.fixture(scope="module", params=[EIGHT, pytest.param("abcdefghijklmno", marks=pytest.mark.nightly)])
+def bowed(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bowed") / "session"
-    record(folder, seed=41, mechanisms=[BowedScales()], rate_hz=10.0)
+    record(folder, seed=41, plan=subset(table_ii_plan(41), request.param), mechanisms=[BowedScales()], rate_hz=10.0)
     return folder
 
 

@@ -8,26 +8,33 @@ from dbbstation.diagnosis.findings import Verdict
 from dbbstation.tasks.diagnose import diagnose_sessions
 from tests.plant.mechanisms.disturbances import BarScale, BumpedJig
 from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
+ALL = "abcdefghijklmno"
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 
 
-def diagnosed(folder, hidden, candidates, seed, rate_hz):
-    record(folder, seed=seed, mechanisms=[KINEMATICS, hidden], rate_hz=rate_hz)
+def diagnosed(folder, hidden, candidates, seed, tests, rate_hz):
+    plan = subset(table_ii_plan(seed), tests)
+    record(folder, seed=seed, plan=plan, mechanisms=[KINEMATICS, hidden], rate_hz=rate_hz)
     return diagnose_sessions([folder], candidates, (), lambda _: None)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rate_hz", [4.0, pytest.param(10.0, marks=pytest.mark.nightly)])
-def test_a_bent_scale_is_identified_by_tests_that_were_held_out(tmp_path, rate_hz):
-    found = diagnosed(tmp_path / "s", BarScale(curved_um=2.0), ("bar-scale", "joint-runout"), 1509, rate_hz).diagnosis
+@pytest.mark.parametrize(
+    ("tests", "parts", "rate_hz"), [(EIGHT, 8, 5.0), pytest.param(ALL, 10, 10.0, marks=pytest.mark.nightly)]
+)
+def test_a_bent_scale_is_identified_by_tests_that_were_held_out(tmp_path, tests, parts, rate_hz):
+    found = diagnosed(
+        tmp_path / "s", BarScale(curved_um=2.0), ("bar-scale", "joint-runout"), 1509, tests, rate_hz
+    ).diagnosis
     scale = next(f for f in found.sources if f.name == "bar-scale")
     assert scale.verdict is Verdict.IDENTIFIED
     bow = scale.parameters["curved_um"]
     assert bow.value == pytest.approx(2.0, abs=4.0 * bow.uncertainty)
     assert bow.uncertainty < 0.5
-    assert len(scale.gains.parts) == 10
+    assert len(scale.gains.parts) == parts
     assert scale.gains.predicts
     assert not found.chosen_anew.is_worse
 
@@ -38,18 +45,20 @@ FEW = ("jig-bump", "bar-scale", "bar-drift", "backlash", "gravity", "platform-jo
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("candidates", "rate_hz"), [(FEW, 4.0), pytest.param(None, 10.0, marks=pytest.mark.nightly)], ids=["few", "all"]
+    ("candidates", "tests", "bumped", "rate_hz"),
+    [(FEW, EIGHT, 9, 5.0), pytest.param(None, ALL, 15, 10.0, marks=pytest.mark.nightly)],
+    ids=["few", "all"],
 )
-def test_a_bump_happened(tmp_path, candidates, rate_hz):
+def test_a_bump_happened(tmp_path, candidates, tests, bumped, rate_hz):
     """Between the two directions of a test, so that one mounting sees both sides of it."""
-    told = diagnosed(tmp_path / "s", BumpedJig(from_run=15), candidates, 1510, rate_hz)
+    told = diagnosed(tmp_path / "s", BumpedJig(from_run=bumped), candidates, 1510, tests, rate_hz)
     bump = next(f for f in told.diagnosis.sources if f.name == "jig-bump")
     assert bump.verdict is Verdict.HAPPENED
     for name, true in (("x_um", 2.33), ("y_um", -6.43)):
         value = bump.parameters[name]
         assert value.value == pytest.approx(true, abs=4.0 * value.uncertainty)
         assert value.uncertainty < 1.0
-    assert bump.parameters["after_runs"].value == pytest.approx(15.0, abs=0.1)
+    assert bump.parameters["after_runs"].value == pytest.approx(float(bumped), abs=0.1)
     others = [f for f in told.diagnosis.sources if f.name != "jig-bump"]
     assert all(f.verdict not in {Verdict.IDENTIFIED, Verdict.HAPPENED} for f in others)
     summary = told.summary()

@@ -11,22 +11,28 @@ from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.servo import ReversalSpike
+from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
 FEW = ("gravity", "backlash", "reversal-spike", "joint-friction")
 NAMES = (*FEW, "servo-lag", "screw-lead")
+ALL = "abcdefghijklmno"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("names", "decay_s"),
-    [(FEW, 0.15), *(pytest.param(NAMES, decay_s, marks=pytest.mark.nightly) for decay_s in (0.15, 0.4))],
+    ("names", "tests", "decay_s"),
+    [(FEW, EIGHT, 0.15), *(pytest.param(NAMES, ALL, decay_s, marks=pytest.mark.nightly) for decay_s in (0.15, 0.4))],
 )
-def test_short_spikes_are_found_beside_gravity_however_uncertain_their_height_is(tmp_path, names, decay_s):
+def test_short_spikes_are_found_beside_gravity_however_uncertain_their_height_is(tmp_path, names, tests, decay_s):
     """Ten readings a second hardly tell a high short spike from a low long one; that there is one they tell."""
     kinematics = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
     record(
-        tmp_path / "s", seed=61, mechanisms=[kinematics, Gravity(), ReversalSpike((1.2,) * 6, decay_s)], rate_hz=10.0
+        tmp_path / "s",
+        seed=61,
+        plan=subset(table_ii_plan(61), tests),
+        mechanisms=[kinematics, Gravity(), ReversalSpike((1.2,) * 6, decay_s)],
+        rate_hz=10.0,
     )
     recorded = load_sessions([tmp_path / "s"])
     diagnosis = diagnose(recorded.machine, recorded.observations, sources_named(names))

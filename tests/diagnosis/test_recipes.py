@@ -8,6 +8,7 @@ from dbbstation.tasks.diagnose import diagnose_sessions
 from tests.diagnosis import engine_sessions
 from tests.diagnosis.engine_sessions import (
     RATE_HZ,
+    TESTS,
     answer,
     gravity_backlash_and_screw_cyclic,
     screw_lead_and_gravity,
@@ -16,6 +17,7 @@ from tests.diagnosis.engine_sessions import (
     warm_up_in_two_stages_and_warm_frame,
     warm_up_of_unknown_time_constant,
 )
+from tests.plant.plan import EIGHT
 
 SURE = 0.95
 RIVALS = ("screw-lead", "strut-weight", "servo-lag", "joint-friction", "platform-joints")
@@ -59,9 +61,12 @@ def test_a_lead_and_gravity_are_named_though_both_act_over_the_length(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("rivals", "rate_hz"), [(RIVALS, 5.0), pytest.param(None, RATE_HZ, marks=pytest.mark.nightly)], ids=["few", "all"]
+    ("rivals", "tests", "rate_hz"),
+    [(RIVALS, EIGHT, 5.0), pytest.param(None, TESTS, RATE_HZ, marks=pytest.mark.nightly)],
+    ids=["few", "all"],
 )
-def test_three_causes_at_once_are_all_named(tmp_path, monkeypatch, rivals, rate_hz):
+def test_three_causes_at_once_are_all_named(tmp_path, monkeypatch, rivals, tests, rate_hz):
+    monkeypatch.setattr(engine_sessions, "TESTS", tests)
     monkeypatch.setattr(engine_sessions, "RATE_HZ", rate_hz)
     hidden = {"gravity", "backlash", "screw-cyclic"}
     candidates = None if rivals is None else (*sorted(hidden), *rivals)

@@ -164,6 +164,10 @@ def gravity_plan(
     return Plan(tuple(tests), tuple(balls.values()), path or Path(radius_mm=144.0), name="gravity conditions")
 
 
+EIGHT = "abdfhjkn"
+"""Of the fifteen of [CAL Table II]: all three heights, tilted and level."""
+
+
 def subset(plan: Plan, names: Sequence[str]) -> Plan:
     tests = tuple(plan.test(name) for name in names)
     used = {test.ball for test in tests}

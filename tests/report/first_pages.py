@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 
 from dbbstation.cli import DONE
@@ -55,7 +57,7 @@ def complete(folder):
 
 
 def four_reports(folder):
-    """Write the four reports; return page and numbers of each, by what it shows."""
+    """Write the four reports, page and numbers of each, named by what it shows."""
     rng = np.random.default_rng(35)
     errors = Kinematics(length_mm=rng.normal(0.0, 0.03, 6), base_mm=rng.normal(0.0, 0.05, (6, 3)))
     plan, quiet = subset(table_ii_plan(4), list(TESTS)), Noise(white_um=0.3)
@@ -74,10 +76,15 @@ def four_reports(folder):
         "bare": [folder / "bare"],
     }
     settings = settings_in(folder)
-    made = {}
     for name, words in asked.items():
         out = folder / f"{name}.html"
         outcome = call("--settings", settings, "report", *words, "--out", out, "--json")
         assert outcome.code == DONE, outcome.err
-        made[name] = (out, outcome.data)
-    return made
+        out.with_suffix(".json").write_text(outcome.out, encoding="utf-8")
+
+
+def read_reports(folder):
+    """Page and numbers of each report, by what it shows."""
+    return {
+        page.stem: (page, json.loads(page.with_suffix(".json").read_text("utf-8"))) for page in folder.glob("*.html")
+    }

@@ -9,7 +9,8 @@ from dbbstation.plan.tolerance import CircleFigure
 from tests.browser import Browser, chromium
 from tests.cli.conftest import call
 from tests.cli.test_report_command import Page
-from tests.report.first_pages import PLACE, four_reports, settings_in
+from tests.once import made_once
+from tests.report.first_pages import PLACE, four_reports, read_reports, settings_in
 
 A4 = (int((210 - 2 * 14) / 25.4 * 96), int((297 - 14 - 16) / 25.4 * 96))
 """Width and height between the margins of the page [CSS px]."""
@@ -17,12 +18,12 @@ A4 = (int((210 - 2 * 14) / 25.4 * 96), int((297 - 14 - 16) / 25.4 * 96))
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("pages")
+    return made_once(tmp_path_factory, "pages", four_reports)
 
 
 @pytest.fixture(scope="module")
 def reports(folder):
-    return four_reports(folder)
+    return read_reports(folder)
 
 
 def first_page(reports, name):
@@ -73,11 +74,10 @@ def test_it_is_no_certificate(reports):
     assert title.startswith("Not a certificate: serial number of the machine unknown")
 
 
-def test_a_certificate_is_refused_where_something_is_lacking(folder, reports):
-    assert reports
-    out = folder / "refused.html"
+def test_a_certificate_is_refused_where_something_is_lacking(folder, tmp_path):
+    out = tmp_path / "refused.html"
     words = ("report", folder / "bare", "--certificate", "--place", PLACE, "--out", out)
-    done = call("--settings", settings_in(folder), *words)
+    done = call("--settings", settings_in(tmp_path), *words)
     assert done.code == FAILED
     assert "operator unknown" in done.err
     assert not out.exists()

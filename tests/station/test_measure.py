@@ -120,7 +120,7 @@ def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(plan_file: Path, t
     out = tmp_path / "session"
     text = plan_file.read_text(encoding="utf-8").replace("repeat_at_end: [a]\n", "")
     plan_file.write_text(re.sub(r"  - \{name: b.*\n", "", text), encoding="utf-8")
-    with bench(plan_file, scale=30.0) as place:
+    with bench(plan_file, scale=30.0, rate_hz=20.0) as place:
         part = out / "runs" / "a-cw-1.csv.part"
         with subprocess.Popen(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
             wait_for(lambda: lines_of(part) > 100, process)

@@ -1,1 +1,1 @@
-"""What recordings show that a model lacks: detect, locate, name, ask. Pure mathematics."""
+"""What recordings show that a model lacks: detect, locate, name, ask."""

@@ -1,4 +1,4 @@
-"""Whether the residual is larger just after one strut turns round: a strut that rings, where no listed cause is at work."""
+"""Whether the residual grows after one strut's reversals: a ringing strut."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ FEWEST_ROWS = 4
 
 @dataclass(frozen=True)
 class AfterReversals:
-    """The residual just after a strut turns round.
+    """The residual after one strut's reversals.
 
     Attributes:
         strut: 1 to 6.
-        probability: that noise which is the same everywhere is as much larger there, over all struts and times.
+        probability: by even noise, over all struts and times.
     """
 
     strut: int
@@ -50,11 +50,11 @@ class AfterReversals:
 
 
 def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[NDArray[np.float64]]) -> AfterReversals | None:
-    """The strut whose reversals the residual follows most; None where there are too few of them.
+    """Return the strut whose reversals the residual follows most, or None for too few.
 
     Args:
-        runs: that are paths, as shapes see them.
-        residual_mm: what a fit leaves of each, shape (n,) [mm].
+        runs: paths.
+        residual_mm: shape (n,) each.
     """
     if not all({"time", "strut-speed-sign"} <= run.values.keys() for run in runs):
         return None
@@ -74,6 +74,6 @@ def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[NDArray[np.fl
 
 
 def _reversals(sign: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Rows in which a strut first moves the other way than before, shape (k,)."""
+    """Return rows in which a strut first moves back, shape (k,)."""
     moving = np.flatnonzero(sign)
     return moving[1:][np.diff(sign[moving]) != 0.0]

@@ -1,7 +1,7 @@
-"""The channel of bar readings as the inference sees it: base columns, columns of causes, and a target.
+"""Bar readings as a channel: base columns, causes' columns, target.
 
-Columns are laid out once about the base fit. A cause that a joint fit has taken in, or that competes with one, is laid out
-anew at its fitted values: exact columns, tangents of its nonlinear parameters, and what its formula may be off by.
+Columns are laid out about the base fit. Fitted causes and their rivals are laid out anew: exact columns, tangents,
+formula slack.
 """
 
 from __future__ import annotations
@@ -57,17 +57,17 @@ DRAWS = 4
 
 
 class CircleChannel:
-    """Everything that a diagnosis compares.
+    """All that a diagnosis compares.
 
     Args:
-        calibration: the base model, fitted; its runs as thinned.
-        sources: named candidates, several laws of one cause under one name; each must be given what it needs by every run.
+        calibration: base fit with thinned runs.
+        sources: candidates, laws of one cause under one name; runs must give their needs.
 
     Attributes:
-        calibration: the base fit.
-        readings: as the base fit predicts them.
-        set_up: balls and bars that are off by far more than stated, a variant for each of them.
-        sources: by name and law.
+        calibration: base fit with thinned runs.
+        readings: predicted by the base fit.
+        set_up: balls and bars far off, a variant each.
+        sources: candidates, laws of one cause under one name; runs must give their needs.
     """
 
     def __init__(self, calibration: Calibration, sources: Sequence[ErrorSource]) -> None:
@@ -89,22 +89,22 @@ class CircleChannel:
 
     @property
     def observations(self) -> tuple[Observation, ...]:
-        """Runs, averaged over sectors."""
+        """Return runs averaged over sectors."""
         return self.calibration.observations
 
     @property
     def base(self) -> Columns:
-        """Priors and scales of the base columns."""
+        """Return the base's priors and scales."""
         return self.calibration.layout.known
 
     @property
     def held(self) -> NDArray[np.float64]:
-        """Base directions at nominal."""
+        """Return base directions held at nominal."""
         return self.calibration.solution.held
 
     @property
     def named(self) -> tuple[Cause, ...]:
-        """Causes with a name; laws and forms of one are equally likely."""
+        """Return named causes; laws and forms of one are equally likely."""
         found = []
         for name in dict.fromkeys(name for name, _ in self.sources):
             laws = [key for key in self.sources if key[0] == name]
@@ -117,15 +117,15 @@ class CircleChannel:
         return tuple(found)
 
     def columns_of(self, variants: Sequence[Variant]) -> NDArray[np.int64]:
-        """Columns of the amplitudes of several forms, one after the other."""
+        """Return the amplitudes' columns of several forms."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *(variant.columns for variant in variants)])
 
     def known_with(self, variants: Sequence[Variant]) -> Columns:
-        """Priors and scales of the base columns, then of the amplitudes of several forms, at their plausible sizes."""
+        """Return priors and scales of base, then of forms' amplitudes."""
         return with_random(self.base, np.concatenate([np.zeros(0), *(variant.plausible for variant in variants)]))
 
     def whole(self, name: str, variant: Variant) -> Variant:
-        """The form of a cause that has all its amplitudes, at the same point and without slack."""
+        """Return a cause's form with all amplitudes at its point, without slack."""
         if not len(variant.whole):
             return replace(variant, slack=variant.slack[:0], slack_sd=variant.slack_sd[:0])
         sizes = [p.plausible for p in self.source_of(name, variant).parameters(self.machine) if not p.grid]
@@ -133,21 +133,21 @@ class CircleChannel:
         return Variant(variant.whole, plausible, variant.nonlinear, law=variant.law)
 
     def source_of(self, name: str, variant: Variant) -> ErrorSource:
-        """Source that a form of a cause is of: a cause may have one form over time, and one by thermometers."""
+        """Return the source of a form."""
         return self.sources[name, variant.law]
 
     def forms(self, but_for: Collection[str]) -> Iterator[tuple[Variant, float]]:
-        """Forms of named causes but for some, as laid out first, and by how much their formulas may be off, as a share."""
+        """Return initial forms of named causes with their relative inaccuracy."""
         for (name, law), variants in self._laid.items():
             if name not in but_for:
                 yield from ((variant, self.sources[name, law].form_uncertainty) for variant in variants)
 
     def happens_once(self, name: str) -> bool:
-        """Whether a cause acts once in a session, so that no other tests can show it again."""
+        """Return whether a cause acts once in a session."""
         return any(source.happens_once for own, source in self.sources.items() if own[0] == name)
 
     def to_whole(self, variant: Variant) -> NDArray[np.float64]:
-        """Amplitudes of a form to all amplitudes of its cause: some of these, or one for all of them, shape (p, q)."""
+        """Return the matrix from a form's amplitudes to the cause's, shape (p, q)."""
         if not len(variant.whole):
             return np.eye(len(variant.columns))
         same = (variant.whole[:, None] == variant.columns).astype(np.float64)
@@ -160,19 +160,18 @@ class CircleChannel:
         but_for: NDArray[np.bool_] | None = None,
         only: NDArray[np.int64] | None = None,
     ) -> BesideBase:
-        """Causes beside the base at a noise of one sample [mm], balls scattering `scatter` times as stated.
+        """Return causes beside the base at a sample's noise [mm], balls scattering `scatter` times as stated.
 
-        Rows that are held back, shape (n,), say nothing; targets must be zero there. `only` are the columns that are asked for then,
-        all if None.
+        Held-back rows, shape (n,), need zero targets; `only` are needed columns, None: all.
         """
         columns = self.columns if but_for is None else self.columns.but_for(but_for, only)
         return BesideBase(columns, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM))
 
     def target(self, fit: Calibration) -> NDArray[np.float64]:
-        """What readings say of base and causes, about a fit of the base and of causes laid out at its values, (n,).
+        """Return the target of base and causes about a fit, (n,).
 
         Args:
-            fit: the base fit, or a joint one, which has the base's columns where they were and others behind.
+            fit: base or joint; base columns come first.
         """
         base = len(self.base.prior)
         known = fit.x[:base] - fit.layout.nominal[:base]
@@ -186,11 +185,11 @@ class CircleChannel:
         return np.asarray(target, dtype=np.float64)
 
     def noise(self, target: NDArray[np.float64], others: Sequence[Cause], noise_mm: float) -> Spectrum:
-        """Noise from what base and all causes together leave of a target.
+        """Return noise from the residual of base and all causes.
 
         Args:
             target: shape (n,) [mm].
-            others: causes beside the named ones.
+            others: unnamed causes.
         """
         sd = np.zeros(self.columns.count)
         for cause in (*self.named, *self.set_up, *others):
@@ -204,7 +203,7 @@ class CircleChannel:
         return noise_left_by([left[rows, 0] for rows in self.runs], phases, [left[rows, 1:] for rows in self.runs])
 
     def blocks(self, columns: NDArray[np.int64], target: NDArray[np.float64]) -> list[Block]:
-        """Compressed runs of base columns, then of those of some causes, one block per run."""
+        """Return compressed runs of base, then causes' columns, a block each."""
         every = np.arange(self.columns.base.shape[1] + len(columns))
         found = []
         for rows in self.runs:
@@ -215,7 +214,7 @@ class CircleChannel:
         return found
 
     def refine(self, name: str, law: str, values: Mapping[str, NDArray[np.float64]], fit: Calibration) -> None:
-        """Lay out a cause at values of all its parameters, with tangents and slack.
+        """Lay out a cause at parameter values, with tangents and slack.
 
         Args:
             values: by set, shape (p,).
@@ -263,18 +262,18 @@ class CircleChannel:
 
     @cached_property
     def _variables(self) -> list[dict[str, NDArray[np.float64]]]:
-        """What errors may follow, of all rows of each run; forms are laid out along them again and again."""
+        """Return each run's variables for all rows, cached."""
         return [variables(motion, self.machine) for motion in self.motions]
 
     def give_back(self) -> None:
-        """Let columns of forms that were laid out better since be replaced; no comparison may ask for them any more."""
+        """Free columns of replaced forms, unused from now on."""
         former, self._former = self._former, []
         if former:
             columns = [part for one in former for part in (one.columns, one.slack, one.whole)]
             self.columns.give_back(np.unique(np.concatenate(columns)))
 
     def _readings_about(self, fit: Calibration) -> list[BarReading]:
-        """Readings of all runs as a fit predicts them; several causes are laid out about one fit, one after the other."""
+        """Return readings by a fit, cached for one fit."""
         if fit is self.calibration:
             return self.readings
         if fit is not self._last[0]:
@@ -282,7 +281,7 @@ class CircleChannel:
         return self._last[1]
 
     def _amplitudes_in(self, fit: Calibration, key: tuple[str, str]) -> NDArray[np.float64] | None:
-        """Amplitudes of a cause in a fit; None where that fit is without it."""
+        """Return a cause's amplitudes in a fit, or None."""
         terms = [t for t in fit.layout.terms if (t.source.name, t.source.law) == key]
         base = {term.source.name for term in self.calibration.layout.terms}
         if not terms or key[0] in base:
@@ -301,7 +300,7 @@ class CircleChannel:
         return samples
 
     def _scattering(self, times: float) -> Columns:
-        """What is known of the base where balls scatter so many times as stated."""
+        """Return base priors with scaled ball scatter."""
         if times == 1.0:
             return self.base
         prior = self.base.prior.copy()
@@ -312,10 +311,9 @@ class CircleChannel:
         return replace(self.base, prior=prior)
 
     def _outsize(self) -> tuple[Cause, ...]:
-        """Random effects that may be larger than stated; the parameters of each that runs see.
+        """Return random effects that may exceed their stated size, with visible parameters.
 
-        A level bar does not see the height of its ball. A ball that was put up once only is no other matter than its
-        mounting, and one that was set free may stand anywhere as it is.
+        Level bars miss ball heights. A ball mounted once is its mounting; a freed one is free already.
         """
         setups = [observation.setup for observation in self.observations]
         put_up = {ball: {s.mounting for s in setups if s.ball == ball} for ball in {s.ball for s in setups}}
@@ -363,10 +361,10 @@ class CircleChannel:
         shared: Sequence[str],
         nonlinear: tuple[float, ...],
     ) -> list[Variant]:
-        """Forms of a source at one point, by its parts.
+        """Return a source's forms at one point, by parts.
 
         Args:
-            derivatives: of the readings by its amplitudes, per run, shape (n, p).
+            derivatives: per run, shape (n, p).
         """
         amplitudes = [p for p in source.parameters(self.machine) if not p.grid]
         sets = list(dict.fromkeys(shared))

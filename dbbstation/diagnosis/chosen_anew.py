@@ -1,4 +1,4 @@
-"""Groups of tests held back: what each named cause brings in tests that took no part in choosing it."""
+"""Each named cause's gain in held-back groups of tests."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 
 def without_tests(explained: Explained) -> ChosenAnew | None:
-    """Hold back groups of tests in turn; None where there are too few, or where no cause was named.
+    """Hold back groups of tests; None for too few, or without named causes.
 
-    The reference is the kinematic calibration, fitted to the same tests.
+    The reference is the kinematic calibration of the same tests.
     """
     settled, channel = explained.settled, explained.channel
     groups = groups_of(channel.observations)

@@ -1,4 +1,4 @@
-"""The diagnosis: do recordings differ from the model beyond noise, which physics was left out, what does it change."""
+"""The diagnosis: which physics is missing, and its consequences."""
 
 from __future__ import annotations
 
@@ -57,19 +57,17 @@ def diagnose(
     *,
     hold_out: bool = True,
 ) -> Diagnosis:
-    """Find what a kinematic calibration leaves out, by the probabilities of sets of causes; see docs/decisions.md, 19.
+    """Find what a kinematic calibration leaves out; see docs/decisions.md, 19.
 
     Args:
-        machine: nominal machine.
-        observations: raw runs.
-        sources: named candidates, several forms of one cause under one name; those that lack what they need are left out
-            by the caller.
-        progress: told what is being done.
-        hold_out: choose everything anew without each group of tests, which asks whether causes predict others.
+        machine: nominal.
+        observations: raw.
+        sources: candidates with their needs, forms of one cause under one name.
+        hold_out: choose anew without each group of tests.
 
     Raises:
         CalibrationError: the base model cannot be fitted.
-        ModelError: a source needs what the runs or the machine file do not give.
+        ModelError: a source needs data that runs or machine file lack.
     """
     most = sectors_for(len(observations))
     runs = [thinned(observation, most) for observation in observations]
@@ -114,7 +112,7 @@ def diagnose(
 
 
 def _cancelling(explained: Explained) -> Cancelling | None:
-    """Named causes whose effects on the readings cancel each other."""
+    """Return named causes whose effects cancel."""
     settled, samples = explained.settled, explained.channel.columns.samples
     values = settled.comparison.estimates(settled.best.members).values if settled.best.members else np.zeros(0)
     effects = {}
@@ -132,7 +130,7 @@ def _widened(explained: Explained) -> Explained:
 
 
 def judged(explained: Explained) -> tuple[Explained, tuple[SourceFinding, ...]]:
-    """Judge every named cause, and take out of the joint model what is rather not there, until nothing of that is in it."""
+    """Judge named causes, removing improbable ones from the joint model until stable."""
     findings = judge(explained)
     given_up: set[str] = set()
     while rather_not := doubtful(explained, findings):
@@ -143,11 +141,10 @@ def judged(explained: Explained) -> tuple[Explained, tuple[SourceFinding, ...]]:
 
 
 def doubtful(explained: Explained, findings: Sequence[SourceFinding]) -> set[str]:
-    """Named causes of the most probable set that are rather not there than there; a model is better off without them.
+    """Return improbable named causes of the best set.
 
-    The most probable of many sets may have a small probability. Of all single models the one of what is rather there than
-    not predicts best [Barbieri and Berger, Annals of Statistics 32 (2004) 870]. A cause that is ambiguous stays: it or
-    one of its like is there.
+    The median probability model predicts best [Barbieri and Berger, Annals of Statistics 32 (2004) 870]. Ambiguous causes
+    stay.
     """
     members = {member.cause.name for member in explained.settled.members}
     doubted = {f.name for f in findings if f.verdict is Verdict.NOT_TESTABLE and f.probability < EVEN}
@@ -155,7 +152,7 @@ def doubtful(explained: Explained, findings: Sequence[SourceFinding]) -> set[str
 
 
 def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
-    """What no named cause explains: the unmodelled effect that brings most, where one is there for sure."""
+    """Return the most valuable sure unmodelled effect, else the residual."""
     settled = explained.settled
     posterior, unmodelled = settled.posterior, settled.unmodelled
     effects = [m for m in settled.best.members if unmodelled.of(m)]
@@ -184,7 +181,7 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
 
 
 def _quick(settled: SettledCircles) -> Unexplained:
-    """The residual above the harmonics that are asked for, which noise is read from: nothing, or what follows a reversal."""
+    """Return the residual above modelled harmonics: nothing, or after reversals."""
     found = after_reversals(settled.unmodelled.runs, settled.after.residual_mm)
     if found is None or found.probability >= SIGNIFICANT:
         return Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise.")
@@ -192,7 +189,7 @@ def _quick(settled: SettledCircles) -> Unexplained:
 
 
 def rough_formulas(settled: SettledCircles) -> list[str]:
-    """Named causes whose slack the recordings call for: the joint fit, which has none, leaves it."""
+    """Return named causes whose slack is needed, which the joint fit lacks."""
     evidence = settled.comparison.log_evidence(settled.best.members)
     found = []
     for member in settled.members:
@@ -209,7 +206,7 @@ CLEAR = 3.0
 def usable_sources(
     machine: Machine, observations: Sequence[Observation], sources: Sequence[ErrorSource]
 ) -> tuple[list[ErrorSource], dict[str, str]]:
-    """Sources that have what they need, in every form for which that is so, and why the others have not, by name."""
+    """Return usable forms of sources, and reasons against others, by name."""
     usable: list[ErrorSource] = []
     lacking = {}
     motions = [observation.motion() for observation in observations]
@@ -223,7 +220,7 @@ def usable_sources(
 
 
 def _missing(source: ErrorSource, machine: Machine, motions: Sequence[Motion]) -> str:
-    """Return why a source cannot be a candidate; empty where it can."""
+    """Return why a source is no candidate, or an empty text."""
     try:
         source.parameters(machine)
     except ModelError as error:

@@ -1,4 +1,4 @@
-"""Sums of readings over narrow pieces of a variable, and what curves over it would explain beside a base."""
+"""Readings summed over pieces of a variable, and what curves explain."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class DirectionalSums:
-    """Sums over the pieces of one variable, for what moves in d directions.
+    """Sums over one variable for d directions.
 
     Attributes:
-        at: mean of the variable in each piece, shape (b,) or (b, c).
-        rest: gain times what the base leaves, shape (b, d).
+        at: piece means, shape (b,) or (b, c).
+        rest: gain times residual, shape (b, d).
         gains: gain times gain, shape (b, d, d).
-        base: gain times what the base can do, along orthonormal directions, shape (b, d, k).
+        base: gain times base directions, shape (b, d, k).
     """
 
     at: NDArray[np.float64]
@@ -29,7 +29,7 @@ class DirectionalSums:
     base: NDArray[np.float64]
 
     def explained(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weighted sum of squares that curves explain beside the base, shape (m,), from (b, m, p)."""
+        """Return squares explained by curves beside the base, shape (m,), from (b, m, p)."""
         pieces, many, count = curves.shape
         flat = curves.reshape(pieces, many * count).T
         rest = (flat @ self.rest).reshape(many, count, -1)
@@ -40,15 +40,14 @@ class DirectionalSums:
 
 
 class NearbyWaves:
-    """What waves of any frequency near one explain: sums with a few polynomials stand for those with every such wave.
+    """Squares explained by waves near a frequency, from polynomial sums.
 
-    With the place x of a piece between -1 and 1, exp(i a x) = J_0(a) + 2 sum i^n J_n(a) T_n(x), Bessel functions and Chebyshev polynomials
-    [Jacobi and Anger; Abramowitz and Stegun, eqs 9.1.44 and 9.1.45]. Terms beyond `TERMS` are below rounding for all frequencies within
-    `REACH` waves over the extent.
+    For place x in -1..1, exp(i a x) = J_0(a) + 2 sum i^n J_n(a) T_n(x) [Jacobi and Anger; Abramowitz and Stegun, eqs
+    9.1.44 and 9.1.45]; `TERMS` suffice within `REACH` waves.
 
     Args:
-        sums: over pieces of a variable of one dimension.
-        frequency: near which [1 / unit of the variable].
+        sums: of a scalar variable.
+        frequency: [1 / unit].
     """
 
     def __init__(self, sums: DirectionalSums, frequency: float) -> None:
@@ -65,10 +64,10 @@ class NearbyWaves:
         self._twice = _moments(wave**2, x, sums.gains.reshape(pieces, -1), TERMS_OF_SQUARES)
 
     def explained(self, frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Weighted sum of squares that waves explain beside the base, shape (m,), from (m,): as curves of cosine and sine would.
+        """Return squares explained by waves, shape (m,), from (m,).
 
         Args:
-            frequencies: within `REACH` waves over the extent of the one that was given [1 / unit of the variable].
+            frequencies: within `REACH` waves of the given one [1 / unit].
         """
         many, d = len(frequencies), self._directions
         turned = 2.0 * np.pi * (frequencies - self._frequency) * self._half
@@ -88,7 +87,7 @@ TERMS, TERMS_OF_SQUARES = 18, 24
 def _moments(
     wave: NDArray[np.complex128], x: NDArray[np.float64], values: NDArray[np.float64], terms: int
 ) -> NDArray[np.complex128]:
-    """Sums of wave times Chebyshev polynomial times values, shape (terms, q), from (b,), (b,) and (b, q)."""
+    """Return sums of wave times polynomials times values, shape (terms, q), from (b,), (b,) and (b, q)."""
     curves = np.empty((terms, 2, len(x)))
     before, now = x, np.ones(len(x))  # T_1, which is also T_-1, and T_0
     for curve in curves:
@@ -100,7 +99,7 @@ def _moments(
 
 
 def _weights(turned: NDArray[np.float64], terms: int) -> NDArray[np.complex128]:
-    """Weight of each polynomial in exp(i a x), shape (m, terms), from a, shape (m,)."""
+    """Return polynomials' weights in exp(i a x), shape (m, terms), from a, shape (m,)."""
     order = np.arange(terms)
     weights = jv(order, turned[:, None]) * 1j**order
     weights[:, 1:] *= 2.0
@@ -108,12 +107,12 @@ def _weights(turned: NDArray[np.float64], terms: int) -> NDArray[np.complex128]:
 
 
 def sides(transform: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Sums with cosine and with sine, shape (m, 2, ...), from those with exp(-ix), shape (m, ...)."""
+    """Return cosine and sine sums, shape (m, 2, ...), from those with exp(-ix), shape (m, ...)."""
     return np.stack([transform.real, -transform.imag], axis=1)
 
 
 def squares(mean: NDArray[np.float64], twice: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Sums with products of cosine and sine, shape (m, 2, 2, d, d), from those with one, (d, d), and with exp(-2ix), (m, d, d)."""
+    """Return cosine and sine products, shape (m, 2, 2, d, d), from those with one, (d, d), and exp(-2ix), (m, d, d)."""
     # cos² = (1 + cos 2x) / 2, sin² = (1 - cos 2x) / 2, sin cos = sin 2x / 2
     found = np.empty((len(twice), 2, 2, *mean.shape))
     found[:, 0, 0], found[:, 1, 1] = (mean + twice.real) / 2.0, (mean - twice.real) / 2.0
@@ -122,13 +121,13 @@ def squares(mean: NDArray[np.float64], twice: NDArray[np.complex128]) -> NDArray
 
 
 def taken(base: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What directions of the base take from the products of curves, (m, p d, p d), from its products with them, (m, p, d, k)."""
+    """Return the base's part of curve products, (m, p d, p d), from (m, p, d, k)."""
     side = base.reshape(len(base), base.shape[1] * base.shape[2], -1)
     return np.asarray(side @ side.transpose(0, 2, 1))
 
 
 def solved(rest: NDArray[np.float64], of_base: NDArray[np.float64], gains: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Explained sums of squares from products with curves: (m, p, d), as `taken` has them, and (m, p, p, d, d)."""
+    """Return explained squares from (m, p, d), `taken` and (m, p, p, d, d)."""
     many, size = len(rest), rest.shape[1] * rest.shape[2]
     normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - of_base + np.eye(size)
     right = rest.reshape(many, size, 1)

@@ -1,8 +1,7 @@
-"""What a machine may do that the formula of a cause does not say: its effect, modulated along what it depends on.
+"""Formula slack of causes: the effect modulated along its variable.
 
-A cause that acts on struts may be a little larger at one length than at another, or in one direction of travel than in
-the other; one that grows with time may follow another law. The effect as fitted times a few smooth functions of its
-variable stands for all of this [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
+Struts' effects may vary with length or direction, growth with another law; smooth modulations stand for it [Kennedy and
+O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
 """
 
 from __future__ import annotations
@@ -41,10 +40,9 @@ class Effects:
     """What a source does to one run.
 
     Attributes:
-        reading: what a model predicts for it.
-        values: of all parameters of the source, shape (p,).
-        derivative: of the reading by these, shape (n, p).
-        known: variables that errors may follow, as `variables` has them.
+        values: shape (p,).
+        derivative: of the reading, shape (n, p).
+        known: variables, as `variables`.
     """
 
     motion: Motion
@@ -55,7 +53,7 @@ class Effects:
 
 
 def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
-    """Columns of what the formula of a source may be off by, over all runs, shape (n, q)."""
+    """Return a source's slack columns over all runs, shape (n, q)."""
     if source.form_uncertainty == 0.0:
         return np.zeros((sum(len(run.derivative) for run in runs), 0))
     amplitude = np.array([not p.grid for p in source.parameters(machine)])
@@ -85,13 +83,13 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
 
 
 def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
-    """What other constants of the law would change, shape (n, q): each in a share of one, where others are one of what a formula is off by."""
+    """Return changes by other constants, shape (n, q), with share one relative to others."""
     changes = [run.reading.by_parameters(source.left_open(run.motion, machine, run.values)) for run in runs]
     return np.vstack(changes) / source.form_uncertainty
 
 
 def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
-    """What grows over time by one law may have further stages: its effect with other time constants, shape (n, q)."""
+    """Return growth with other time constants, shape (n, q)."""
     parameters = source.parameters(machine)
     amplitude = np.array([not p.grid for p in parameters])
     if source.varies_with != "time" or amplitude.all():
@@ -111,7 +109,7 @@ def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]
 def _strut_contributions(
     source: ErrorSource, motion: Motion, machine: Machine, values: NDArray[np.float64], reading: BarReading
 ) -> NDArray[np.float64] | None:
-    """What a source adds to the reading through each strut, shape (n, 6) [mm]; None where it acts otherwise too."""
+    """Return a source's reading through each strut, shape (n, 6) [mm]; None if it acts otherwise too."""
     model = MachineModel(machine, (Fitted(source, values, source.shared_by(motion)),))
     effect = model.effect(motion, reading.actual)
     others = (
@@ -130,7 +128,7 @@ def _strut_contributions(
 def _followed_by_strut(
     source: ErrorSource, known: Mapping[str, NDArray[np.float64]], motion: Motion, machine: Machine
 ) -> list[NDArray[np.float64]]:
-    """Variables that the discrepancy of a source that acts on struts follows: place and its own, each of shape (n, 6)."""
+    """Return variables of a strut source's slack: place and own, shape (n, 6) each."""
     if source.varies_with in {"time", "temperature"}:
         return [np.broadcast_to(known["time"][:, None], (len(motion), STRUTS))]
     found = [known["strut-length"]]
@@ -147,7 +145,7 @@ that is another at speed."""
 
 
 def _swing_rad(motion: Motion, machine: Machine) -> NDArray[np.float64]:
-    """Angles of the platform joints away from the middle of the travel, shape (n, 6) [rad]."""
+    """Return platform joints' angles from mid-travel, shape (n, 6) [rad]."""
     rest = middle(machine)
     unit, at_rest = motion.struts(machine).unit, inverse(machine.hexapod, rest).unit
     in_platform = np.einsum("nji,nkj->nki", motion.frames(machine).rotation, unit)
@@ -156,7 +154,7 @@ def _swing_rad(motion: Motion, machine: Machine) -> NDArray[np.float64]:
 
 
 def _followed(source: ErrorSource, known: Mapping[str, NDArray[np.float64]], motion: Motion) -> NDArray[np.float64]:
-    """Variables that the discrepancy of a source that acts on no single strut follows: its own, or the place, (n, q)."""
+    """Return variables of another source's slack: own or place, (n, q)."""
     name = "time" if source.varies_with in {"temperature", "speed"} else source.varies_with
     if name in known and known[name].ndim == 1:
         return known[name][:, None]

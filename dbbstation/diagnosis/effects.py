@@ -1,4 +1,4 @@
-"""What each cause of a model does to the circles and over the workspace, and the circles as they would be if it were cured."""
+"""Each cause's effect on circles and workspace, and cured circles."""
 
 from __future__ import annotations
 
@@ -38,14 +38,12 @@ class CuredCircle:
     """One run with and without a cause.
 
     Attributes:
-        direction: `ccw` or `cw`.
-        repeat: of the test and direction.
-        g_um: circular deviation that the cause would make by itself, up to 30 undulations per revolution [µm].
-        centre_um: how far it moves the centre, X and Y, shape (2,) [µm].
-        measured_g_um: circular deviation as measured, by the same figure [µm].
-        measured_centre_um: centre less the commanded one as measured, shape (2,) [µm].
-        cured_centre_um: the same if it were cured, shape (2,) [µm].
-        effect_mm: what the cause does to its readings, shape (n,) [mm].
+        g_um: circular deviation of the cause alone, up to 30 undulations per revolution.
+        centre_um: shift, X and Y, shape (2,).
+        measured_g_um: by the same figure.
+        measured_centre_um: less commanded, shape (2,).
+        cured_centre_um: without the cause, shape (2,).
+        effect_mm: on readings, shape (n,).
     """
 
     test: str
@@ -63,19 +61,17 @@ class CuredCircle:
 
 @dataclass(frozen=True, eq=False)
 class CauseEffect:
-    """What one cause contributes.
+    """A cause's contribution.
 
     Attributes:
-        name: of the source; `geometry` for all kinematic parameters together.
-        sources: names of the sources that would go with it.
-        g_um: mean over the runs of the circular deviation that it would make by itself [µm].
-        g_u_um: standard uncertainty of that; None where the covariance of its parameters is not known.
-        centre_um: mean distance by which it moves the centres [µm].
-        centre_u_um: standard uncertainty of that; None likewise.
-        workspace_um: root mean square distance over the workspace by which it moves the tool, about a common shift [µm]; None
-            where it follows more than the pose.
-        workspace_u_um: standard uncertainty of that; None likewise.
-        circles: run by run.
+        name: source, or `geometry` for all kinematic parameters.
+        sources: removed with it.
+        g_um: mean circular deviation of the cause alone.
+        g_u_um: standard uncertainty; None if unknown.
+        centre_um: mean shift.
+        centre_u_um: standard uncertainty; None if unknown.
+        workspace_um: rms tool shift over the workspace about a common shift; None if it follows more than the pose.
+        workspace_u_um: standard uncertainty; None if unknown.
     """
 
     name: str
@@ -106,22 +102,19 @@ def effects_of(
     unseen: NDArray[np.float64] | None = None,
     formula_variance: NDArray[np.float64] | None = None,
 ) -> tuple[CauseEffect, ...]:
-    """Return what each cause of a model contributes to the circles, the greatest circular deviation first.
+    """Return causes' contributions, the greatest circular deviation first.
 
-    A cause's effect is what the model reads with it less what it reads without it, all other causes at work. To first order effects
-    add up; their circular deviations need not, since causes may act against each other.
+    An effect is the reading with less without the cause. Effects add to first order, circular deviations need not.
 
     Args:
-        model: with its sources, those of the measurement too.
-        rows: source, set and parameter of each row of the covariance.
-        covariance: of these, in the products of their units, shape (k, k); None where it is not known.
-        unseen: combinations of these that the recordings did not determine, each at its plausible size, shape (h, k). Circles do
-            not show them; over the workspace the uncertainty is not known where they are its greater part.
-        formula_variance: part of the variances that is what formulas may be off by, shape (k,); None where there is none. What
-            the shape of a formula lacks it lacks on every strut, so that all amplitudes of a source are off by one share.
+        model: with measurement sources.
+        rows: source, set and parameter.
+        covariance: in products of units, shape (k, k); None if unknown.
+        unseen: undetermined combinations at plausible size, shape (h, k); workspace uncertainty is unknown if they dominate.
+        formula_variance: part by formulas, common to a source's amplitudes, shape (k,); or None.
 
     Raises:
-        ModelError: a source needs what the runs do not give.
+        ModelError: a source needs missing data.
         TraceError: a run that is no circle.
     """
     lengths = [model.bar(observation.motion()) for observation in observations]
@@ -169,7 +162,7 @@ ROUNDING_MM = 1e-9
 
 
 def _groups(model: MachineModel) -> Iterator[tuple[str, tuple[Fitted, ...]]]:
-    """Causes with their sources: the geometry as one, all sets of a source as one; random effects of a session are none."""
+    """Return causes with sources: geometry as one, a source's sets as one, no random effects."""
     geometry = tuple(f for f in model.sources if f.source.name in KINEMATIC_SOURCES)
     if geometry:
         yield GEOMETRY, geometry
@@ -187,7 +180,7 @@ def _groups(model: MachineModel) -> Iterator[tuple[str, tuple[Fitted, ...]]]:
 
 
 def _places(group: Sequence[Fitted], model: MachineModel, rows: Sequence[Row]) -> list[int] | None:
-    """Rows of the covariance that are a cause's parameters; None where one of them has none."""
+    """Return a cause's covariance rows; None if one is missing."""
     place = {row: k for k, row in enumerate(rows)}
     names = [
         (f.source.name, f.shared, parameter.name) for f in group for parameter in f.source.parameters(model.machine)
@@ -196,7 +189,7 @@ def _places(group: Sequence[Fitted], model: MachineModel, rows: Sequence[Row]) -
 
 
 def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Square root of a covariance, shape (p, r)."""
+    """Return a covariance's root, shape (p, r)."""
     values, vectors = np.linalg.eigh(covariance)
     kept = values > 0.0
     root: NDArray[np.float64] = vectors[:, kept] * np.sqrt(values[kept])
@@ -204,7 +197,7 @@ def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _of_formulas(group: Sequence[Fitted], variance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Change of all parameters by what the formula of each source may be off by, one source a column, shape (p, sources)."""
+    """Return parameter changes by formula errors, a column per source, shape (p, sources)."""
     sources = list(dict.fromkeys(f.source.name for f in group))
     owner = np.concatenate([np.full(len(f.values), sources.index(f.source.name)) for f in group])
     share = np.sqrt(variance) * np.sign(np.concatenate([f.values for f in group]))
@@ -212,7 +205,7 @@ def _of_formulas(group: Sequence[Fitted], variance: NDArray[np.float64]) -> NDAr
 
 
 def _parted(group: Sequence[Fitted], changes: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-    """Changes of all parameters of a cause, shape (p, r), source by source."""
+    """Return parameter changes, shape (p, r), by source."""
     ends = np.cumsum([len(f.values) for f in group])
     return tuple(np.split(changes, ends[:-1]))
 
@@ -223,7 +216,7 @@ def _answers(
     group: Sequence[Fitted],
     roots: tuple[NDArray[np.float64], ...] | None,
 ) -> NDArray[np.float64] | None:
-    """Change of a run's readings by one standard deviation along each independent direction of the cause, shape (n, r) [mm]."""
+    """Return reading changes per independent direction of one standard deviation, shape (n, r) [mm]."""
     if roots is None:
         return None
     total = np.zeros((len(reading.length_mm), roots[0].shape[1] if roots else 0))
@@ -264,7 +257,7 @@ def _u_of_mean_g(
     spread: Sequence[NDArray[np.float64] | None],
     circles: Sequence[CuredCircle],
 ) -> float | None:
-    """Standard uncertainty of the mean circular deviation, each direction of the covariance changed by one standard deviation."""
+    """Return the mean circular deviation's standard uncertainty by directions."""
     changes = []
     for observation, effect, answers, circle in zip(observations, effects, spread, circles, strict=True):
         if answers is None:
@@ -280,7 +273,7 @@ def _u_of_centres(
     spread: Sequence[NDArray[np.float64] | None],
     centres: Sequence[NDArray[np.float64]],
 ) -> float | None:
-    """Standard uncertainty of the mean distance, likewise; the first harmonic of a change is what it moves the centre by."""
+    """Return the mean shift's standard uncertainty by first harmonics."""
     changes = []
     for observation, effect, answers, centre in zip(observations, effects, spread, centres, strict=True):
         if answers is None:
@@ -300,7 +293,7 @@ def _u_of_centres(
 
 
 def _norm_of_mean(changes: NDArray[np.float64]) -> float:
-    """Norm over directions of the mean over runs, of changes of shape (runs, r)."""
+    """Return the norm over directions of means over runs, shape (runs, r)."""
     return float(np.linalg.norm(changes.mean(axis=0))) if changes.size else 0.0
 
 
@@ -310,7 +303,7 @@ def _over_the_workspace(
     group: Sequence[Fitted],
     changes: tuple[tuple[NDArray[np.float64], ...] | None, tuple[NDArray[np.float64], ...] | None],
 ) -> tuple[float | None, float | None]:
-    """Root mean square distance by which a cause moves the tool, about a common shift, and its standard uncertainty [µm]; None: not known."""
+    """Return a cause's rms tool shift about a common one, with standard uncertainty [µm]; None: unknown."""
     if any(f.source.belongs_to is not Owner.MACHINE or not f.source.needs <= {Need.POSE} for f in group):
         return None, None
     motion = Motion(workspace(model.machine))
@@ -344,5 +337,5 @@ def _over_the_workspace(
 
 
 def _rms_about_mean_um(moved_mm: NDArray[np.float64]) -> float:
-    """Root mean square length of vectors, shape (3, n) [mm], about their mean [µm]."""
+    """Return vectors' rms length, shape (3, n) [mm], about their mean [µm]."""
     return 1e3 * float(np.sqrt(np.mean(np.sum((moved_mm - moved_mm.mean(axis=1, keepdims=True)) ** 2, axis=0))))

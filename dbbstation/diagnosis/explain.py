@@ -1,4 +1,4 @@
-"""Naming: which sets of causes explain the recordings, with base and causes fitted anew about the most probable one."""
+"""Which sets of causes explain the recordings, refitted about the best."""
 
 from __future__ import annotations
 
@@ -61,9 +61,9 @@ def explain(
     sources: Sequence[ErrorSource],
     progress: Callable[[str], None],
 ) -> Explained:
-    """Compare sets of causes; balls and bars that are certainly off are set free, and the rest is compared again.
+    """Compare sets of causes, freeing balls and bars that are certainly off.
 
-    Runs that are no circle of this machine are left out before, and taken back where what was found explains them.
+    Foreign runs are omitted first and reinstated if explained.
     """
     progress("kinematic calibration")
     fit = partial(calibrate, machine)
@@ -78,7 +78,7 @@ def explain(
 
 
 def without(explained: Explained, names: Collection[str]) -> Explained:
-    """Return it with the most probable hypothesis that has none of these causes, and the joint fit of that one."""
+    """Return the best hypothesis without these causes, with its joint fit."""
     settled = explained.settled
     posterior = settled.posterior
     best = next((h for h in posterior.hypotheses if not h.names.intersection(names)), Hypothesis((), 0.0))
@@ -92,7 +92,7 @@ def _with_set_up(
     sources: Sequence[ErrorSource],
     progress: Callable[[str], None],
 ) -> Explained:
-    """Compare; set free what balls and bars are certainly off, one after the other, and compare again."""
+    """Compare, free certain set-up faults one by one, and compare again."""
     while True:
         progress("candidates")
         channel = CircleChannel(before, sources)
@@ -111,10 +111,10 @@ def _with_set_up(
 
 
 class _Settling:
-    """Compare; lay out likely causes at their best values and compare again; fit jointly; until nothing changes.
+    """Compare, refine likely causes, fit jointly, until stable.
 
-    The most probable hypothesis and its rivals are laid out with tangents and slack before anything is added to them: what
-    a grid or a formula leaves of a large effect would call for causes that are not there.
+    The best hypothesis and rivals get tangents and slack before anything is added, lest grid errors call for false
+    causes.
     """
 
     def __init__(self, channel: CircleChannel, progress: Callable[[str], None]) -> None:
@@ -130,7 +130,7 @@ class _Settling:
         self._likely = CLOSE  # the most probable set alone is wanted, until nothing changes
 
     def run(self) -> SettledCircles:
-        """Rounds until nothing changes; who interrupts them gets what the last one came to.
+        """Run until stable; an interruption returns the last round.
 
         Raises:
             KeyboardInterrupt: in the first round.
@@ -149,7 +149,7 @@ class _Settling:
         return replace(_fitted_as_named(self._channel, settled), stopped=stopped)
 
     def _compared(self) -> SettledCircles:
-        """Compare sets of causes about the last fit."""
+        """Compare sets about the last fit."""
         channel, unmodelled = self._channel, self._unmodelled
         channel.give_back()
         target = channel.target(self._fit)
@@ -175,7 +175,7 @@ class _Settling:
         )
 
     def _is_done(self, settled: SettledCircles) -> bool:
-        """Lay out, widen or fit what a comparison calls for; True where it calls for nothing."""
+        """Refine, widen or fit as needed; True if nothing is needed."""
         if self._is_laid_out_better(settled):
             return False
         named = frozenset((m.cause.name, m.variant.law) for m in settled.members)
@@ -199,7 +199,7 @@ class _Settling:
         return False
 
     def _is_laid_out_better(self, settled: SettledCircles) -> bool:
-        """Lay out members and their rivals that were not yet, and let balls scatter as they do; False where nothing is to be done."""
+        """Refine members and rivals, and scale ball scatter; False if nothing is needed."""
         usual = _usual_scatter(self._fit) if any(m.cause.setup for m in settled.best.members) else self._scatter
         rough = [(m, r) for m, r in _with_rivals(settled) if (r.cause.name, r.variant.law) not in self._laid_out]
         if rough:
@@ -213,7 +213,7 @@ class _Settling:
 
 
 def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
-    """Named members of the most probable hypothesis, each with itself and with the causes that do best in its place."""
+    """Return named members with their best replacements."""
     best, named = settled.best, [cause for cause in settled.causes if cause.named]
     pairs = [(member, member) for member in settled.members]
     return pairs + [
@@ -230,10 +230,7 @@ def _listed(
     refused: Collection[str],
     given_up: Collection[tuple[str, str]],
 ) -> tuple[Cause, ...]:
-    """Causes that are compared: those with a name, faults of the set-up, and effects that none of the former has among its forms.
-
-    Laws that were given up are no forms of their cause any more.
-    """
+    """Return compared causes: named, set-up faults, and unmodelled effects without a name, without abandoned laws."""
     forms = [variant for cause in unmodelled.causes for variant in cause.variants]
     known = dict(zip(map(id, forms), named_already(comparison, forms, channel.forms(but_for=refused)), strict=True))
     nameless = [cause for cause in map(partial(_but_for, known=known), unmodelled.causes) if cause.variants]
@@ -246,7 +243,7 @@ def _listed(
 
 
 def _but_for(cause: Cause, known: Mapping[int, bool]) -> Cause:
-    """The unmodelled effect without the forms that have a name; one curve for each strut has it where every strut alone has."""
+    """Return the unmodelled effect without named forms."""
     kept = [v for v in cause.variants if not known[id(v)]]
     if [v.label for v in kept] == [EACH]:
         kept = []
@@ -254,7 +251,7 @@ def _but_for(cause: Cause, known: Mapping[int, bool]) -> Cause:
 
 
 def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:
-    """Causes of a joint fit whose values are negative beyond their uncertainty though they cannot be, and what to say of it."""
+    """Return significantly negative causes of a joint fit, with words."""
     base = {term.source.name for term in channel.calibration.layout.terms}
     found = {}
     for term in fit.layout.terms:
@@ -271,10 +268,9 @@ def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:
 
 
 def _idle_laws(fit: Calibration, channel: CircleChannel) -> set[tuple[str, str]]:
-    """Laws of a joint fit, by cause, whose nonlinear parameters the runs do not determine, and which contain a simpler law.
+    """Return laws with undetermined nonlinear parameters that have a simpler law.
 
-    Such a parameter is at an end of its range or as uncertain as before. Where the fit does not settle and no parameter is, all
-    such laws are asked to be simpler.
+    Such a parameter is at its end or as uncertain as before. In an unsettled fit without such, all laws are simplified.
     """
     sigma, prior = np.sqrt(fit.solution.variance), fit.layout.known.prior
     idle, all_of_them = set(), set()
@@ -291,10 +287,7 @@ def _idle_laws(fit: Calibration, channel: CircleChannel) -> set[tuple[str, str]]
 
 
 def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> SettledCircles:
-    """Return it with a joint fit of just the causes that its hypothesis names, where the rounds ended on another one.
-
-    Two hypotheses may take turns: each is the more probable one about the fit of the other.
-    """
+    """Return it with a joint fit of its own named causes, if rounds alternated."""
     base = {term.source.name for term in channel.calibration.layout.terms}
     fitted = {term.source.name for term in settled.after.layout.terms} - base
     if fitted == {m.cause.name for m in settled.members}:
@@ -316,7 +309,7 @@ def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> Settled
 
 
 def _steady(posterior: Posterior, fitted: frozenset[tuple[str, str]]) -> Hypothesis:
-    """The most probable hypothesis, or one as probable whose named causes are fitted already."""
+    """Return the best hypothesis, or an equal one already fitted."""
     top = posterior.best.log_posterior
     for hypothesis in posterior.hypotheses:
         if hypothesis.log_posterior < top - AS_PROBABLE:
@@ -331,7 +324,7 @@ AS_PROBABLE = 1.0
 
 
 def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis) -> Calibration | None:
-    """Fit base and named causes together, exactly, from the amplitudes of the comparison; None where that fails."""
+    """Fit base and named causes exactly; None on failure."""
     members = [member for member in best.members if member.cause.named]
     if not members:
         return channel.calibration
@@ -361,7 +354,7 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
 def _estimated(
     channel: CircleChannel, comparison: ModelComparison, hypothesis: Hypothesis
 ) -> list[NDArray[np.float64] | None]:
-    """Values of all parameters of each named member, of the first set where there are several."""
+    """Return named members' parameter values, of the first set."""
     values = comparison.estimates(hypothesis.members).values
     found: list[NDArray[np.float64] | None] = []
     for member in hypothesis.members:
@@ -388,7 +381,7 @@ def _values_in(fit: Calibration, name: str) -> dict[str, NDArray[np.float64]]:
 
 
 def _refine(channel: CircleChannel, fit: Calibration, named: Collection[tuple[str, str]]) -> None:
-    """Lay out named causes, each by the law that it follows, at their values in a fit."""
+    """Lay out named causes by law at fitted values."""
     for name, law in sorted(named):
         channel.refine(name, law, _values_in(fit, name), fit)
 
@@ -419,7 +412,7 @@ def _lay_out(
 
 
 def _usual_scatter(fit: Calibration) -> float:
-    """How many times as much as stated balls scatter: by chance half of them lie beyond their median, at least 1."""
+    """Return the ball scatter in stated sizes by the median, at least 1."""
     seats = [seat for seat in seats_of(fit) if seat.freedom > 0]
     if not seats:
         return 1.0

@@ -1,4 +1,4 @@
-"""What the comparison of circles came to: the most probable set of causes with its joint fit, and all that it needed."""
+"""The outcome of comparing circles."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class SettledCircles:
     """What the comparison came to.
 
     Attributes:
-        after: joint fit of base and named causes of the most probable hypothesis.
-        posterior: over sets of causes, about that fit.
-        best: its most probable hypothesis, or one as probable, whose named causes were fitted.
-        unmodelled: those among them that have no name.
-        noise: measured on what all causes together leave.
+        after: joint fit of base and named causes.
+        posterior: about that fit.
+        best: most probable, or equal and fitted.
+        unmodelled: unnamed members.
+        noise: beside all causes.
         left: misfit of the joint fit.
-        refused: causes that cannot be what these recordings show, and why.
-        scatter: how many times as much as stated balls scatter.
-        stopped: somebody interrupted the comparison; this is what it had come to.
+        refused: impossible causes with reasons.
+        scatter: of balls in stated sizes.
+        stopped: interrupted.
     """
 
     after: Calibration
@@ -53,18 +53,18 @@ class SettledCircles:
     stopped: bool = False
 
     def second_start_agrees(self) -> bool:
-        """Whether a search that begins with nothing, about the same fit, comes to the same most probable set of causes."""
+        """Return whether a search from nothing agrees."""
         anew = search(self.comparison, self.causes, most_members=MOST_MEMBERS, likely=CLOSE)
         return anew.best.names == self.posterior.best.names
 
     @property
     def members(self) -> tuple[Member, ...]:
-        """Named causes of the most probable hypothesis."""
+        """Return the best hypothesis's named causes."""
         return tuple(m for m in self.best.members if m.cause.named)
 
     @property
     def noise_mm(self) -> float:
-        """Standard deviation, per sample, of white noise that would act on smooth effects as this one does [mm]."""
+        """Return white noise per sample of equal effect on smooth quantities [mm]."""
         return float(np.sqrt(self.noise.power[0]))
 
 
@@ -73,9 +73,8 @@ class Explained:
     """Everything that the comparison needs and found.
 
     Attributes:
-        before: fit of the base model.
-        outliers: balls and runs that are off, kept from pulling it.
-        settled: what the comparison came to.
+        before: base fit.
+        outliers: kept from the fit.
     """
 
     before: Calibration

@@ -1,4 +1,4 @@
-"""What a diagnosis answers: verdicts, places, numbers with their uncertainty. No text is made here twice."""
+"""Answers of a diagnosis: verdicts, places, values with uncertainty."""
 
 from __future__ import annotations
 
@@ -35,24 +35,21 @@ __all__ = [
 
 @dataclass(frozen=True)
 class SourceFinding:
-    """What is said of one source.
+    """Finding on one source.
 
     Attributes:
-        ambiguous_with: sources that would explain the recordings about as well in its place.
-        gain: difference in log evidence that it brings.
-        concealed: share of its signature's sum of squares that the fitted machine parameters take up.
-        whole_um: root mean square of its signature over the runs [µm].
-        rest_um: of what the fitted parameters leave of it [µm].
-        parameters: values with their uncertainty as fitted; for a source that was not, the best amplitudes beside those that
-            were, whose uncertainty says how much could hide.
-        text: one sentence for people.
-        probability: that it is there, given the recordings and the catalogue of causes; of its class where it has one.
-        stability: selection frequency: share of draws of seven tenths of the tests in which it is found again; None where it was
-            not tried.
-        equivalent: causes that are observationally equivalent to it, itself among them; empty where there are none.
-        acts: in the whole session, or once.
-        sigmas: norm of its effect over its standard deviation; 0 for a cause that the most probable set has not.
-        gains: what it brought in groups of tests that were held back; None where they were not asked.
+        ambiguous_with: sources of about equal explanation.
+        gain: in log evidence.
+        concealed: share of squares absorbed by machine parameters.
+        whole_um: signature's rms over runs.
+        rest_um: beyond fitted parameters.
+        parameters: fitted, or best amplitudes, whose uncertainty bounds what could hide.
+        probability: given the catalogue; of its class if any.
+        stability: selection frequency over seven tenths of tests; None if not tried.
+        equivalent: with itself; may be empty.
+        acts: always or once.
+        sigmas: norm over standard deviation; 0 if not in the best set.
+        gains: held-out; None if not tested.
     """
 
     name: str
@@ -73,7 +70,7 @@ class SourceFinding:
 
     @property
     def persists(self) -> bool:
-        """Whether it happened once, such as a bump, and held-out tests tell of it, too."""
+        """Return whether held-out tests confirm a single event."""
         return self.verdict is Verdict.HAPPENED and self.gains is not None and self.gains.predicts
 
 
@@ -83,11 +80,11 @@ class Location:
 
     Attributes:
         direction: `ccw` or `cw`.
-        theta_deg: from, to: angles from +X towards +Y [deg].
-        strut: 1 to 6 that contributes most there; None where no strut does.
-        variable: what organises the misfit; empty where nothing does.
-        share: of the misfit's sum of squares.
-        peak_um: greatest smoothed deviation there [µm].
+        theta_deg: from, to: from +X towards +Y.
+        strut: 1 to 6, or None.
+        variable: may be empty.
+        share: of squares.
+        peak_um: greatest smoothed deviation.
     """
 
     test: str
@@ -101,7 +98,7 @@ class Location:
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """One point of a curve: where, its value and one standard uncertainty [µm]."""
+    """Place, value and standard uncertainty [µm]."""
 
     at: float
     value_um: float
@@ -110,17 +107,17 @@ class CurvePoint:
 
 @dataclass(frozen=True)
 class Curve:
-    """An unmodelled effect as a function of what organises it.
+    """An unmodelled effect as a curve.
 
     Attributes:
-        strut: 1 to 6; None where all struts follow it, or no strut's error is meant.
-        form: which of its kind, such as the period of a wave or the place of a step, in words; empty where there is one.
-        period: of a wave [unit of the variable]; None for what is none.
-        direction: in which what it moves does so most, 3 to 6 numbers as `convention` says; empty where that is one number.
-        convention: what was taken out of it because fitted parameters make that, in words; empty where nothing was.
-        readings_um: root mean square of what it does to the readings [µm].
-        unconcealed_um: of what the fitted machine parameters leave of that [µm].
-        points: least first; between them the curve is straight, or a wave.
+        strut: 1 to 6; None for all struts or none.
+        form: in words; may be empty.
+        period: of a wave, in the variable's unit; else None.
+        direction: of strongest motion, 3 to 6 numbers by `convention`; empty for a scalar.
+        convention: removed part that fitted parameters make; may be empty.
+        readings_um: rms effect on readings.
+        unconcealed_um: beyond fitted machine parameters.
+        points: rising; straight or a wave between.
     """
 
     follows: Follows
@@ -136,12 +133,12 @@ class Curve:
 
     @property
     def variable(self) -> str:
-        """What it follows, as printed."""
+        """Return the variable as printed."""
         return str(self.follows)
 
     @property
     def period_mm(self) -> float | None:
-        """Period of a wave of strut length [mm]; None for all others."""
+        """Return a length wave's period [mm], else None."""
         return self.period if self.follows.variable == "strut-length" else None
 
     def plain(self) -> dict[str, object]:
@@ -154,12 +151,11 @@ class Unexplained:
     """The unmodelled residual.
 
     Attributes:
-        rms_um: beyond noise, in the low harmonics [µm].
-        strut: 1 to 6; None where it is not one strut's.
-        follows: what organises it; None where nothing does clearly.
-        gain: log evidence of that description.
-        text: one sentence for people.
-        curve: the error along the variable; None where nothing organises it clearly.
+        rms_um: beyond noise, low harmonics.
+        strut: 1 to 6, or None.
+        follows: or None.
+        gain: log evidence.
+        curve: or None.
     """
 
     rms_um: float
@@ -171,16 +167,16 @@ class Unexplained:
 
     @property
     def variable(self) -> str | None:
-        """What organises it, as printed; None where nothing does clearly."""
+        """Return the variable as printed, or None."""
         return None if self.follows is None else str(self.follows)
 
 
 @dataclass(frozen=True)
 class Shift:
-    """How far a parameter of the earlier calibration had been pulled.
+    """A parameter's bias in the earlier calibration.
 
     Attributes:
-        before_um: without the sources that were found [µm].
+        before_um: without found sources.
     """
 
     parameter: str
@@ -190,7 +186,7 @@ class Shift:
 
     @property
     def shift_um(self) -> float:
-        """How far it had been pulled [µm]."""
+        """Return the bias [µm]."""
         return self.before_um - self.after_um
 
 
@@ -199,10 +195,9 @@ class NextTest:
     """A test worth measuring next.
 
     Attributes:
-        circle: ball, bar and path: x_mm, y_mm, z_mm, a_deg, b_deg, elevation_deg, feed_mm_min, wait_s.
-        source: what it is to reveal or to tell apart.
-        sigma_before: standard deviation of its amplitude, or of the combination of its amplitudes that gains most, with the tests
-            before it.
+        circle: x_mm, y_mm, z_mm, a_deg, b_deg, elevation_deg, feed_mm_min, wait_s.
+        source: to reveal or distinguish.
+        sigma_before: of its amplitude or most improved combination, with earlier tests.
     """
 
     text: str
@@ -218,20 +213,19 @@ class Diagnosis:
     """Everything found.
 
     Attributes:
-        mismatch: the recordings differ from the base model beyond noise.
-        misfit: of the base model.
-        left: misfit of the joint model.
-        before: fit of the base model.
-        after: joint fit; the same as `before` where nothing was found.
-        held_out: predictions of left-out tests, before and after [mm].
-        chosen_anew: what was found without each group of tests; None where nothing was named, or there are too few tests.
-        outliers: balls and runs that do not belong, kept from pulling the fits.
-        workspace: how far the earlier calibration was off elsewhere; None where nothing was found.
+        mismatch: beyond noise.
+        misfit: of the base.
+        left: of the joint model.
+        before: base fit.
+        after: joint fit, or `before`.
+        held_out: predictions before and after [mm].
+        chosen_anew: without each group; None without names or for few tests.
+        workspace: the calibration's error elsewhere; None without findings.
         locations: largest share first.
-        second_start_agrees: a second search came to the same set of causes; None where somebody stopped the comparison.
-        next_tests: best first, each beside those before it; empty where nothing is to be asked.
-        cancelling: effects of named causes on the readings that cancel each other [mm]; None where none do.
-        limits: what ended at a limit: the search, parameters, the joint fit.
+        second_start_agrees: None if interrupted.
+        next_tests: best first, each beside earlier ones; may be empty.
+        cancelling: [mm], or None.
+        limits: of search, parameters, joint fit.
     """
 
     mismatch: bool

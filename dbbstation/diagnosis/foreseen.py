@@ -1,4 +1,4 @@
-"""Tests that could be measured: circles within reach, and what their readings would say of base and causes."""
+"""Possible tests, and their information on base and causes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ SPACING_S = 200.0
 
 @dataclass(frozen=True)
 class Proposal:
-    """A circle that could be measured, so long after the session's last run."""
+    """A possible circle at a time after the last run."""
 
     circle: Circle
     wait_s: float
@@ -46,7 +46,7 @@ class Proposal:
 
     @property
     def text(self) -> str:
-        """What to do, in words."""
+        """Return what to do, in words."""
         x, y, z = (round(value) for value in self.circle.ball_mm)
         a, b, _ = self.circle.tilt_deg
         parts = [f"a circle about the ball at X {x} Y {y} Z {z} mm, tilted A {a:g} B {b:g} degrees"]
@@ -66,14 +66,14 @@ _Form: TypeAlias = tuple[str, str, tuple[float, ...], float]
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """One direction of a proposal, and what it would say, its mounting taken out.
+    """One direction of a proposal, its mounting removed.
 
     Attributes:
-        ball: orthonormal directions of what a shift of the ball could do, shape (n, 3).
-        weight: for the many samples of a run, of which a few stand here.
-        touched: base columns that it has to do with, shape (t,).
-        base: rows of these, shape (n, t).
-        of_sources: rows of the amplitudes of sources, by their form and the wait where that counts, shape (n, p).
+        ball: orthonormal effects of ball shifts, shape (n, 3).
+        weight: of samples represented.
+        touched: base columns, shape (t,).
+        base: their rows, shape (n, t).
+        of_sources: amplitude rows by form and wait, shape (n, p).
     """
 
     ball: NDArray[np.float64]
@@ -84,7 +84,7 @@ class _Run:
 
 
 class ForeseenTests:
-    """Tests that could be measured beside those of a channel; what each would say is worked out once, whatever is asked of it."""
+    """Possible tests of a channel, each computed once."""
 
     def __init__(self, channel: CircleChannel) -> None:
         self.channel = channel
@@ -94,10 +94,10 @@ class ForeseenTests:
         self._runs: dict[tuple[Circle, float, str], _Run] = {}
 
     def that_show(self, needs: Collection[Need]) -> list[Proposal]:
-        """Circles about the balls of the plan that the machine can run: at other tilts and elevations, and what needs ask for.
+        """Return circles about the plan's balls within reach.
 
         Args:
-            needs: of the sources that are to show: with the time come later tests, with time and path other feeds.
+            needs: time adds later tests, time and path other feeds.
         """
         seen: dict[str, Observation] = {}
         for observation in self.channel.observations:
@@ -133,12 +133,10 @@ class ForeseenTests:
         direction: Direction,
         asked: Sequence[tuple[ErrorSource, Variant]],
     ) -> NDArray[np.float64]:
-        """What a proposed run would say of base columns and of sources, compressed to few rows, shape (r, k).
-
-        Its mounting is new and tells nothing else, so what a shift of the ball could do is taken out of the rows.
+        """Return a run's compressed rows on base and sources, shape (r, k), its new mounting removed.
 
         Args:
-            asked: sources, whose columns stand behind those of the base, in all sets that they have.
+            asked: sources, behind the base, in all sets.
         """
         run = self._run(proposal, direction, asked)
         place = len(self.channel.base.prior)
@@ -202,7 +200,7 @@ def _form(proposal: Proposal, source: ErrorSource, variant: Variant) -> _Form:
 
 
 def _without(ball: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows without what lies along orthonormal directions."""
+    """Return rows orthogonal to directions."""
     return np.asarray(rows - ball @ (ball.T @ rows), dtype=np.float64)
 
 
@@ -215,13 +213,13 @@ def _reachable(machine: Machine, circle: Circle) -> bool:
 
 
 def _ends_s(channel: CircleChannel) -> float:
-    """Return the end of the last run, on the clock of its session [s]; zero where times are unknown."""
+    """Return the last run's end on the session's clock [s]; zero if unknown."""
     clocks = [o.started_s + float(o.raw.t_s[-1]) for o in channel.observations if o.started_s is not None]
     return max(clocks, default=0.0)
 
 
 def _motion(proposal: Proposal, direction: Direction, ends_s: float) -> Motion:
-    """One of two directions one after the other, mounted anew on the same ball, so long after the end of the last run [s]."""
+    """Return one of two successive directions, newly mounted, after the last run [s]."""
     first_s = ends_s + proposal.wait_s + SPACING_S
     before: Setup = proposal.observation.setup
     moving_s = (*before.moving_s, (first_s, first_s + SPACING_S * len(Direction)))

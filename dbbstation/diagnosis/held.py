@@ -1,4 +1,4 @@
-"""How far parameters may be off along directions that no run can see and that a fit therefore holds at nominal."""
+"""Possible errors along held directions."""
 
 from __future__ import annotations
 
@@ -13,20 +13,19 @@ if TYPE_CHECKING:
 
 
 def uncertainties(calibration: Calibration, held: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard uncertainty of every column, shape (k,), directions that were held as in `held_variance`."""
+    """Return every column's standard uncertainty, shape (k,), with `held_variance`."""
     seen = np.maximum(calibration.solution.variance, 0.0)
     return np.asarray(np.sqrt(seen + held_variance(calibration, held)), dtype=np.float64)
 
 
 def held_variance(calibration: Calibration, held: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Variance of every column along directions that were held, shape (k,).
+    """Return every column's variance along held directions, shape (k,).
 
-    A parameter that lies in such a direction would otherwise look well known at zero. Along it a source is taken to be as
-    large as it is where it was seen, or as its plausible size where that is more: a ball that is 70 µm off where the
-    runs see it is hardly less than 20 µm off where they do not.
+    Along them a source is as large as found or plausible, whichever is more: a ball 70 µm off in visible directions may
+    be 20 µm off in others.
 
     Args:
-        held: orthonormal rows over the fitted columns, in units of their scales, shape (h, f).
+        held: orthonormal rows in scales, shape (h, f).
     """
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
@@ -46,18 +45,16 @@ def held_variance(calibration: Calibration, held: NDArray[np.float64]) -> NDArra
 
 
 def unseen(calibration: Calibration) -> NDArray[np.float64]:
-    """What the runs cannot determine, as the model file has it: orthonormal rows over the fitted columns, shape (h, f)."""
+    """Return undetermined orthonormal rows for the model file, shape (h, f)."""
     fitted = np.flatnonzero(~calibration.layout.known.random)
     return calibration.null_space[:, fitted] / calibration.layout.known.scale[fitted]
 
 
 def held_beside(before: Calibration, after: Calibration) -> NDArray[np.float64]:
-    """Directions that a joint fit holds and the base fit did not have to, orthonormal rows, shape (h, f).
-
-    The base's own are a convention, such as base joints that are all higher or lower.
+    """Return directions held by the joint fit only, shape (h, f); the base's own are convention.
 
     Args:
-        after: the joint fit, which keeps the base's columns where they were and adds others behind.
+        after: base columns first.
     """
     wide = np.zeros((len(before.solution.held), after.solution.held.shape[1]))
     wide[:, : before.solution.held.shape[1]] = before.solution.held

@@ -1,4 +1,4 @@
-"""What the tests say without some of them: predictions of left-out tests, and what is found again in the others."""
+"""Held-out predictions, and causes found again."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
-    """Predictions of left-out tests without and with the named causes [mm]."""
+    """Return predictions of held-out tests without and with named causes [mm]."""
     channel, settled = explained.channel, explained.settled
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
     single = max(_single_noise_mm(channel.observations, noise_mm, fine_noise_mm(settled.after)), SMALLEST_NOISE_MM)
@@ -45,11 +45,10 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
 
 
 def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
-    """Share of draws of seven tenths of the tests in which causes are found again; nothing where none was found.
+    """Return causes' shares of selections in seven tenths of tests; may be empty.
 
     Args:
-        explained: what the comparison came to.
-        names: of named causes that compete in each draw, beside everything that was found.
+        names: causes competing in each draw.
     """
     channel, settled = explained.channel, explained.settled
     if not settled.members:
@@ -70,11 +69,10 @@ def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
 
 
 def widened_by_tests(calibration: Calibration) -> Calibration:
-    """The same fit with the larger of its own uncertainty and that of a jackknife over groups of tests.
+    """Return the fit with the larger of own and jackknife uncertainty by tests.
 
-    What balls, runs and readings do otherwise than the model of noise says shows in how values move when tests are left out. Nothing is
-    chosen anew, the fit is linear about its values, correlations stay [`widening`], and random effects keep what is stated. With fewer
-    than `LEAST_PARTS` groups of tests nothing changes.
+    Nothing is chosen anew; correlations stay [`widening`], random effects keep stated sizes. Below `LEAST_PARTS` groups
+    nothing changes.
     """
     groups = groups_of(calibration.observations)
     if groups is None:
@@ -95,13 +93,13 @@ def widened_by_tests(calibration: Calibration) -> Calibration:
 
 
 def groups_of(observations: Sequence[Observation]) -> list[int] | None:
-    """Group of the test of each run that is held back in turn; None where there are too few groups."""
+    """Return each run's held-back group by test; None for too few."""
     groups = in_turn([o.test for o in observations], FOLDS)
     return groups if len(np.unique(groups)) >= LEAST_PARTS else None
 
 
 def _single_noise_mm(observations: Sequence[Observation], noise_mm: float, fine_mm: float) -> float:
-    """Noise of a single sample, where the low harmonics, few of all, carry more of it than the fine ones [mm]."""
+    """Return a single sample's noise if low harmonics carry more than fine ones [mm]."""
     samples = float(np.mean([len(o.raw) for o in observations]))
     low = min((2 * LOW + 1) / samples, 1.0)
     return float(np.sqrt(low * noise_mm**2 + (1.0 - low) * min(fine_mm, noise_mm) ** 2))

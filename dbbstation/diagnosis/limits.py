@@ -1,4 +1,4 @@
-"""What ended at a limit: a search, a parameter, a joint fit, or the patience of whoever waits."""
+"""Limits reached by search, parameters, fit or interruption."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def limits_of(settled: SettledCircles) -> tuple[LimitReached, ...]:
-    """What ended at a limit on the way to a most probable set and its joint fit, the search first."""
+    """Return all limits, the search first."""
     found = []
     if settled.stopped:
         found.append(
@@ -34,7 +34,7 @@ def limits_of(settled: SettledCircles) -> tuple[LimitReached, ...]:
 
 
 def limits_of_fit(fit: Calibration) -> tuple[LimitReached, ...]:
-    """Parameters that a fit holds at an end of their range, and whether its last step still moved."""
+    """Return parameters at range ends, and an unsettled last step."""
     found = [_at_end(fit, column) for column in fit.at_limit]
     if not fit.settled:
         text = "The joint fit still moved at its last step. Values and uncertainties are those of that step."
@@ -43,7 +43,7 @@ def limits_of_fit(fit: Calibration) -> tuple[LimitReached, ...]:
 
 
 def _at_end(fit: Calibration, column: int) -> LimitReached:
-    """A parameter that a fit holds at an end of its range."""
+    """Return a parameter at its range end."""
     term = next(one for one in fit.layout.terms if one.columns.start <= column < one.columns.stop)
     parameter = term.parameters[column - term.columns.start]
     value = float(fit.x[column])

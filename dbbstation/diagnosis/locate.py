@@ -1,4 +1,4 @@
-"""Where a misfit is: test, direction, angles, strut."""
+"""Where a misfit is: test, direction, angle, strut."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ COUNTS_SIGMA = 4.0
 def locations_of(
     before: Calibration, after: Calibration, found: Sequence[ErrorSource], first: Misfit, unnamed: str | None
 ) -> tuple[Location, ...]:
-    """Where what the base model leaves is largest, and which strut the found sources say most of it comes from.
+    """Return the largest base misfits and their struts by found sources.
 
     Args:
-        after: the joint fit.
-        unnamed: variable of what has no name; None where nothing organises it.
+        after: joint fit.
+        unnamed: its variable, or None.
     """
     fitted = [f for f in after.model.sources if f.source in found]
     variable = next((source.varies_with for source in found if source.varies_with), unnamed or "")
@@ -47,12 +47,12 @@ def locate(
     struts: Sequence[NDArray[np.float64] | None],
     variable: str,
 ) -> tuple[Location, ...]:
-    """Stretches of the circles where the misfit exceeds the noise, largest share first.
+    """Return stretches beyond noise, largest share first.
 
     Args:
-        residual_mm: what the base model leaves of each, shape (n,) [mm].
-        noise_mm: of one sample, as it acts on smooth effects [mm].
-        struts: per run, what each strut contributes to the reading, shape (n, 6) [mm]; None where none does.
+        residual_mm: of the base, shape (n,) each.
+        noise_mm: per sample, for smooth effects.
+        struts: contributions per run, shape (n, 6) [mm]; or None.
     """
     smoothed = [smooth(r, np.radians(o.raw.phi_deg)) for o, r in zip(observations, residual_mm, strict=True)]
     total = sum(float(s @ s) for s in smoothed)
@@ -80,7 +80,7 @@ def locate(
 
 
 def strut_contributions(calibration: Calibration, fitted: Sequence[Fitted]) -> list[NDArray[np.float64] | None]:
-    """Per run, what the strut-length errors of sources add to the reading, strut by strut, shape (n, 6) [mm]."""
+    """Return struts' contributions to readings per run, shape (n, 6) [mm]."""
     model = calibration.model
     contributions: list[NDArray[np.float64] | None] = []
     for observation in calibration.observations:
@@ -106,7 +106,7 @@ def _strut(contribution: NDArray[np.float64] | None, rows: NDArray[np.int64]) ->
 
 
 def _stretches(marked: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Start and end of every run of marked samples of a ring; the end may lie beyond the ring's length."""
+    """Return begin and end of marked stretches of a ring; ends may exceed its length."""
     if marked.all():
         return [(0, len(marked))]
     if not marked.any():

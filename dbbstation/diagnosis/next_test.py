@@ -1,4 +1,4 @@
-"""Which tests to measure next: the fewest that change a verdict that is still open, or halve an uncertainty."""
+"""The fewest tests that change an open verdict or halve an uncertainty."""
 
 from __future__ import annotations
 
@@ -44,15 +44,13 @@ HALVED = 0.5
 def next_tests(
     explained: Explained, findings: Sequence[SourceFinding], elsewhere: WorkspaceError | None
 ) -> tuple[NextTest, ...]:
-    """Return the tests that tell most about the first cause that is still open, told apart from its likenesses.
+    """Return the best tests for the first open cause, against its rivals.
 
-    A cause that was identified is open too, where the joint model does not know the rest of the workspace better than what
-    it corrects there.
+    An identified cause is open if the workspace remains more uncertain than corrected.
 
     Args:
-        explained: what the comparison came to.
-        findings: one per named cause, most probable first.
-        elsewhere: what the causes change over the workspace; None where none was found.
+        findings: per named cause, most probable first.
+        elsewhere: workspace change; None without findings.
     """
     channel, settled = explained.channel, explained.settled
     could_be = ForeseenTests(channel)
@@ -81,19 +79,15 @@ def next_tests(
 def propose(
     could_be: ForeseenTests, asked: Sequence[tuple[ErrorSource, Variant]], noise_mm: float, most: int = MOST_PROPOSED
 ) -> tuple[NextTest, ...]:
-    """Return the fewest tests that together change what can be said of a source, or halve its uncertainty.
+    """Return the fewest tests that change a source's verdict or halve its uncertainty.
 
-    Tests are added one by one, each the one that lowers the root mean square uncertainty of the amplitudes most beside
-    those before it. A verdict changes where the source becomes testable beside all that it must be told apart from: half
-    of the combinations of its amplitudes, at their plausible sizes, stand out by five standard deviations. An uncertainty
-    is that of one combination; a proposal states that of the combination that gains most.
-
-    Empty where so many tests would do neither, where no circle is within reach, or where only the measurement itself
-    shows what a source needs.
+    Tests are added greedily by rms amplitude uncertainty. A verdict changes if half of the plausible combinations stand
+    out by five standard deviations; an uncertainty is the best combination's. Empty if so many tests fail, none is within
+    reach, or the need cannot be foreseen.
 
     Args:
-        could_be: tests to choose from, beside what was measured.
-        asked: the source to reveal, with its columns; then those that it must be told apart from.
+        could_be: possible tests.
+        asked: the source with columns, then its rivals.
     """
     if not all(source.needs <= PROPOSED for source, _ in asked):
         return ()
@@ -142,7 +136,7 @@ def propose(
 def _told(
     covariance: NDArray[np.float64], rows: NDArray[np.float64], noise_mm: float, own: slice
 ) -> NDArray[np.float64]:
-    """Covariance of some columns once further rows have been measured."""
+    """Return the covariance after further rows."""
     seen = np.flatnonzero(rows.any(axis=0))
     gain = rows[:, seen] @ covariance[seen, own]
     answer = rows[:, seen] @ covariance[np.ix_(seen, seen)] @ rows[:, seen].T + noise_mm**2 * np.eye(len(rows))
@@ -150,18 +144,18 @@ def _told(
 
 
 def _size(covariance: NDArray[np.float64], variant: Variant) -> float:
-    """Root mean square uncertainty of amplitudes in units of their plausible sizes."""
+    """Return the rms uncertainty in plausible sizes."""
     return float(np.sqrt(np.mean(np.maximum(np.diag(covariance), 0.0) / variant.plausible**2)))
 
 
 def _sigmas(covariance: NDArray[np.float64], variant: Variant) -> NDArray[np.float64]:
-    """Standard deviations of uncorrelated combinations of amplitudes in units of their plausible sizes, least first, (p,)."""
+    """Return uncorrelated standard deviations in plausible sizes, least first, (p,)."""
     variances = np.linalg.eigvalsh(covariance / np.outer(variant.plausible, variant.plausible))
     return np.sqrt(np.maximum(variances, np.finfo(np.float64).tiny))
 
 
 def _worth_it(now: NDArray[np.float64], then: NDArray[np.float64]) -> bool:
-    """Whether a source becomes testable, or a combination of its amplitudes half as uncertain."""
+    """Return whether a source becomes testable or half as uncertain."""
     testable = [bool(np.mean(sigmas <= 1.0 / OUT) >= TESTABLE_SHARE) for sigmas in (now, then)]
     return testable == [False, True] or bool(np.any(then <= HALVED * now))
 

@@ -1,4 +1,4 @@
-"""Forms of a cause by its parts: all its amplitudes, those of one part alone, one for all struts."""
+"""Forms of a cause by parts: all, one, or common."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Part:
     """One form of a cause.
 
     Attributes:
-        label: strut or part; empty for all of them.
-        amplitudes: that it has, among those of all sets, one set after the other; all of them, added up, where `alike`.
+        label: strut or part; empty for all.
+        amplitudes: over all sets; summed if `alike`.
     """
 
     label: str
@@ -33,14 +33,14 @@ class Part:
 
     @property
     def alike(self) -> bool:
-        """Whether it has one amplitude for all struts."""
+        """Return whether all struts share one amplitude."""
         return self.label == ALIKE
 
 
 def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
-    """Forms of a cause, whose log weights are those of one distribution: kinds of forms are equally likely, and members of a kind.
+    """Return forms with log weights: kinds equally likely, members within.
 
-    What wears or was made badly is often one strut, or all alike; all others free beside it would hide what is faint.
+    Wear is often one strut, or alike on all.
     """
     every = tuple(range(len(amplitudes) * sets))
     labels = [p.alone_with for p in amplitudes] * sets

@@ -1,4 +1,4 @@
-"""What naming causes gained in every test: traces beside both models, residuals and circularity."""
+"""Each test's gain by named causes."""
 
 from __future__ import annotations
 
@@ -24,14 +24,13 @@ TRACE_SECTORS = 360
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One run as deviations from the commanded circle, by rising angle, shape (s,) each.
+    """One run by rising angle, shape (s,) each.
 
     Attributes:
-        direction: sense of travel.
-        theta_deg: angle from +X towards +Y [deg].
-        measured_um: bar length less its nominal length [µm].
-        before_um: the same as the base model, fitted, predicts it [µm].
-        after_um: as the joint model predicts it [µm].
+        theta_deg: from +X towards +Y.
+        measured_um: less nominal bar length.
+        before_um: by the base.
+        after_um: by the joint model.
     """
 
     direction: Direction
@@ -46,7 +45,7 @@ class GainOfTest:
     """One test, all its runs together.
 
     Attributes:
-        residual_um: root mean square of the residual within the mounting, before and after [µm].
+        residual_um: rms within the mounting, before and after.
     """
 
     name: str
@@ -56,12 +55,12 @@ class GainOfTest:
 
     @property
     def gain_um(self) -> float:
-        """How much less is left [µm]."""
+        """Return the reduction [µm]."""
         return self.residual_um[0] - self.residual_um[1]
 
 
 def gains_by_test(diagnosis: Diagnosis) -> tuple[GainOfTest, ...]:
-    """What every test gained, in the order of the recordings."""
+    """Return every test's gain, in recording order."""
     before, after = diagnosis.before, diagnosis.after
     rounds = [_circularity_um(before), _circularity_um(after)]
     names = names_of_tests(before.observations)

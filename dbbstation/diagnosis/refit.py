@@ -1,4 +1,4 @@
-"""A fit again: of other runs, or with more sources, begun where the last one ended."""
+"""Refits with other runs or more sources."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def refitted(
     more: Sequence[ErrorSource] = (),
     start: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> Calibration:
-    """Fit runs with the sources of another fit, begun at its values, and with more of them, begun where `start` says."""
+    """Fit runs with another fit's sources and values, and more from `start`."""
     layout = like.layout
     sources = list({term.source.name: term.source for term in layout.terms}.values())
     begin = {

@@ -1,8 +1,7 @@
-"""First look for waves, bumps and steps: which of many forms the readings follow best, beside a base fitted anew.
+"""First look for waves, bumps and steps beside a refitted base.
 
-Readings are added up over narrow pieces of a variable, once for what the base leaves and once for everything that the
-base can do. Any curve over the variable then costs as much as it has pieces, and what it would explain beside the base
-is still exact but for the width of a piece. The best few of each kind are compared as unmodelled effects.
+Sums over narrow pieces, of residual and base, make curves cheap and exact within a piece. The best of each kind compete
+as unmodelled effects.
 """
 
 from __future__ import annotations
@@ -96,13 +95,13 @@ PLACE_MM = 5.0
 
 
 class TemplateScan:
-    """What a fit leaves of all runs, and what its base can do, in units of noise.
+    """A fit's residual and base directions, in noise.
 
     Args:
-        runs: as shapes see them.
-        residual: per run, what the fit leaves, shape (n,) [mm].
-        jacobian: per run, of all base columns, shape (n, k); each is asked for once.
-        held: directions that are kept at nominal.
+        runs: for shapes.
+        residual: shape (n,) each.
+        jacobian: shape (n, k) each, used once.
+        held: at nominal.
     """
 
     def __init__(
@@ -134,7 +133,7 @@ class TemplateScan:
     def sums(
         self, variable: str, strut: int | None, moves: str, pieces: Callable[[NDArray[np.float64]], NDArray[np.int64]]
     ) -> DirectionalSums:
-        """Add up over pieces of a variable, given the piece of each value."""
+        """Sum over pieces of a variable."""
         values = np.concatenate([run.values[variable] for run in self._runs])
         gain = np.vstack([run.gain[moves] for run in self._runs])
         if strut is not None:
@@ -147,7 +146,7 @@ class TemplateScan:
         ends = np.concatenate([[0], np.cumsum(number)])
 
         def added(samples: NDArray[np.floating], times: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-            """Sums over the pieces, of samples times one number each."""
+            """Return samples summed over pieces with factors."""
             weights = np.ones(many) if times is None else times[rows]
             return np.asarray(csr_array((weights, rows, ends), shape=(len(number), many)) @ samples, dtype=np.float64)
 
@@ -162,7 +161,7 @@ class TemplateScan:
 
 
 def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
-    """Return the shapes that the readings follow best, some of every kind that the runs can show."""
+    """Return the best shapes of every visible kind."""
     found: list[Shape] = []
     for strut in range(1, STRUTS + 1):
         low, high = (float(limit["strut-length"][strut - 1]) for limit in (extent.low, extent.high))
@@ -210,10 +209,7 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
 
 
 def _shared(found: Sequence[Shape], extent: Ranges) -> list[Shape]:
-    """The same with each wave and ringing of a strut on all struts, at the form of the strut that shows it most.
-
-    One effect of six struts is then one cause: forms of two struts that no recording tells apart would count as two.
-    """
+    """Return waves and ringing of one strut on all struts, since forms of two may be indistinguishable."""
     kept: list[Shape] = []
     for shape in sorted(found, key=lambda one: -one.explained):
         if shape.strut is None or shape.kind not in {"wave", "ringing"}:
@@ -224,7 +220,7 @@ def _shared(found: Sequence[Shape], extent: Ranges) -> list[Shape]:
 
 
 def _is_one(one: Shape, other: Shape, extent: Ranges) -> bool:
-    """Whether two forms of struts differ by less than half a wave over the extent of their variable, or a few steps of the scan."""
+    """Return whether two forms differ by less than half a wave or a few scan steps."""
     if other.strut is None or one.follows != other.follows:
         return False
     if isinstance(one.form, Wave) and isinstance(other.form, Wave):
@@ -252,7 +248,7 @@ def _piece(values: NDArray[np.float64], low: float, width: float) -> NDArray[np.
 
 
 def _since(values: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Time since a reversal in narrow pieces, long ago in one; the instant itself is in none of the later ones."""
+    """Return time since reversal in pieces, fine at first."""
     return np.round(np.clip(values, -RINGING_S, RINGING_S) / RINGING_PIECE_S).astype(np.int64)
 
 
@@ -266,7 +262,7 @@ def _bumps(low: float, high: float) -> list[Form]:
 
 
 def _steps(low: float, high: float, count: int = _STEPS) -> list[Form]:
-    """Steps that are sharp, anywhere but at the very ends."""
+    """Return sharp steps away from the ends."""
     wide = (high - low) / count
     return [StepForm(float(at), wide / 4.0) for at in np.linspace(low, high, count + 1)[2:-2]] if wide > 0.0 else []
 
@@ -284,7 +280,7 @@ def _lines(places: NDArray[np.float64]) -> list[Form]:
 def _best(
     variable: str, kind: str, strut: int | None, moves: str, sums: DirectionalSums, forms: Sequence[Form], apart: float
 ) -> list[Shape]:
-    """Return the forms that explain most, of those that explain more than their neighbours in the list."""
+    """Return local maxima of explanation."""
     if not forms:
         return []
     curves = np.stack([form.columns(sums.at) for form in forms], axis=1)
@@ -296,7 +292,7 @@ def _best(
 
 
 def _peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
-    """Places that explain more than their neighbours, best first."""
+    """Return local maxima, best first."""
     padded = np.concatenate([[-np.inf], explained, [-np.inf]])
     peaks = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
     return np.asarray(peaks[np.argsort(-explained[peaks])][:most])
@@ -305,7 +301,7 @@ def _peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
 def _waves(
     variable: str, strut: int | None, moves: str, sums: DirectionalSums, grid: NDArray[np.float64]
 ) -> list[Shape]:
-    """Return waves of a grid of frequencies, made finer about the best ones."""
+    """Return waves of a frequency grid, refined."""
     if len(grid) == 0:
         return []
     explained = sums.explained(_cosines(sums.at, grid))
@@ -336,7 +332,7 @@ def _finer(
 
 
 def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cosine and sine of each frequency, shape (b, m, 2)."""
+    """Return cosines and sines, shape (b, m, 2)."""
     phase = 2.0 * np.pi * np.outer(at, frequencies)
     return np.stack([np.cos(phase), np.sin(phase)], axis=2)
 
@@ -344,7 +340,7 @@ def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArr
 def _waves_of_time(
     strut: int | None, moves: str, sums: DirectionalSums, low: float, width: float, extent: float
 ) -> list[Shape]:
-    """Waves of time at all frequencies at once, by Fourier transformation of the sums."""
+    """Return waves over time by Fourier transform."""
     place = np.floor((sums.at - low) / width).astype(np.int64)
     size = next_fast_len(2 * (int(place.max()) + 1), real=True)
     first, last = max(1, int(np.floor(0.5 * size * width / extent))), size // 4

@@ -1,7 +1,6 @@
-"""Unmodelled effects: an error of a strut, the reading or a ball that follows some variable.
+"""Unmodelled effects of struts, readings or balls over variables.
 
-They compete with the named sources. Where one of them explains the recordings clearly better than every source that
-has a name, the cause is unknown, and strut and variable are what can be said of it.
+They compete with named sources; if one wins, its cause is unknown and strut and variable describe it.
 """
 
 from __future__ import annotations
@@ -109,11 +108,11 @@ THERMOMETERS = ("machine", "jig", "bar")
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """One run as shapes see it, rows that count.
+    """One run for shapes, kept rows.
 
     Attributes:
-        values: by variable, shape (n,), (n, 6) where each strut has its own, or (n, c) for c coordinates.
-        gain: how the reading answers to what moves, by its name, shape (n, d); of the struts shape (n, 6).
+        values: by variable, shape (n,), (n, 6) by strut, or (n, c).
+        gain: of the reading by what moves, shape (n, d); struts (n, 6).
     """
 
     values: dict[str, NDArray[np.float64]]
@@ -122,10 +121,10 @@ class Samples:
 
 @dataclass(frozen=True)
 class Follows:
-    """What an unmodelled error is a function of, and what it moves.
+    """What an unmodelled error follows and moves.
 
     Attributes:
-        kind: of curve, such as `wave`; empty for the usual one.
+        kind: such as `wave`; empty for the usual one.
     """
 
     variable: str
@@ -133,14 +132,14 @@ class Follows:
     moves: str = EVERY
 
     def __str__(self) -> str:
-        """Variable, kind of curve and what moves, as printed."""
+        """Return variable, kind and moved part as printed."""
         kind = f" {self.kind}" if self.kind else ""
         own = (self.variable, self.moves) in ITS_OWN
         return f"{self.variable}{kind}{'' if own else BEHIND.get(self.moves, '')}"
 
     @property
     def moves_struts(self) -> bool:
-        """Whether it is an error of strut lengths, of one or of all."""
+        """Return whether strut lengths err."""
         return self.moves in {EVERY, SIGNED}
 
 
@@ -149,12 +148,11 @@ class Shape:
     """One family of curves.
 
     Attributes:
-        variable: what the error is a function of.
-        kind: of curve, such as `wave`; empty for the usual one.
-        strut: 1 to 6; None where all struts follow the same curve, or where it is no strut's error.
-        moves: what moves; where that is every strut and a strut is given, only that one.
-        tried: how many independent forms it was picked from.
-        explained: sum of squares that it explains by itself where it was picked, in units of the noise.
+        kind: such as `wave`; empty for the usual one.
+        strut: 1 to 6; None for all or none.
+        moves: what moves; a given strut restricts it.
+        tried: independent forms of the choice.
+        explained: squares alone, in noise.
     """
 
     variable: str
@@ -167,16 +165,16 @@ class Shape:
 
     @property
     def follows(self) -> Follows:
-        """What it is a function of, and what it moves."""
+        """Return what it follows and moves."""
         return Follows(self.variable, self.kind, self.moves)
 
     @property
     def period(self) -> float | None:
-        """Of a wave [unit of the variable]; None for all others."""
+        """Return a wave's period in the variable's unit, else None."""
         return 1.0 / self.form.frequency if isinstance(self.form, Wave) else None
 
     def columns(self, samples: Samples) -> NDArray[np.float64]:
-        """Effect of each amplitude on the readings of a run: directions that move times curves, shape (n, d p)."""
+        """Return amplitudes' effects on readings: directions times curves, shape (n, d p)."""
         values, gain = self.followed(samples.values[self.variable]), self._gain(samples)
         if self.variable not in OF_STRUTS or self.strut is not None:
             curve = self.form.columns(values)
@@ -184,7 +182,7 @@ class Shape:
         return np.einsum("ni,nip->np", samples.gain[self.moves], self.form.columns(values))
 
     def followed(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values of the variable that this one follows: of its strut or of its place, where there are several."""
+        """Return its variable's values, by strut or place."""
         if isinstance(self.form, Spring):
             return values[..., WAYS_DEG.index(self.form.towards_deg)]
         return values[..., self.strut - 1] if self.variable in OF_STRUTS and self.strut else values
@@ -219,14 +217,14 @@ ITS_OWN = {
 
 @dataclass(frozen=True, eq=False)
 class Ranges:
-    """Least and greatest value of each variable over all runs, so that curves have the same points in each."""
+    """Variables' extents over all runs."""
 
     low: dict[str, NDArray[np.float64]]
     high: dict[str, NDArray[np.float64]]
 
 
 def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]]:
-    """Return what errors may follow, by name, of all rows: shape (n, 6) of struts, else (n,) or (n, c)."""
+    """Return variables of all rows: shape (n, 6) by strut, else (n,) or (n, c)."""
     struts = motion.struts(machine)
     found = {"strut-length": struts.length_mm}
     if motion.is_path:
@@ -254,9 +252,9 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
 
 
 def _since_reversal_s(time_s: NDArray[np.float64], speed_mm_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Time since each strut last turned round, with the sign of its new direction; zero before the first time, shape (n, 6) [s].
+    """Return time since each strut's reversal with its new sign; zero before, shape (n, 6) [s].
 
-    The instant lies between two samples, where the speed is zero on a straight line between both.
+    The instant is interpolated at zero speed.
     """
     since = np.zeros_like(speed_mm_s)
     for strut in range(speed_mm_s.shape[1]):
@@ -283,8 +281,8 @@ def samples_of(
     """Return variables and gains of a run.
 
     Args:
-        reading: what a model predicts for it.
-        pivot_mm: about which the table may turn with its balls, shape (3,) [mm]; None: it is not asked.
+        reading: predicted.
+        pivot_mm: of table rotation, shape (3,); None: none.
     """
     known = {name: values[motion.kept] for name, values in variables(motion, machine).items()}
     gain = {
@@ -305,7 +303,7 @@ def samples_of(
 
 
 def _pulled(struts: Struts) -> NDArray[np.float64]:
-    """Lengthening of the struts by a force along each axis and a moment about each, one for each unit, (n, 6, 6)."""
+    """Return struts' stretch per unit force and moment, (n, 6, 6)."""
     count = len(struts.length_mm)
     stretch = np.empty((count, STRUTS, 6))
     for k, load in enumerate(np.diag([1.0] * 3 + [LEVER_MM] * 3)):
@@ -315,7 +313,7 @@ def _pulled(struts: Struts) -> NDArray[np.float64]:
 
 
 def _hoses(frames: Frames, machine: Machine) -> NDArray[np.float64]:
-    """From the middle of the platform's joints to each far place, shape (n, 12, 3) [mm]."""
+    """Return vectors from the platform's middle to far places, shape (n, 12, 3) [mm]."""
     middle = frames.position_mm + frames.rotation @ machine.hexapod.platform_joints_mm.mean(axis=0)
     angles = np.radians(WAYS_DEG)
     places = AWAY_MM * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
@@ -324,10 +322,9 @@ def _hoses(frames: Frames, machine: Machine) -> NDArray[np.float64]:
 
 
 def _pulled_towards(motion: Motion, machine: Machine) -> NDArray[np.float64]:
-    """Lengthening of the struts by a unit pull, shape (n, 6, 60): five numbers for each place.
+    """Return struts' stretch by a unit pull, shape (n, 6, 60): five numbers per place.
 
-    The pull on the middle of the platform's joints; what it does as a moment where it holds the platform elsewhere, at
-    `LEVER_MM` along each of the platform's axes; and a force down, since the place may be higher or lower.
+    Pull at the platform's middle, moments at `LEVER_MM` along its axes, and a force down for unknown height.
     """
     struts, frames = motion.struts(machine), motion.frames(machine)
     count = len(motion)
@@ -344,7 +341,7 @@ def _pulled_towards(motion: Motion, machine: Machine) -> NDArray[np.float64]:
 
 
 def ranges(runs: Sequence[Samples]) -> Ranges:
-    """Extent of every variable that all runs have."""
+    """Return extents of common variables."""
     names = [name for name in runs[0].values if all(name in run.values for run in runs)]
     low = {name: np.min([run.values[name].min(axis=0) for run in runs], axis=0) for name in names}
     high = {name: np.max([run.values[name].max(axis=0) for run in runs], axis=0) for name in names}
@@ -352,10 +349,10 @@ def ranges(runs: Sequence[Samples]) -> Ranges:
 
 
 def shapes(extent: Ranges) -> list[Shape]:
-    """Return the families that need no first look, in the order of their columns.
+    """Return families without look, in column order.
 
     Args:
-        extent: of the variables over all runs.
+        extent: over all runs.
     """
     found: list[Shape] = []
     warmed = [n for n in extent.low if n in TEMPERATURES and np.max(extent.high[n] - extent.low[n]) > FOLLOWED_K]
@@ -400,7 +397,7 @@ def shapes(extent: Ranges) -> list[Shape]:
 
 
 def wander(runs: Sequence[Samples]) -> list[Shape]:
-    """A slow wander of the reading, within runs and from one to the next: a random walk over the time; none without times."""
+    """Return a random walk of the reading over time; none without times."""
     times = [run.values["time"] for run in runs if "time" in run.values]
     if len(times) < len(runs):
         return []

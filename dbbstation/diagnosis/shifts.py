@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def shifts_between(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
-    """How far machine parameters had been pulled, largest first; nothing where nothing was found."""
+    """Return biases of machine parameters by missing physics, largest first; may be empty."""
     if after is before:
         return ()
     row_of = {name: k for k, name in enumerate(after.layout.names)}

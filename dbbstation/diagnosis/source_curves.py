@@ -1,8 +1,7 @@
-"""What found sources do to struts or readings, over the variable that organises it, beside what the readings say.
+"""Found sources over their variable, beside readings.
 
-The readings are drawn as partial residuals: the error that the joint model puts on a strut, plus what the residuals
-would put on that strut alone [Larsen and McCleary, Technometrics 14 (1972) 781]. Where the model is right they lie on
-its curve; where its curve has the wrong form they leave it.
+Readings are partial residuals: the model's strut error plus the residual on that strut alone [Larsen and McCleary,
+Technometrics 14 (1972) 781]; a wrong form departs from its curve.
 """
 
 from __future__ import annotations
@@ -55,14 +54,14 @@ SENSES = {1.0: "lengthening", -1.0: "shortening"}
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """One curve of a panel, averaged over pieces of the variable's range, shape (b,) each.
+    """One curve over pieces, shape (b,) each.
 
     Attributes:
-        sense: `lengthening` or `shortening` where the error hangs on the direction of travel; empty otherwise.
-        model_um: mean error that the source puts there in the joint model [µm].
-        before_um: error that would explain the residual of the base model best; NaN where hardly seen [µm].
-        after_um: the model's, plus the one that would explain the residual of the joint model best; NaN alike [µm].
-        sigma_um: standard deviation of either by noise, what fitted parameters take aside [µm].
+        sense: `lengthening` or `shortening`, or empty.
+        model_um: mean error by the source.
+        before_um: explaining the base residual; NaN if hardly seen.
+        after_um: the model's plus the joint residual's; NaN if hardly seen.
+        sigma_um: by noise beside fitted parameters.
     """
 
     sense: str
@@ -78,10 +77,10 @@ class SourceCurves:
     """One source.
 
     Attributes:
-        source: its name; empty for the unmodelled residual.
-        fine: the error may change from each piece of the range to the next, as a wave does.
-        struts: branches of each strut, 1 to 6; empty where the source moves no strut.
-        reading: branches of the bar's reading, where it moves no strut.
+        source: empty for the unmodelled residual.
+        fine: may change between pieces, as a wave.
+        struts: by 1 to 6; may be empty.
+        reading: if no strut moves.
     """
 
     source: str
@@ -94,7 +93,7 @@ class SourceCurves:
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """Samples of all runs, one column per strut or one for the reading, shape (n, c) each."""
+    """Samples of all runs by strut or reading, shape (n, c) each."""
 
     variable: NDArray[np.float64]
     sense: NDArray[np.float64]
@@ -104,13 +103,13 @@ class _Samples:
 
 @with_one_thread
 def source_curves(diagnosis: Diagnosis) -> tuple[SourceCurves, ...]:
-    """Curves of every source that was found, and of the residual where some variable organises it."""
+    """Return curves of found sources and the organised residual."""
     left = ("",) if diagnosis.unexplained.follows is not None else ()
     return tuple(_curves(diagnosis, name) for name in (*found_sources(diagnosis), *left))
 
 
 def found_sources(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Sources of the joint model that the base model has not."""
+    """Return joint sources beyond the base."""
     base = {term.source.name for term in diagnosis.before.layout.terms}
     return tuple(dict.fromkeys(t.source.name for t in diagnosis.after.layout.terms if t.source.name not in base))
 
@@ -156,7 +155,7 @@ def _wanted(diagnosis: Diagnosis, name: str) -> Follows:
 
 
 def _drawn_over(wanted: Follows, observations: Sequence[Observation], *, moves_struts: bool) -> str:
-    """Return the variable itself where it is one that every run has, else strut length, or angle for a reading."""
+    """Return the variable if common, else strut length or angle."""
     variable = wanted.variable
     if variable in {"temperature", *TEMPERATURES}:
         return variable
@@ -168,7 +167,7 @@ def _drawn_over(wanted: Follows, observations: Sequence[Observation], *, moves_s
 
 
 def _strut_mm(there: Actual, name: str) -> NDArray[np.float64] | None:
-    """Strut-length errors by one source of a model over the whole motion, shape (6,) or (n, 6) [mm]."""
+    """Return one source's strut errors over a motion, shape (6,) or (n, 6) [mm]."""
     effects = [there.by(f).strut_mm for f in there.model.acting(there.motion) if f.source.name == name]
     return next((effect for effect in effects if effect is not None), None)
 
@@ -202,7 +201,7 @@ def _samples(
 
 
 def _warmer_k(calibration: Calibration, name: str, motion: Motion) -> NDArray[np.float64]:
-    """What the thermometers rose that a source follows, shape (n, 1) or (n, 6) [K]."""
+    """Return a source's thermometers' rise, shape (n, 1) or (n, 6) [K]."""
     own = (t.source for t in calibration.layout.terms if t.source.name == name)
     return next(source.warmer_k(motion) for source in own if isinstance(source, FollowsTemperature))
 
@@ -224,7 +223,7 @@ def _branch(
     *,
     fine: bool,
 ) -> Branch:
-    """Average one column over pieces of its range; pieces without a sample are left out."""
+    """Return a column averaged over pieces, without empty ones."""
     over, gain = samples.variable[:, column], samples.gain[:, column]
     pieces = int(np.ceil(np.ptp(over) / WAVE_PIECE_MM)) if fine else BINS
     edges = np.linspace(over.min(), over.max(), pieces + 1)

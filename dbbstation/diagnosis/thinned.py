@@ -1,4 +1,4 @@
-"""Runs averaged over narrow sectors of the turn: what a diagnosis works on."""
+"""Runs averaged over narrow sectors."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ LEAST_SECTORS = SECTORS // 2
 
 
 def sectors_for(runs: int) -> int:
-    """Samples per turn that each of so many runs is averaged to, at the most."""
+    """Return samples per turn for so many runs."""
     return max(min(SECTORS, MOST_SAMPLES // max(runs, 1)), LEAST_SECTORS)
 
 
 def thinned(observation: Observation, most: int = SECTORS) -> Observation:
-    """Return the run averaged over sectors, with what was commanded averaged alike; as it is where it is short.
+    """Return the run averaged over sectors, with its command; short runs as they are.
 
     Args:
-        most: samples per turn at the most.
+        most: samples per turn.
     """
     raw = observation.raw
     if len(raw) <= most:

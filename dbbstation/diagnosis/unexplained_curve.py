@@ -1,12 +1,7 @@
-"""The curve of an unmodelled effect: its values along the variable that organises it, with their uncertainty.
+"""An unmodelled effect's curve with uncertainty.
 
-Amplitudes are those of the most probable set of causes, with the kinematic parameters, mountings, balls and bar fitted
-anew beside them. What these can make of a curve cannot be told from them, so it is taken out by convention: a constant of everything, which is
-a strut's reference length or the bar's offset, and of a curve over strut length also a slope, which joints can do almost
-whole. What is printed is the curve less the straight line (or constant) that fits it best over all readings.
-
-What moves in several directions, such as a ball, is printed along the one in which it moves most, and where its variable
-is a place, along the line on which it changes most.
+Amplitudes are of the best set with kinematics and set-up refitted. What these can make is removed by convention: a
+constant, and over length a slope. Motions in several directions are printed along the strongest.
 """
 
 from __future__ import annotations
@@ -60,13 +55,7 @@ AXES = {
 
 
 def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) -> Curve:
-    """Return the curve of an unmodelled effect, with others of the most probable hypothesis that follow the same.
-
-    A dent between two widths of the catalogue is two bumps in one place: their sum is the error of that strut.
-
-    Args:
-        settled: what the comparison came to.
-    """
+    """Return an effect's curve, summed with others that follow the same."""
     unmodelled, runs, comparison = settled.unmodelled, settled.unmodelled.runs, settled.comparison
     shape = _largest(settled, member)
     together = [m for m in settled.best.members if m is member or any(_adds(shape, s) for s in unmodelled.of(m))]
@@ -111,7 +100,7 @@ def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) ->
 
 
 def _largest(settled: SettledCircles, member: Member) -> Shape:
-    """Shape of a member, that of the strut with the largest curve where each strut has its own."""
+    """Return a member's shape, of the strut with the largest curve."""
     shapes = settled.unmodelled.of(member)
     found = settled.comparison.estimates([member, *settled.best.without(member.cause.name)])
     parts = _parts(shapes, found.values[: len(member.variant.columns)])
@@ -119,12 +108,12 @@ def _largest(settled: SettledCircles, member: Member) -> Shape:
 
 
 def _parts(shapes: Sequence[Shape], values: NDArray[Number]) -> list[NDArray[Number]]:
-    """Values of amplitudes, or their columns, by shape: all shapes of a form have as many."""
+    """Return amplitudes or columns by shape."""
     return np.split(values, len(shapes))
 
 
 def _adds(one: Shape, other: Shape) -> bool:
-    """Whether two effects are errors of one thing over one variable, so that their sum is a curve as well."""
+    """Return whether two effects are of one thing over one variable."""
     if one.variable not in OF_STRUTS or one.strut is None:
         return False
     return (one.variable, one.strut, one.moves) == (other.variable, other.strut, other.moves)
@@ -133,7 +122,7 @@ def _adds(one: Shape, other: Shape) -> bool:
 def _summed(
     runs: Sequence[Samples], shapes: Sequence[Shape], pieces: Sequence[_Piece]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points of a sum of curves, and the matrix from the amplitudes of all to them; of one curve its own."""
+    """Return a sum's points, and the matrix from all amplitudes."""
     if len(pieces) == 1:
         return pieces[0].at, pieces[0].to_points
     at = max((piece.at for piece in pieces), key=len)
@@ -141,11 +130,7 @@ def _summed(
 
 
 def _not_followed(settled: SettledCircles, together: Sequence[Member]) -> float:
-    """Structured sum of squares that the curve leaves to all other curves together, over what it explains itself.
-
-    A curve with a kink between two points, or another error beside this one, spoils the values more than noise does:
-    each point is then uncertain by that share of the curve's own size.
-    """
+    """Return structure left by the curve over its own explanation, as the points' relative uncertainty."""
     unmodelled, comparison = settled.unmodelled, settled.comparison
     names = {m.cause.name for m in together}
     others = settled.best.without(*names)
@@ -166,13 +151,13 @@ def _not_followed(settled: SettledCircles, together: Sequence[Member]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """One effect along the direction in which it moves most.
+    """An effect along its strongest direction.
 
     Attributes:
-        amplitudes: less what is conventional, shape (p,).
-        to_points: matrix from them to the points, shape (n, p).
-        at: places of the points, shape (n,).
-        direction: empty where what moves has one only.
+        amplitudes: less convention, shape (p,).
+        to_points: shape (n, p).
+        at: shape (n,).
+        direction: may be empty.
     """
 
     amplitudes: NDArray[np.float64]
@@ -211,11 +196,11 @@ def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[NDArray[np.float
 def _over(
     runs: Sequence[Samples], shape: Shape, line: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
-    """Points of the variable, matrix from amplitudes of one direction to them, and along what they lie.
+    """Return points, the matrix from amplitudes of one direction, and their axis.
 
     Args:
-        runs: as shapes see them.
-        line: amplitudes of the direction that moves most, shape (p,).
+        runs: for shapes.
+        line: amplitudes of the strongest direction, shape (p,).
     """
     form = shape.form
     if isinstance(form, Plane | PlaneStep):
@@ -233,26 +218,26 @@ _AXIS = {"position of the platform": "+X", "tilt of the platform": "that of tilt
 
 
 def _line(at: NDArray[np.float64], weights: NDArray[np.float64], order: int) -> NDArray[np.float64]:
-    """Matrix from values at points to those of the polynomial of an order that fits them best, shape (p, p)."""
+    """Return the matrix to the best polynomial's values, shape (p, p)."""
     basis = np.vander(at, order + 1)
     weighted = basis.T * weights
     return np.asarray(basis @ np.linalg.solve(weighted @ basis, weighted), dtype=np.float64)
 
 
 def _values(shape: Shape, run: Samples) -> NDArray[np.float64]:
-    """Values of the shape's variable in one run: of its strut, or of all."""
+    """Return the variable's values in a run."""
     return shape.followed(run.values[shape.variable])
 
 
 def _weights(runs: Sequence[Samples], shape: Shape) -> NDArray[np.float64]:
-    """How many readings lie about each point of a piecewise linear curve, shape (p,)."""
+    """Return readings about each point, shape (p,)."""
     return np.asarray(
         sum(shape.form.columns(_values(shape, run)).reshape(-1, shape.form.count).sum(axis=0) for run in runs)
     )
 
 
 def _extent(runs: Sequence[Samples], shape: Shape, flat: NDArray[np.float64] | None) -> tuple[float, float]:
-    """Least and greatest value of the variable over all runs, of a place along one direction in its plane."""
+    """Return the variable's extent, of a place along one direction."""
     values = [_values(shape, run) for run in runs]
     along = values if flat is None else [value @ flat for value in values]
     return float(min(one.min() for one in along)), float(max(one.max() for one in along))

@@ -1,4 +1,4 @@
-"""A model that keeps an unmodelled effect, so that it can be predicted and compensated, marked as of unknown cause."""
+"""A model with a kept unmodelled effect, marked as of unknown cause."""
 
 from __future__ import annotations
 
@@ -37,12 +37,11 @@ KEPT_AS = {
 
 @dataclass(frozen=True, eq=False)
 class JointFitWithCurve:
-    """A joint fit of everything that has a name and the curve that has none.
+    """A joint fit of names and the nameless curve.
 
     Attributes:
-        fit: with the curve of the struts that it was found on, and of no other.
-        to_all: matrix from the parameters that were fitted to those of the source, shape (p, f).
-        curve: as the diagnosis found it.
+        fit: on the curve's struts only.
+        to_all: from fitted to all parameters, shape (p, f).
     """
 
     source: ErrorSource
@@ -51,11 +50,11 @@ class JointFitWithCurve:
     curve: Curve
 
     def identified(self, report: Mapping[str, Any], sessions: Mapping[str, str]) -> IdentifiedModel:
-        """Return the model to keep, with a value for every parameter of the source; zero where nothing was fitted.
+        """Return the model to keep; unfitted parameters are zero.
 
         Args:
-            report: numbers of the fit, by name.
-            sessions: SHA-256 of each session file, by name.
+            report: numbers by name.
+            sessions: SHA-256 by name.
         """
         found = identified_model(self.fit, {**report, "unexplained": self.curve.plain()}, sessions)
         machine, name = found.model.machine, self.source.name
@@ -82,13 +81,10 @@ class JointFitWithCurve:
 
 
 def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCurve:
-    """Fit what has a name and the curve that has none together.
-
-    Args:
-        curve: that the diagnosis found.
+    """Fit names and the curve together.
 
     Raises:
-        ModelError: nothing is left without a name, or what is left follows nothing that a program knows.
+        ModelError: nothing nameless remains, or it follows no pose variable.
         CalibrationError: the fit does not converge.
     """
     if curve is None:
@@ -109,10 +105,9 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCur
 
 
 def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
-    """Return the finding with the wave of an exact fit: the comparison knows its period from the scan only.
+    """Return the finding with an exactly fitted wave.
 
-    A wave of few turns is partly made by joints, which pulls that look by some per cent; the fit has the period among
-    its parameters, with its uncertainty. Where the fit does not converge the finding stays.
+    Joints make part of a long wave, which biases the scan by some per cent. An unsettled fit changes nothing.
     """
     curve = rest.curve
     if curve is None or curve.period_mm is None or curve.strut is None:
@@ -134,7 +129,7 @@ def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
 
 
 def _to_all(each: int, strut: int | None) -> NDArray[np.float64]:
-    """Parameters of one strut, or of a curve that all share, to those of all struts, shape (6 each, each)."""
+    """Return the matrix from one or shared parameters to all struts', shape (6 each, each)."""
     chosen = np.ones(STRUTS) if strut is None else np.eye(STRUTS)[strut - 1]
     return np.kron(chosen[:, None], np.eye(each))
 
@@ -143,7 +138,7 @@ def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) ->
     first = int(np.flatnonzero(to_all.any(axis=1))[0])
 
     class TiedSource(ErrorSource):
-        """The whole source with parameters tied."""
+        """A source with tied parameters."""
 
         name = whole.name
         belongs_to = whole.belongs_to
@@ -154,7 +149,7 @@ def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) ->
         texts = whole.texts
 
         def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-            """Those of the first strut that it acts on."""
+            """Return the first strut's parameters."""
             own = whole.parameters(machine)[first : first + to_all.shape[1]]
             return own if strut else tuple(replace(p, name=p.name.replace("strut_1", "every_strut")) for p in own)
 
@@ -170,7 +165,7 @@ def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) ->
 
 
 def _wave(curve: Curve, machine: Machine) -> NDArray[np.float64]:
-    """Sine and cosine [µm] and period [mm] of a wave, from its points."""
+    """Return a wave's sine and cosine [µm] and period [mm], from points."""
     assert curve.period_mm is not None  # noqa: S101 - asked by the caller
     at = np.array([point.at for point in curve.points]) - sum(machine.travel.strut_mm) / 2.0
     angle = 2.0 * np.pi * at / curve.period_mm

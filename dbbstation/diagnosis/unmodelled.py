@@ -1,4 +1,4 @@
-"""Unmodelled effects as causes: errors that follow some variable and have no named cause, compared beside the named ones."""
+"""Unmodelled effects as causes beside named ones."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ struts, and the frequencies or places that a kind was picked from."""
 
 @dataclass(eq=False)
 class Unmodelled:
-    """Unmodelled effects over a channel; they may become more.
+    """A channel's unmodelled effects, extensible.
 
-    An effect that any strut may have is one cause: its forms are one curve for all struts, the curve of one strut, and one for each.
+    One cause per effect: for all struts, one, or each.
 
     Attributes:
-        runs: as shapes see them.
-        follows: what each cause is a function of, by its name.
-        shapes: by name of the cause and label of its form; one for each strut where each has its own.
+        runs: for shapes.
+        follows: by cause.
+        shapes: by cause and form; per strut if each has its own.
     """
 
     channel: CircleChannel
@@ -57,7 +57,7 @@ class Unmodelled:
         self._add([*shapes(ranges(self.runs)), *wander(self.runs)])
 
     def look(self, fit: Calibration, members: Sequence[Member], noise_mm: float) -> None:
-        """Look for waves, bumps, steps and pulses in what a fit leaves, beside its base and causes, and take them in."""
+        """Look for waves, bumps, steps and pulses beside base and causes, and add them."""
         channel = self.channel
         taken = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
         known = with_random(channel.base, np.concatenate([np.zeros(0), *(member.sd for member in members)]))
@@ -68,11 +68,11 @@ class Unmodelled:
         self._add(looked_for(look, ranges(self.runs)))
 
     def of(self, member: Member) -> tuple[Shape, ...]:
-        """Shapes of an effect in its form; none of a cause that has a name."""
+        """Return an effect's shapes in its form; none for named causes."""
         return self.shapes.get((member.cause.name, member.variant.label), ())
 
     def _add(self, more: Sequence[Shape]) -> None:
-        """Take in shapes: columns of the channel, and one cause for those of one kind that differ in their strut alone."""
+        """Add shapes, one cause for those that differ in strut only."""
         families: dict[str, list[Shape]] = {}
         for shape in more:
             families.setdefault(_name(shape), []).append(shape)
@@ -90,7 +90,7 @@ class Unmodelled:
             self.causes.append(Cause(name, tuple(self._variants(name, family, own)), odds, named=False))
 
     def _variants(self, name: str, family: Sequence[Shape], columns: Sequence[NDArray[np.int64]]) -> Iterator[Variant]:
-        """Forms of one cause: kinds of forms are equally likely, and struts of a kind."""
+        """Return a cause's forms: kinds equally likely, struts within."""
         forms: list[tuple[tuple[Shape, ...], NDArray[np.int64]]] = [
             ((shape,), own) for shape, own in zip(family, columns, strict=True)
         ]
@@ -120,7 +120,7 @@ def _label(shapes: Sequence[Shape]) -> str:
 
 
 def _name(shape: Shape) -> str:
-    """Name of the cause that a shape is a form of: a dent or a step is at its own place on one strut."""
+    """Return a shape's cause; dents and steps belong to one strut."""
     own = f", strut {shape.strut}" if shape.strut and shape.kind in {"bump", "step"} else ""
     text = shape.form.text("")
     return f"unmodelled: {shape.follows}{own}{', ' + text if text else ''}"

@@ -1,1 +1,1 @@
-"""Two sessions side by side: one as the simulation of the other, on the channel of `inference`."""
+"""Compare two sessions: one is the simulation of the other."""

@@ -1,4 +1,4 @@
-"""Error sources as causes of a difference: what changed between two sessions, or acted in one of them, or in both at other times."""
+"""Error sources as causes of a difference: changed, or acting in one session."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ it did in A: the sine of the angle whose cosine is `EQUIVALENT`, 4.5 %."""
 
 @dataclass(frozen=True)
 class When:
-    """One way in which a cause may be at work; a difference is B less A.
+    """A way of acting; differences are B less A.
 
     Attributes:
-        label: as printed; empty for a change of a cause that does the same in both sessions.
+        label: empty for a change common to both.
     """
 
     label: str
@@ -49,7 +49,7 @@ class Change:
     """One error source over both sessions.
 
     Attributes:
-        share: of its plausible sizes that a change has.
+        share: plausible size of a change.
     """
 
     source: ErrorSource
@@ -61,7 +61,7 @@ class Change:
         return self.source.name if usual else f"{self.source.name} by {self.source.law}"
 
     def law(self, log_odds: float) -> Law:
-        """Columns and forms for the channel; a form per part of the source and per way of being at work."""
+        """Return columns and forms by part and way."""
         amplitudes, shapes = self._amplitudes, [p for p in self._parameters if p.grid]
         parts = parts_of(amplitudes, self._sets)
         count = len(amplitudes) * self._sets
@@ -101,7 +101,7 @@ class Change:
         )
 
     def columns(self, point: tuple[float, ...]) -> NDArray[np.float64]:
-        """Reading of B less that of A by each amplitude of each way of being at work, shape (n, p)."""
+        """Return reading B less A by amplitude and way, shape (n, p)."""
         of_a = self._of(0, point) if len(self._whens) > 1 else None
         of_b = self._of(1, point)
         found = []
@@ -113,7 +113,7 @@ class Change:
         return np.hstack(found)
 
     def _at(self, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same about amplitudes, each by itself: what comes of play over a transit is not proportional to the play."""
+        """Return the same about amplitudes, for effects that are not proportional."""
         found = self.columns(point)
         width = len(amplitudes) // len(self._whens)
         for k in np.flatnonzero(amplitudes).tolist():
@@ -127,7 +127,7 @@ class Change:
         return found
 
     def _effect(self, side: int, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What a source does to the readings of one session, shape (n,)."""
+        """Return a source's effect in one session, shape (n,)."""
         pieces, sides = [], self.sides
         for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
             values = self._values(point, np.split(amplitudes, self._sets)[group])
@@ -137,7 +137,7 @@ class Change:
 
     @property
     def _proportional(self) -> bool:
-        """Whether effects are proportional to amplitudes: all but those of what has a history."""
+        """Return whether effects are proportional: those without history."""
         return isinstance(self.source, LinearSource) or Need.PATH not in self.source.needs
 
     def _values(self, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -168,7 +168,7 @@ class Change:
 
     @cached_property
     def _whens(self) -> tuple[When, ...]:
-        """Ways of being at work that these sessions can show."""
+        """Return visible ways of acting."""
         point = tuple(p.grid[len(p.grid) // 2] for p in self._parameters if p.grid)
         of_a, of_b = self._of(0, point), self._of(1, point)
         size = max(float(np.linalg.norm(of_a)), float(np.linalg.norm(of_b)), 1e-300)
@@ -176,14 +176,14 @@ class Change:
         return (CHANGED,) if apart <= HARDLY_DIFFERENT else (IN_B, IN_A, IN_BOTH)
 
     def _grid(self, k: int, parameter: Parameter) -> tuple[float, ...]:
-        """Values of a nonlinear parameter that these runs can show, rising."""
+        """Return visible values of a nonlinear parameter, rising."""
         middle = [p.grid[len(p.grid) // 2] for p in self._parameters if p.grid]
         values = tuple(sorted(parameter.grid))
         shown = tuple(v for v in values if self.source.shows(self.sides.motions[1], [*middle[:k], v, *middle[k + 1 :]]))
         return shown or values[:1]
 
     def _of(self, side: int, point: tuple[float, ...]) -> NDArray[np.float64]:
-        """What the amplitudes of all sets do to the readings of one session, shape (n, p)."""
+        """Return the effect of all sets' amplitudes in one session, shape (n, p)."""
         count = len(self._amplitudes)
         values = self._values(point, np.zeros(count))
         amplitudes = [k for k, p in enumerate(self._parameters) if not p.grid]
@@ -198,7 +198,7 @@ class Change:
     def _discrepancy(
         self, effect: NDArray[np.float64], point: tuple[float, ...], amplitudes: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """What the formula may be off by in either session."""
+        """Return formula slack in both sessions."""
         count = len(self._amplitudes) * self._sets
         total = [np.zeros(count), np.zeros(count)]
         for when, own in zip(self._whens, np.split(amplitudes, len(self._whens)), strict=True):

@@ -1,8 +1,7 @@
-"""The channel of two sessions: readings of A as the simulation of B, circle by circle at the same angles.
+"""Two sessions as a channel: readings of A simulate B, circle by circle.
 
-Base: what is stated of balls, bars and the beginning of turns in both sessions. Causes: error sources that changed or acted in one
-session, balls and bars that sit further off than stated, the jig put down elsewhere. Unmodelled effects: over the angle and
-what else tells runs apart, on struts, and a curve of its own in every test or run.
+Base: stated balls, bars and turn begins. Causes: changed sources, displaced balls and bars, a moved jig. Unmodelled: over
+angle and other variables, on struts, and own curves of tests or runs.
 """
 
 from __future__ import annotations
@@ -40,8 +39,8 @@ def channel_of(sides: Sides, sources: Sequence[ErrorSource]) -> Channel:
     """Put two sessions on a channel.
 
     Args:
-        sides: both sessions at common angles.
-        sources: named candidates that have what they need in both; the geometry of the machine is asked anyway.
+        sides: at common angles.
+        sources: candidates with their needs in both; geometry is always included.
     """
     variables, runs = variables_of(sides), samples_of_b(sides)
     # A run is travelled at one speed: its rows are its clock.

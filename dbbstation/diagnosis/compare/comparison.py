@@ -1,7 +1,6 @@
-"""Two sessions side by side: do they differ, where, in what form, by which cause, and what cannot be distinguished.
+"""Compare two sessions: whether, where, in what form and by which cause they differ.
 
-The readings of A are the simulation of B; the difference B less A is a channel like any other (`dbbstation.inference`). Sets of
-causes are compared by their probability, verdicts are read off, and the residual is tested.
+B less A is a channel of `dbbstation.inference`.
 """
 
 from __future__ import annotations
@@ -54,18 +53,17 @@ CENTRED_SHAPE = 25.0
 
 @dataclass(frozen=True, eq=False)
 class RunDifference:
-    """One run of B less the same run of A.
+    """A run of B less that of A.
 
     Attributes:
-        smooth_mm: difference up to the highest smooth harmonic, at the common angles, shape (s,) [mm].
-        noise_mm: root mean square that noise alone leaves in it [mm].
-        found_mm: what the causes that were found do, at the common angles, shape (s,) [mm].
-        centre_mm: by how much the circle's centre moved, x and y [mm].
-        centre_sigma_mm: standard deviation of either by noise and what is stated of balls [mm].
-        radial_mm: by how much the mean length changed [mm].
-        radial_sigma_mm: standard deviation of that by noise and what is stated of bars, and of balls where the bar is raised
-            [mm].
-        circularity_mm: greatest less least of the difference without mean and centre [mm].
+        smooth_mm: up to the highest smooth harmonic, shape (s,).
+        noise_mm: rms of noise in it.
+        found_mm: by found causes, shape (s,).
+        centre_mm: move of the centre, x and y.
+        centre_sigma_mm: standard deviation by noise and stated balls.
+        radial_mm: change of mean length.
+        radial_sigma_mm: by noise, stated bars, and balls of raised bars.
+        circularity_mm: range without mean and centre.
     """
 
     pair: Pair
@@ -81,17 +79,17 @@ class RunDifference:
 
     @property
     def rms_mm(self) -> float:
-        """Of the smooth difference [mm]."""
+        """Return the smooth difference's rms [mm]."""
         return _rms(self.smooth_mm)
 
     @property
     def differs(self) -> bool:
-        """Whether what was found is there in this run beyond doubt."""
+        """Return whether findings are certain in this run."""
         return self.sigmas >= OUT
 
     @property
     def peak(self) -> tuple[float, float]:
-        """Angle [deg] and value [mm] of the greatest smooth difference."""
+        """Return angle [deg] and value [mm] of the greatest smooth difference."""
         at = int(np.argmax(np.abs(self.smooth_mm)))
         return float(self.pair.theta_deg[at]), float(self.smooth_mm[at])
 
@@ -101,15 +99,12 @@ class Comparison:
     """Everything found.
 
     Attributes:
-        matching: which runs were put side by side.
-        settled: what the comparison of sets of causes came to.
-        runs: in the order of session A.
-        left: tests of the residual.
-        trial: what groups of tests say of the findings; without predictions where nothing was found, or there are too few groups.
-        held_out: predictions of held-out tests by what is stated of the set-up alone, and with what was found [mm].
-        effects: of the causes of the most probable set, largest first, by name.
-        noticed_mm: change of one strut's length that would have been found, whichever strut it is [mm].
-        lacking: error sources that could not be asked, and why.
+        runs: in session A's order.
+        trial: evidence of groups of tests; without predictions if nothing was found or groups are few.
+        held_out: predictions by stated set-up, and with findings [mm].
+        effects: of the best set, largest first, by name.
+        noticed_mm: detectable change of any strut's length.
+        lacking: sources not tested, with reasons.
     """
 
     matching: Matching
@@ -125,7 +120,7 @@ class Comparison:
 
     @property
     def probability(self) -> float:
-        """That anything but noise and what is stated of the set-up lies between the sessions, if that was as likely as not before."""
+        """Return the probability of any difference beyond noise and set-up, at even prior."""
         odds = np.array([cause.log_prior_odds for cause in self.settled.causes])
         nothing = float(-np.logaddexp(0.0, odds).sum())  # log prior probability of none of them
         before = float(np.log(-np.expm1(nothing))) - nothing
@@ -135,38 +130,38 @@ class Comparison:
 
     @property
     def differ(self) -> bool:
-        """Whether the sessions differ: a cause is there for sure, or the residual is not noise."""
+        """Return whether the sessions differ: a sure cause or structured residual."""
         return self.probability >= SURE or not self.left.is_noise
 
     @property
     def there(self) -> tuple[CauseFinding, ...]:
-        """Findings of causes of the most probable set, largest first."""
+        """Return present causes' findings, largest first."""
         by_name = {finding.name: finding for finding in self.findings}
         return tuple(by_name[name] for name in self.effects)
 
     @cached_property
     def rms_mm(self) -> float:
-        """Of all smooth differences [mm]."""
+        """Return the rms of smooth differences [mm]."""
         return _rms(np.concatenate([run.smooth_mm for run in self.runs]))
 
     @property
     def cancelling(self) -> Cancelling | None:
-        """Effects that cancel each other [mm]; None where none do."""
+        """Return cancelling effects [mm], or None."""
         return cancelling(effects_by_name(self.settled), "µm", 1e3)
 
     @property
     def noise_mm(self) -> float:
-        """What noise leaves in the smooth differences, root mean square [mm]."""
+        """Return the rms of noise in smooth differences [mm]."""
         return self.runs[0].noise_mm
 
     @property
     def found_rms_mm(self) -> float:
-        """Of what was found, over all runs [mm]."""
+        """Return the rms of findings over all runs [mm]."""
         return _rms(np.concatenate([run.found_mm for run in self.runs]))
 
     @property
     def halves_mm(self) -> tuple[float, float] | None:
-        """What was found, in tests that both directions were run of: what they share, what changes its sign; None: no such test."""
+        """Return findings common and opposite to both directions, or None."""
         both = np.array(
             [[self.runs[k].found_mm for k in runs] for runs in both_directions([run.pair for run in self.runs])]
         )
@@ -189,13 +184,12 @@ def compare(
     """Compare two sessions.
 
     Args:
-        machine: nominal, for the way from struts to readings.
-        a: accepted runs of session A.
-        b: accepted runs of session B.
-        sources: named candidates beside the geometry of the machine; those that lack what they need are left out by the caller.
-        lacking: error sources that could not be asked, and why.
-        progress: called with what is being done.
-        hold_out: choose everything anew without each group of tests.
+        machine: nominal.
+        a: accepted runs.
+        b: accepted runs.
+        sources: candidates with their needs.
+        lacking: sources not tested, with reasons.
+        hold_out: choose anew without each group of tests.
 
     Raises:
         TraceError: no run in common; circles of one of them had their centres removed.
@@ -280,7 +274,7 @@ def _run(
 
 
 def _refuse_centred(name: str, runs: Sequence[Observation]) -> None:
-    """Refuse a session whose every circle lies on its commanded centre, though it is no circle."""
+    """Refuse a session with all circles centred by software."""
     if len(runs) < 2:  # noqa: PLR2004 - one centre may be where it belongs
         return
     for run in runs:

@@ -1,4 +1,4 @@
-"""What is said of a comparison beside verdicts: where each cause acts, what a calibration would make of it."""
+"""Details of a comparison: place of causes, absorption by calibration."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ RANK = 1e-9
 
 @dataclass(frozen=True)
 class EffectOfCause:
-    """What one cause of the most probable set does to the difference.
+    """A cause's effect on the difference.
 
     Attributes:
-        share: of the reduction of chi-square by all that was found, what it brings alone.
-        taken_up: share of its sum of squares that a new kinematic calibration of B would take up.
-        opposite: share of its sum of squares that changes its sign with the direction, over tests that were run in both.
-        test: of the run in which it is largest.
-        theta_deg: arc of that run, from and to, over which it is at least half as large as at its peak [deg].
+        share: of the total chi-square reduction, alone.
+        taken_up: share of squares that a kinematic calibration of B would absorb.
+        opposite: share of squares odd in direction, over tests run both ways.
+        test: of the largest effect.
+        theta_deg: arc of at least half its peak, from and to.
     """
 
     rms_mm: float
@@ -48,7 +48,7 @@ class EffectOfCause:
 
 
 def effects_of(sides: Sides, settled: Settled) -> dict[str, EffectOfCause]:
-    """Effects of the causes of the most probable set, by name, those that are worth most beside the others first."""
+    """Return effects of the best set by name, most valuable first."""
     comparison, best = settled.comparison, settled.best
     kinematic = _kinematic(sides)
     found = {}
@@ -86,7 +86,7 @@ def _placed(sides: Sides, rows: NDArray[np.float64], share: float, taken_up: flo
 
 
 def opposite_share(sides: Sides, by_run: list[NDArray[np.float64]]) -> float:
-    """Share of a sum of squares over tests that were run in both directions that changes its sign with the direction."""
+    """Return the share of squares odd in direction."""
     same, opposite = 0.0, 0.0
     for one, other in both_directions(sides.pairs):
         same += float(np.sum((by_run[one] + by_run[other]) ** 2))
@@ -95,7 +95,7 @@ def opposite_share(sides: Sides, by_run: list[NDArray[np.float64]]) -> float:
 
 
 def both_directions(pairs: Sequence[Pair]) -> list[tuple[int, int]]:
-    """Places of the runs of each test that was run in both directions."""
+    """Return the runs of tests in both directions."""
     by_test: dict[tuple[str, int], list[int]] = {}
     for k, pair in enumerate(pairs):
         by_test.setdefault((pair.test, pair.number), []).append(k)
@@ -103,7 +103,7 @@ def both_directions(pairs: Sequence[Pair]) -> list[tuple[int, int]]:
 
 
 def _kinematic(sides: Sides) -> NDArray[np.float64]:
-    """Orthonormal columns of what the kinematic parameters of the machine can do to the readings of B, shape (n, k)."""
+    """Return orthonormal kinematic columns of B's readings, shape (n, k)."""
     sources = sources_named(KINEMATIC_SOURCES)
     columns = [
         np.hstack([reading.by_source(s, sides.machine, np.zeros(len(s.parameters(sides.machine)))) for s in sources])
@@ -114,7 +114,7 @@ def _kinematic(sides: Sides) -> NDArray[np.float64]:
 
 
 def noticed_mm(settled: Settled) -> float:
-    """Change of the length of the strut that is seen worst that would stand out [mm]."""
+    """Return the detectable change of the worst-seen strut's length [mm]."""
     cause = next(cause for cause in settled.causes if cause.name == "strut-reference-length")
     single = [v.columns for v in cause.variants if len(v.columns) == 1 and v.label.startswith("strut")]
     products = [float(settled.comparison.beside((), columns)[0, 0]) for columns in single]

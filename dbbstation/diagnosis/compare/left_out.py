@@ -1,4 +1,4 @@
-"""What two sessions say without some of the tests: predictions of held-out tests, and what each cause brings to them."""
+"""Held-out tests of a comparison."""
 
 from __future__ import annotations
 
@@ -27,11 +27,10 @@ if TYPE_CHECKING:
 
 
 def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> Trial:
-    """Hold back groups of tests in turn; nothing is said where nothing was found, or there are fewer than `LEAST_PARTS` groups.
+    """Hold back groups of tests; empty without findings or below `LEAST_PARTS` groups.
 
     Args:
-        settled: what the comparison came to.
-        hold_out: choose everything anew without each group; False: only how values move without it is asked.
+        hold_out: choose everything anew; False: only refit values.
     """
     groups = in_turn([pair.test for pair in sides.pairs], FOLDS)
     parts = []
@@ -46,7 +45,7 @@ def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True
 
 
 def _chosen_anew(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> ChosenAnew:
-    """What each cause brought in each part; the reference is that nothing changed since the first session but the set-up."""
+    """Return each cause's gain; the reference is an unchanged machine."""
     bank, kept = settled.bank, settled.channel.kept
 
     def of_others() -> Iterator[ModelComparison]:
@@ -60,7 +59,7 @@ def _chosen_anew(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> Chosen
 
 
 def predicted(sides: Sides, settled: Settled) -> tuple[HeldOut, HeldOut]:
-    """Predictions of held-out tests, without and with what was found."""
+    """Return predictions of held-out tests without and with findings."""
     bank, members = settled.bank, settled.best.members
     columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
     base = settled.channel.known

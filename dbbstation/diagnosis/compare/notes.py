@@ -1,4 +1,4 @@
-"""What a reader of a comparison must know: what else was not alike in the two sessions."""
+"""Other differences of two sessions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SAME_TEMPERATURE_K = 0.5
 
 
 def notes_of(machine_a: Machine, machine_b: Machine, pairs: Sequence[Pair]) -> list[str]:
-    """Sentences on machines, balls, programs, feeds and temperatures that were not the same."""
+    """Return sentences on different machines, balls, programs, feeds and temperatures."""
     return [*_machines(machine_a, machine_b), *_balls(pairs), *_programs(pairs), *_feeds(pairs), *_temperatures(pairs)]
 
 
@@ -98,6 +98,6 @@ def _temperatures(pairs: Sequence[Pair]) -> list[str]:
 
 
 def _means(logs: Sequence[Mapping[str, NDArray[np.float64]]]) -> dict[str, float]:
-    """Mean of every sensor that all runs logged [degC]."""
+    """Return means of sensors logged by all runs [degC]."""
     sensors = set.intersection(*(set(log) for log in logs))
     return {sensor: float(np.mean([log[sensor].mean() for log in logs])) for sensor in sorted(sensors)}

@@ -1,4 +1,4 @@
-"""Two sessions run by run: which recordings belong together, and their difference at common angles."""
+"""Two sessions run by run, at common angles."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ SAME_ANGLE_DEG = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """One run as both sessions have it.
+    """A run of both sessions.
 
     Attributes:
-        a: the run in session A; several where the sessions have different numbers of repeats, which are averaged.
-        number: counts the pairs of one test and direction, from 1.
-        a_mm: raw length less commanded length in A at the middles of equal sectors from +X, shape (s,) [mm].
+        a: one, or repeats to average.
+        number: in its test and direction, from 1.
+        a_mm: raw less commanded length of A at sector middles from +X, shape (s,).
     """
 
     a: tuple[Observation, ...]
@@ -58,7 +58,7 @@ class Pair:
 
     @property
     def circle(self) -> Circle:
-        """As commanded in session A."""
+        """Return the circle commanded in A."""
         return self.a[0].raw.circle
 
     @property
@@ -68,17 +68,17 @@ class Pair:
 
     @property
     def label(self) -> str:
-        """Name of the run in texts and tables."""
+        """Return the name for texts and tables."""
         return f"{self.test} {self.direction} {self.number}"
 
     @property
     def theta_deg(self) -> NDArray[np.float64]:
-        """Middles of the sectors, from +X towards +Y, shape (s,) [deg]."""
+        """Return sector middles from +X towards +Y, shape (s,) [deg]."""
         return (np.arange(len(self.a_mm), dtype=np.float64) + 0.5) * (FULL_TURN_DEG / len(self.a_mm))
 
     @property
     def difference_mm(self) -> NDArray[np.float64]:
-        """B less A; straight across sectors in which one of them has no sample, shape (s,) [mm]."""
+        """Return B less A, interpolated over empty sectors, shape (s,) [mm]."""
         difference = self.b_mm - self.a_mm
         there = np.isfinite(difference)
         return np.interp(self.theta_deg, self.theta_deg[there], difference[there], period=FULL_TURN_DEG)
@@ -89,9 +89,9 @@ class Matching:
     """Which runs were put side by side.
 
     Attributes:
-        pairs: in the order of session A.
-        not_comparable: tests of one name and different circles, and in what they differ.
-        averaged: tests and directions whose repeats were averaged, and why.
+        pairs: in session A's order.
+        not_comparable: equal names, different circles, with differences.
+        averaged: with reasons.
     """
 
     pairs: tuple[Pair, ...]
@@ -102,10 +102,9 @@ class Matching:
 
 
 def match(a: Sequence[Observation], b: Sequence[Observation]) -> Matching:
-    """Put runs of one test and direction side by side.
+    """Match runs of a test and direction.
 
-    Where both sessions have as many repeats, they pair in the order of recording; otherwise the mean of all repeats
-    in A is held against the mean of those in B.
+    Equal numbers of repeats pair in order; otherwise means are compared.
 
     Raises:
         TraceError: nothing belongs together.
@@ -137,22 +136,21 @@ def match(a: Sequence[Observation], b: Sequence[Observation]) -> Matching:
 
 
 def common_sectors(raws: Sequence[RawCircle]) -> int:
-    """Sectors into which the run with the fewest samples can be cut."""
+    """Return the number of sectors that the sparsest run fills."""
     return min(SECTORS, min(len(raw) for raw in raws) // PER_SECTOR)
 
 
 @dataclass(frozen=True, eq=False)
 class Sectors:
-    """Takes samples of one turn to the middles of equal sectors.
+    """Moves samples of a turn to sector middles.
 
-    A sector's samples are averaged. They do not lie evenly about the sector's middle, nor alike in both sessions, and a
-    circle that is 0.1 mm off its centre changes by 0.4 µm in a quarter of a degree. Every sample is therefore moved to
-    the middle along the run's own smooth curve, which leaves its noise as it is.
+    Samples are averaged and moved along the run's smooth curve, since 0.1 mm off centre changes 0.4 µm in a quarter
+    degree; noise is unchanged.
 
     Attributes:
-        there: those that have a sample, shape (q,).
-        group: number of each sample's sector among these, shape (n,).
-        moved: what averages of these sectors, shape (q,), change by on the way to the middles, shape (q, q).
+        there: filled sectors, shape (q,).
+        group: of each sample among these, shape (n,).
+        moved: change of sector means, shape (q,), to the middles, shape (q, q).
     """
 
     count: int
@@ -162,7 +160,7 @@ class Sectors:
 
     @classmethod
     def of(cls, theta_deg: NDArray[np.float64], count: int) -> Sectors:
-        """Sectors of samples at angles from +X, shape (n,)."""
+        """Return sectors of samples at angles from +X, shape (n,)."""
         sector = np.minimum((theta_deg * (count / FULL_TURN_DEG)).astype(np.int64), count - 1)
         there, group = np.unique(sector, return_inverse=True)
         highest, _ = bands(len(there))
@@ -172,7 +170,7 @@ class Sectors:
         return cls(count, there, group, away @ np.linalg.pinv(curve))
 
     def at_middles(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values of samples, shape (n,) or (n, p), in the middle of each sector, (count,) or (count, p); NaN without a sample."""
+        """Return samples, shape (n,) or (n, p), at sector middles, (count,) or (count, p); NaN if empty."""
         found = np.full((self.count, *values.shape[1:]), np.nan)
         averages = means(values, self.group)
         found[self.there] = averages + self.moved @ averages
@@ -180,7 +178,7 @@ class Sectors:
 
 
 def at_common_angles(raw: RawCircle, sectors: int) -> NDArray[np.float64]:
-    """Raw length less commanded length in the middle of each sector, shape (sectors,) [mm]; NaN without a sample."""
+    """Return raw less commanded length at sector middles, shape (sectors,) [mm]; NaN if empty."""
     poses = raw.circle.poses(raw.theta_deg)
     deviation = raw.length_mm - np.linalg.norm(poses[:, :3] - np.array(raw.circle.ball_mm), axis=1)
     return Sectors.of(raw.theta_deg, sectors).at_middles(deviation)
@@ -191,7 +189,7 @@ def _mean(runs: Sequence[Observation], sectors: int) -> NDArray[np.float64]:
 
 
 def _by_run(runs: Sequence[Observation]) -> dict[tuple[str, str], list[Observation]]:
-    """Runs by test and direction, in the order they were recorded."""
+    """Return runs by test and direction, in order."""
     found: dict[tuple[str, str], list[Observation]] = {}
     for run in runs:
         found.setdefault((run.test, str(run.raw.circle.direction)), []).append(run)
@@ -199,7 +197,7 @@ def _by_run(runs: Sequence[Observation]) -> dict[tuple[str, str], list[Observati
 
 
 def _unlike(runs: Sequence[Observation]) -> str:
-    """In what runs of one name are not one circle; empty where they are."""
+    """Return differences of circles of one name; may be empty."""
     first = runs[0].raw.circle
     for circle in (run.raw.circle for run in runs[1:]):
         pairs = [

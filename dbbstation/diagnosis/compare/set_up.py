@@ -1,4 +1,4 @@
-"""Set-up of two sessions: what is stated of balls, bars and the beginning of turns, and what of it is off by far more."""
+"""Set-ups of two sessions: stated sizes, and outliers."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ ANYWHERE_MM = 1.0
 
 
 def base_of(sides: Sides) -> Base:
-    """Effects of the set-up of both sessions with the sizes that plans and sessions state."""
+    """Return set-up effects of both sessions at stated sizes."""
     names: list[str] = []
     columns: list[NDArray[np.float64]] = []
     prior: list[NDArray[np.float64]] = []
@@ -58,7 +58,7 @@ def base_of(sides: Sides) -> Base:
 
 
 def _per_degree(pair: Pair) -> NDArray[np.float64]:
-    """Slope of the smooth reading of A along the angle: what a turn that began elsewhere does, shape (s,) [mm/deg]."""
+    """Return A's smooth slope by angle, for shifted begins, shape (s,) [mm/deg]."""
     theta, there = np.radians(pair.theta_deg), np.isfinite(pair.a_mm)
     low, _ = bands(len(theta))
     found, *_ = np.linalg.lstsq(basis(theta[there], low), pair.a_mm[there], rcond=None)
@@ -68,9 +68,9 @@ def _per_degree(pair: Pair) -> NDArray[np.float64]:
 
 
 def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
-    """Random effects of one source: tests that share each, its columns, shape (n, p), and what is stated of it, shape (p,) [mm].
+    """Return a source's sharing tests, columns, shape (n, p), and stated sizes, shape (p,) [mm].
 
-    Runs that share one in A mostly share one in B as well; what is stated of both then adds up to one.
+    Runs usually share in both sessions; then variances add.
     """
     shared = [[source.shared_by(motion) for motion in motions] for motions in sides.motions]
     together = list(zip(*shared, strict=True))
@@ -91,7 +91,7 @@ def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, NDArray[np.flo
 
 
 def _sd(source: ErrorSource, motion: Motion) -> NDArray[np.float64]:
-    """What is stated of a random effect; of a ball whose place nobody knows, that it may be anywhere [mm, deg]."""
+    """Return a random effect's stated size; large for unknown balls [mm, deg]."""
     stated = source.stated_mm(motion)
     known = np.zeros(0) if stated is None else stated
     lost = source.name == "mounting" and motion.setup is not None and not motion.setup.place_known
@@ -99,7 +99,7 @@ def _sd(source: ErrorSource, motion: Motion) -> NDArray[np.float64]:
 
 
 def set_up_laws(sides: Sides) -> list[Law]:
-    """Balls and bars that sit further off than stated: one of them, or each of them."""
+    """Return balls and bars beyond their stated size: one or each."""
     found: list[Law] = []
     named: set[tuple[str, ...]] = set()
     for source in sources_named(SET_UP):
@@ -116,7 +116,7 @@ def set_up_laws(sides: Sides) -> list[Law]:
 def _outsize(
     source: ErrorSource, parameters: Sequence[str], sets: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64]]]
 ) -> list[Law]:
-    """One source of random effects, each of which may be far larger than stated; nothing where nothing is stated."""
+    """Return one source's effects beyond stated size; may be empty."""
     names: list[str] = []
     choices: list[tuple[tuple[int, ...], float, str]] = []
     columns, plausible = [], []
@@ -148,7 +148,7 @@ def _outsize(
 
 
 def jig_laws(sides: Sides, runs: Sequence[Samples]) -> list[Law]:
-    """All balls moved as one body: shift, and turns about their middle."""
+    """Return shift and rotations of all balls together."""
     samples = sides.averaged(1, [run.gain[TABLE] for run in runs])
     seen = np.flatnonzero(np.abs(samples).max(axis=0) > NOTHING)
     names = [f"{name}_mm" for name in "xyz"] + [f"turn_{name}_rad" for name in "xyz"]

@@ -1,4 +1,4 @@
-"""Both sessions as a channel sees them: the same circles at the same angles, each with its own times, feeds and temperatures."""
+"""Both sessions for a channel: equal circles and angles, own times and conditions."""
 
 from __future__ import annotations
 
@@ -32,11 +32,10 @@ reversal is over in less than a sector."""
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """Rows of all pairs, pair by pair, in the order of travel of B; motions are finer, each with its own samples.
+    """Rows by pair in B's order of travel; motions have own samples.
 
     Attributes:
-        pairs: runs of both sessions.
-        runs: of session A, and of session B, per pair; where repeats were averaged, the first of them stands for all.
+        runs: of A and of B per pair; the first of averaged repeats.
     """
 
     machine: Machine
@@ -58,12 +57,12 @@ class Sides:
 
     @cached_property
     def orders(self) -> tuple[NDArray[np.int64], ...]:
-        """Rows of each pair, as places among its common angles."""
+        """Return each pair's rows among its common angles."""
         return tuple(np.argsort(pair.b[0].raw.circle.phi_deg(pair.theta_deg)) for pair in self.pairs)
 
     @cached_property
     def readings(self) -> tuple[tuple[BarReading, ...], tuple[BarReading, ...]]:
-        """What the nominal machine reads on the way of A, and on that of B."""
+        """Return nominal readings on the ways of A and B."""
         model = MachineModel(self.machine)
         a, b = ([model.bar(motion) for motion in motions] for motions in self.motions)
         return tuple(a), tuple(b)
@@ -75,15 +74,15 @@ class Sides:
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
     def rows(self, values_of: Callable[[Pair], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Values at the common angles of every pair as rows, shape (n,)."""
+        """Return values at common angles as rows, shape (n,)."""
         return np.concatenate([values_of(pair)[order] for pair, order in zip(self.pairs, self.orders, strict=True)])
 
     def averaged(self, side: int, values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Values along the motions of one session as rows, shape (n, ...).
+        """Return values along one session's motions as rows, shape (n, ...).
 
         Args:
             side: 0 for A, 1 for B.
-            values: per pair, in its own order of travel, shape (m, ...).
+            values: per pair, in order of travel, shape (m, ...).
         """
         found = []
         for sectors, order, one in zip(self._sectors[side], self.orders, values, strict=True):
@@ -102,11 +101,11 @@ class Sides:
         return a, b
 
     def each_row(self, values: Sequence[float]) -> NDArray[np.float64]:
-        """One value per pair as rows, shape (n,)."""
+        """Return one value per pair as rows, shape (n,)."""
         return np.repeat(np.array(values, dtype=np.float64), [len(order) for order in self.orders])
 
     def by_angle(self, rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """Rows as values at the common angles of each pair, shape (s,) each."""
+        """Return rows by pair at common angles, shape (s,) each."""
         found = []
         for order, block in zip(self.orders, self.blocks, strict=True):
             values = np.empty(len(order))
@@ -115,13 +114,13 @@ class Sides:
         return found
 
     def groups(self, source: ErrorSource) -> NDArray[np.int64]:
-        """Set of values of each pair: pairs that share it in both sessions have the same number, shape (r,)."""
+        """Return each pair's sharing set in both sessions, shape (r,)."""
         names = [(source.shared_by(one), source.shared_by(other)) for one, other in zip(*self.motions, strict=True)]
         order = list(dict.fromkeys(names))
         return np.array([order.index(name) for name in names], dtype=np.int64)
 
 
 def _thinned(run: Observation, pair: Pair) -> Observation:
-    """The run at no more angles than is worth it, as if the plan's circle had been commanded."""
+    """Return the run at fewer angles on the plan's circle."""
     raw, most = run.raw, FINER * len(pair.theta_deg)
     return replace(run, raw=averaged(raw, most) if len(raw) > most else raw, commanded=None)

@@ -1,4 +1,4 @@
-"""Unmodelled effects between two sessions: on the reading, on struts, balls and table, and a curve of its own in every test."""
+"""Unmodelled effects between sessions: reading, struts, balls, table, own curves."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SAME_RHYTHM = 0.999
 
 
 def variables_of(sides: Sides) -> tuple[Variable, ...]:
-    """What tells rows apart without a model: angle, place, tilt, time."""
+    """Return model-free variables: angle, place, tilt, time."""
     circles = [pair.circle for pair in sides.pairs]
     per_run = [
         ("place in X", "mm", Kind.LENGTH, [circle.centre_mm[0] for circle in circles]),
@@ -43,7 +43,7 @@ def variables_of(sides: Sides) -> tuple[Variable, ...]:
 
 
 def _times(sides: Sides) -> list[Variable]:
-    """Time in either session; in one alone where the other took the runs in the same rhythm."""
+    """Return time in each session; one if the rhythm is equal."""
     found = {}
     for side, name in ((1, "time in B"), (0, "time in A")):
         times = [motion.time_s[motion.kept] for motion in sides.motions[side] if motion.time_s is not None]
@@ -56,13 +56,13 @@ def _times(sides: Sides) -> list[Variable]:
 
 
 def of_readings(variables: Sequence[Variable], sides: Sides, time: NDArray[np.float64]) -> list[Pattern]:
-    """Effects on the reading itself; a circle is travelled at one speed, which is no variable beside its direction."""
+    """Return effects on the reading; speed only shows as direction."""
     every = patterns(variables, sides.blocks, time, None)
     return [pattern for pattern in every if pattern.family is not Family.SPEED]
 
 
 def samples_of_b(sides: Sides) -> list[Samples]:
-    """Runs of B as shapes see them, and A's balls with them."""
+    """Return B's runs for shapes, with A's balls."""
     pivot = np.mean([pair.circle.ball_mm for pair in sides.pairs], axis=0)
     return [
         samples_of(motion, sides.machine, reading, pivot)
@@ -71,7 +71,7 @@ def samples_of_b(sides: Sides) -> list[Samples]:
 
 
 def of_struts(sides: Sides, runs: Sequence[Samples]) -> list[Pattern]:
-    """Unmodelled effects on struts, balls, table and tool; see `shapes`."""
+    """Return unmodelled effects on struts, balls, table and tool; see `shapes`."""
     found = [
         _pattern(shape, sides, runs)
         for shape in shapes(ranges(runs))
@@ -102,7 +102,7 @@ def _pattern(shape: Shape, sides: Sides, runs: Sequence[Samples]) -> Pattern:
 
 
 def of_each_test(sides: Sides) -> Pattern:
-    """A curve over the angle of its own in every test or run, or in one of them alone."""
+    """Return own curves over the angle of every test or run, or of one."""
     angle = sides.rows(lambda pair: pair.theta_deg)
     waves = Lobes(OWN_LOBES).columns(angle)
     tests = list(dict.fromkeys(pair.test for pair in sides.pairs))

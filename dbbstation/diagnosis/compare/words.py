@@ -1,4 +1,4 @@
-"""A comparison of two sessions in sentences, and its differences by angle."""
+"""Sentences of a comparison, and differences by angle."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SECTORS = 36
 
 
 def by_angle_um(run: RunDifference) -> NDArray[np.float64]:
-    """Means of the smooth difference over ten degrees from +X, shape (36,) [µm]."""
+    """Return smooth means over ten degrees from +X, shape (36,) [µm]."""
     sector = (run.pair.theta_deg * (SECTORS / 360.0)).astype(np.int64)
     count = np.bincount(sector, minlength=SECTORS)
     return np.asarray(
@@ -27,12 +27,12 @@ def by_angle_um(run: RunDifference) -> NDArray[np.float64]:
 
 
 def label_of(finding: CauseFinding) -> str:
-    """Name of a cause with its form: which strut, which test, in which session."""
+    """Return a cause's name with form: strut, test, session."""
     return f"{finding.name}, {finding.label}" if finding.label else finding.name
 
 
 def verdict_text(found: Comparison) -> str:
-    """Return what a comparison comes to, in a sentence."""
+    """Return the conclusion in a sentence."""
     many = sum(run.differs for run in found.runs)
     if found.differ and found.there:
         where = f"in {many} of {len(found.runs)} runs" if many else "over all runs, though in no single one for sure"
@@ -57,7 +57,7 @@ def verdict_text(found: Comparison) -> str:
 
 
 def organised_text(found: Comparison) -> str:
-    """Return what was found, in short."""
+    """Return the findings in short."""
     if not found.there:
         return "nothing to organise"
     parts = []
@@ -78,7 +78,7 @@ LONG = 160
 
 
 def residual_text(left: LeftOver) -> str:
-    """Return whether something is left beyond noise, in a sentence."""
+    """Return the residual beyond noise in a sentence."""
     if left.is_noise:
         return "The residual is noise."
     worst = left.worst

@@ -1,1 +1,1 @@
-"""One drive on its own: mass, friction, and which physics a model of these leaves out. Knows no hexapod."""
+"""One drive: mass, friction, missing physics, without hexapod."""

@@ -1,4 +1,4 @@
-"""Recordings of a drive as a channel of the comparison: force in the band, mass and viscous friction, causes, curves."""
+"""A drive's recordings as a channel: band force, base, causes, curves."""
 
 from __future__ import annotations
 
@@ -59,10 +59,9 @@ class DriveChannel:
     """A channel and what its laws are of.
 
     Attributes:
-        channel: for the comparison.
-        scale: sizes, with the waves that a first look found.
-        sources: that were compared, by name.
-        shortest_wave_mm: shortest wave over the position that was looked for; infinite where none was.
+        scale: with waves of a first look.
+        sources: by name.
+        shortest_wave_mm: searched; infinite without search.
     """
 
     recordings: Recordings
@@ -73,7 +72,7 @@ class DriveChannel:
     shortest_wave_mm: float
 
     def laws_of(self, source: str) -> list[str]:
-        """Names of the laws of a source."""
+        """Return a source's laws."""
         return [name for name, (own, _) in self.of_law.items() if own.name == source]
 
 
@@ -86,9 +85,9 @@ def drive_channel(
     """Make the channel of recordings.
 
     Args:
-        sources: causes to compare.
-        base: parameters that are fitted anew with every hypothesis.
-        refused: names of laws that cannot be what these recordings show.
+        sources: to compare.
+        base: parameters refitted with every hypothesis.
+        refused: impossible laws.
     """
     variables = _variables(recordings)
     motion = recordings.motion[:, [(MASS, VISCOUS).index(name) for name in base]]
@@ -129,12 +128,10 @@ def drive_channel(
 
 
 def _beyond(straight: NDArray[np.float64], patterns: Iterator[Pattern]) -> Iterator[Pattern]:
-    """Curves less what base and causes of one number do: these are not displaced by a curve that contains them.
+    """Return curves orthogonal to base and single-parameter causes, which they contain.
 
-    A curve near standstill stays as it is. Less its share of Coulomb and viscous friction it would reach up to the greatest speed.
-
-    A spot on the travel is another matter: it is no sum of a load, a spring and the rest of a curve. Over the position the whole
-    curve, without a name, is therefore a hypothesis beside a name with the rest of it.
+    Curves near standstill stay, lest friction extend them to full speed. Over position the whole curve also competes with
+    a name plus rest.
     """
     axes = _axes(straight)
     for pattern in patterns:
@@ -203,16 +200,13 @@ def _law(
 
 
 def _departure(effect: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What a formula may be off by, per row: its effect times smooth functions of a variable, and a sample early or late.
-
-    The last two stand for the moment of a reversal, which a drive that sticks for a while blurs, shape (m, q).
-    """
+    """Return formula slack per row: effect times smooth functions, and shifts by a sample for reversals, shape (m, q)."""
     late = np.gradient(effect)
     return np.column_stack([modulated([effect[:, None]], [along[:, None]], None), late, np.gradient(late)])
 
 
 def _curves(recordings: Recordings) -> Iterator[Pattern]:
-    """Unmodelled forces: any smooth curve over a variable, and the same by direction of travel."""
+    """Return unmodelled forces: smooth curves, also by direction."""
     scale = recordings.scale
     starts = dict(zip((id(s) for s in recordings.signals), _starts(recordings), strict=True))
     travels = recordings.at(lambda s: s.since_reversal_m)
@@ -267,7 +261,7 @@ def _curve_over(
     values: Callable[[Signals], NDArray[np.float64]],
     factor: Callable[[Signals], NDArray[np.float64]] | None,
 ) -> Iterator[Pattern]:
-    """A curve over a variable, with those of its functions that the recordings show; none where they show none."""
+    """Return a curve's visible functions over a variable."""
     samples = recordings.compared(partial(_curve, spline=spline, values=values, factor=factor))
     norms = np.linalg.norm(samples, axis=0)
     seen = samples[:, norms > SAME * norms.max()]
@@ -281,13 +275,13 @@ def _curve(
     values: Callable[[Signals], NDArray[np.float64]],
     factor: Callable[[Signals], NDArray[np.float64]] | None,
 ) -> NDArray[np.float64]:
-    """Functions of a curve at every sample of a recording, shape (n, p)."""
+    """Return a curve's functions at every sample, shape (n, p)."""
     found = spline.columns(values(signals))
     return found if factor is None else found * factor(signals)[:, None]
 
 
 def _starts(recordings: Recordings) -> list[float]:
-    """What is added to the time of each recording, so that they follow each other [s]."""
+    """Return time offsets that concatenate recordings [s]."""
     return [
         float(recordings.time_s[rows.start] - one.t_s[one.kept[0]])
         for rows, one in zip(recordings.blocks, recordings.signals, strict=True)
@@ -295,9 +289,9 @@ def _starts(recordings: Recordings) -> list[float]:
 
 
 def _first_look(recordings: Recordings, smooth: NDArray[np.float64]) -> tuple[Scale, float]:
-    """Sizes with the waves over the position that are strongest in what smooth things leave, and the shortest looked for [mm].
+    """Return sizes with the strongest position waves, and the shortest searched [mm].
 
-    At the usual speed the shortest wave passes in one period of the cut-off. Waves are taken one beside the other.
+    At usual speed that passes in a cut-off period. Waves are picked successively.
     """
     scale = recordings.scale
     speed = float(np.median(np.abs(recordings.at(lambda s: s.speed_m_s))))

@@ -1,8 +1,7 @@
-"""The contract of a cause of force: what it is given, what it declares, what it answers.
+"""The contract of a cause of force.
 
-The force that drives a moving mass is linear in amplitudes: mass times acceleration, viscous friction times speed, and
-columns of further causes. A cause has one or several forms; a form may hold numbers that its columns are not proportional
-to (a Stribeck speed, a period), which begin on a grid and are then improved.
+Force is linear in amplitudes: mass times acceleration, viscous friction times speed, and causes' columns. A form may have
+nonlinear numbers (Stribeck speed, period), refined from a grid.
 """
 
 from __future__ import annotations
@@ -24,17 +23,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Scale:
-    """Sizes of all recordings together: they make amplitudes comparable.
+    """Sizes over all recordings, for comparable amplitudes.
 
     Attributes:
-        force_n: root mean square of the force in the band [N].
-        speed_m_s: greatest speed [m/s].
-        mean_m: mean position at the samples compared [m].
-        cutoff_hz: of the band in which force and model are compared.
-        reverses: some recording changes its direction of travel.
-        both_ways: enough samples are travelled in each direction to say how these differ.
-        waves_per_m: waves over the position that the residual of everything smooth follows best, strongest first [1/m].
-        waves_tried: how many independent waves these were picked from.
+        force_n: rms in the band.
+        speed_m_s: greatest.
+        mean_m: position at compared samples.
+        cutoff_hz: of the band.
+        reverses: some recording changes direction.
+        both_ways: enough samples each way.
+        waves_per_m: strongest residual waves over position [1/m].
+        waves_tried: independent waves tried.
     """
 
     force_n: float
@@ -61,10 +60,10 @@ class DriveParameter:
     """One number of a cause.
 
     Attributes:
-        name: unique within the cause; its unit is its last part.
-        plausible: usual size, one standard deviation, in that unit, for the recording at hand.
+        name: unique, ending with its unit.
+        plausible: one standard deviation, in that unit.
         meaning: one line with the sign.
-        positive: it cannot be negative.
+        positive: cannot be negative.
     """
 
     name: str
@@ -79,12 +78,12 @@ class DriveForm:
     """One form of a cause.
 
     Attributes:
-        amplitudes: what the force is proportional to, p of them.
-        columns: force per amplitude at every sample of a recording, shape (n, p), for values of `shapes`.
-        shapes: numbers that the columns are not proportional to.
-        grids: values of each of these to begin with, rising.
-        label: what tells it from other forms of the cause, which may be there beside it; empty where there is one only.
-        tried: independent forms that it was picked from by looking at the recording.
+        amplitudes: p of them.
+        columns: force per amplitude, shape (n, p), at values of `shapes`.
+        shapes: nonlinear numbers.
+        grids: start values, rising.
+        label: of a coexisting form; may be empty.
+        tried: independent forms of the choice.
     """
 
     amplitudes: tuple[DriveParameter, ...]
@@ -96,7 +95,7 @@ class DriveForm:
 
 
 class DriveSource(ABC):
-    """One physical cause of force. Instances carry no state."""
+    """One physical cause of force, without state."""
 
     name: ClassVar[str]
     varies_with: ClassVar[str]
@@ -109,13 +108,12 @@ class DriveSource(ABC):
 
     @abstractmethod
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Forms to compare, none where the recordings cannot show the cause."""
+        """Return forms; none if invisible in these recordings."""
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
-        """Whether values can be this cause at all, whatever they explain.
+        """Return whether values can be this cause.
 
         Args:
-            values: all parameters of a model that contains the cause, by name.
-            scale: sizes of the recordings.
+            values: of the whole model, by name.
         """
         return True

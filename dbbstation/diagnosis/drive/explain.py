@@ -1,4 +1,4 @@
-"""Naming: which set of causes explains the recordings, with nothing among them that cannot be."""
+"""The most probable possible set of causes of a drive."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ class ExplainedDrive:
     """What the comparison came to.
 
     Attributes:
-        before: fit of mass and viscous friction alone.
-        after: fit of the most probable hypothesis.
-        refused: laws that cannot be what the recordings show, and why.
-        dropped: base parameters that would be negative, and what that points to.
+        before: mass and viscous friction.
+        after: best hypothesis.
+        refused: impossible laws with reasons.
+        dropped: negative base parameters, and their meaning.
     """
 
     drive: DriveChannel
@@ -52,7 +52,7 @@ class ExplainedDrive:
 
 
 def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Callable[[str], None]) -> ExplainedDrive:
-    """Compare sets of causes; refuse what cannot be, and compare again."""
+    """Compare sets of causes, refusing impossible ones."""
     refused: dict[str, str] = {}
     dropped: dict[str, str] = {}
     for number in range(MOST_ROUNDS):
@@ -97,7 +97,7 @@ POINTS_TO = {
 
 
 def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
-    """The comparison with hypotheses weighed by whether their mass and friction can be."""
+    """Return the comparison weighted by possible mass and friction."""
     posterior = settled.posterior
     weights = dict(posterior.weights)
     hypotheses = list(posterior.hypotheses)
@@ -114,9 +114,9 @@ def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
 
 
 def _impossible(drive: DriveChannel, fitted: DriveFit) -> dict[str, str]:
-    """Laws of a fit whose values cannot be, by what their sources say.
+    """Return impossible laws by their sources.
 
-    An amplitude that cannot be negative and fits best below zero is most probably zero: the evidence was that of the wrong sign.
+    Amplitudes below zero are probably zero.
     """
     values = fitted.all_values()
     found = {}

@@ -1,4 +1,4 @@
-"""What is found of one strut drive: verdicts, places, numbers with their uncertainty. Its fields are the keys of the JSON."""
+"""Findings on one strut drive; fields are JSON keys."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class DriveValue(Value):
     """A parameter of the drive.
 
     Attributes:
-        identifiable: False where this recording cannot tell it; the value then means nothing by itself.
+        identifiable: False: the value is meaningless.
     """
 
     identifiable: bool
@@ -29,11 +29,11 @@ class DriveValue(Value):
 
 @dataclass(frozen=True)
 class CausePart:
-    """One wave, pulse or form of a cause.
+    """One wave, pulse or form.
 
     Attributes:
-        label: which; empty where there is one only.
-        t_s: first and last time of a pulse [s]; None where it is none.
+        label: may be empty.
+        t_s: first and last time of a pulse; else None.
     """
 
     label: str
@@ -43,7 +43,7 @@ class CausePart:
 
 @dataclass(frozen=True)
 class Complement:
-    """The other way to read pulses of one size: the opposite force in the rest of the time, and a constant load."""
+    """Pulses of one size read inversely: opposite force elsewhere, plus a constant load."""
 
     force_n: Value
     t_s: tuple[tuple[float, float], ...]
@@ -55,18 +55,17 @@ class DriveFinding:
     """What is said of one cause.
 
     Attributes:
-        ambiguous_with: causes that would explain the recording about as well in its place.
-        concealed: share of its signature's sum of squares that mass and viscous friction take up.
-        unconcealed_rms_n: of what mass and viscous friction leave of it [N].
-        probability: that it is there, or one that nothing recorded here tells from it.
-        gain: log Bayes factor of it beside the others.
-        parameters: as fitted; for a cause that was not, best amplitudes, whose uncertainty says how much could hide.
-        parts: where it is there more than once (waves, pulses, forms), each with its numbers.
-        at_end: names of parameters that lie at the end of the values that are tried.
-        complement: stretches of time that explain as much in the place of `parts`.
-        persists: it happened once, such as friction that drifts, and held-out parts tell of it, too.
-        gains: what it brought in held-out parts [N²]; None: not asked for.
-        text: sentences for people.
+        ambiguous_with: causes of about equal explanation.
+        concealed: share of squares absorbed by mass and viscous friction.
+        unconcealed_rms_n: beyond them.
+        probability: of it or an equivalent.
+        gain: log Bayes factor beside others.
+        parameters: fitted, or best amplitudes, whose uncertainty bounds what could hide.
+        parts: waves, pulses or forms if several.
+        at_end: parameters at the end of their grid.
+        complement: alternative stretches to `parts`.
+        persists: a single event, such as drift, confirmed by held-out parts.
+        gains: held-out [N²]; None if not tested.
     """
 
     name: str
@@ -92,8 +91,8 @@ class UnexplainedForce:
     """An unmodelled force.
 
     Attributes:
-        text: kind and variable, such as `curve over speed`.
-        rms_n: of it beside mass and viscous friction [N].
+        text: such as `curve over speed`.
+        rms_n: beside mass and viscous friction.
         low, high: range of the variable in which it is at least half as large as anywhere; `from` and `to` in JSON.
     """
 
@@ -108,14 +107,14 @@ class UnexplainedForce:
 
 @dataclass(frozen=True)
 class ForceLocation:
-    """A stretch of the recording in which a misfit stands out.
+    """A stretch with outstanding misfit.
 
     Attributes:
         direction: `forwards` or `backwards`.
-        at_reversal: a reversal or stop lies in it or beside it.
-        variable: that it follows; None where nothing does.
-        share: of the misfit's sum of squares.
-        peak_n: greatest deviation, measured minus model [N].
+        at_reversal: in or beside a reversal or stop.
+        variable: or None.
+        share: of squares.
+        peak_n: measured minus model.
     """
 
     t_s: tuple[float, float]
@@ -130,12 +129,12 @@ class ForceLocation:
 
 @dataclass(frozen=True)
 class ModelStep:
-    """A model on the way from the base to the last one, and how it predicts the stretch that was held back.
+    """A step of models, and its prediction of a held-back stretch.
 
     Attributes:
-        added: cause that this step adds; None for the base.
-        relative_force_error: |F - F_model| / |F| on the stretch, fitted without it.
-        parameters: values fitted without the stretch, by name.
+        added: None for the base.
+        relative_force_error: |F - F_model| / |F| on the stretch.
+        parameters: without the stretch.
     """
 
     added: str | None
@@ -146,7 +145,7 @@ class ModelStep:
 
 @dataclass(frozen=True)
 class ForceErrors:
-    """A figure with mass and viscous friction alone (before), and with everything found (after)."""
+    """With mass and viscous friction (before), and all findings (after)."""
 
     before: float
     after: float
@@ -157,9 +156,9 @@ class HeldBack:
     """How models predict a stretch that was held back.
 
     Attributes:
-        relative_force_error: |F - F_model| / |F| there.
-        steps: from mass and viscous friction to the last model.
-        not_in_model: causes that were fitted beside it and are not in it, since nothing decides on them.
+        relative_force_error: |F - F_model| / |F|.
+        steps: from base to last model.
+        not_in_model: fitted but undecided causes.
     """
 
     t_s: tuple[float, float]
@@ -170,7 +169,7 @@ class HeldBack:
 
 @dataclass(frozen=True)
 class ParameterBias:
-    """How far what was left out had pulled a parameter: before, after, before less after, uncertainty of the value after."""
+    """A parameter's bias: before, after, difference, uncertainty after."""
 
     parameter: str
     before: float
@@ -185,10 +184,9 @@ class UnexplainedForces:
     """The unmodelled residual.
 
     Attributes:
-        probability: of such a rest or a larger one by noise alone.
-        variable: what organises it; None where nothing does clearly.
-        text: one sentence for people.
-        effects: without a name that the comparison found, largest first.
+        probability: by noise.
+        variable: or None.
+        effects: unnamed, largest first.
     """
 
     rms_n: float
@@ -202,13 +200,13 @@ class UnexplainedForces:
 
 @dataclass(frozen=True)
 class HeldOutForce:
-    """Predictions of parts that were held out, everything chosen anew without each of them.
+    """Predictions of held-out parts, chosen anew.
 
     Attributes:
-        reference: root mean square error of the law of mass, viscous and Coulomb friction [N].
-        corrected: of everything that was chosen, but for what happens in time [N].
-        worse: whether everything together predicts worse than mass and friction alone.
-        gains: of each source that was chosen without some part, by name, in N².
+        reference: rms error with mass, viscous and Coulomb friction.
+        corrected: with everything but events in time.
+        worse: than mass and friction.
+        gains: by source [N²].
     """
 
     parts: int
@@ -223,8 +221,8 @@ class RecordedSignals:
     """What was recorded.
 
     Attributes:
-        cutoff_hz: band in which force and model are compared [Hz].
-        shortest_wave_mm: shortest wave over the position that could be seen [mm]; None where none could.
+        cutoff_hz: of the band.
+        shortest_wave_mm: visible over position, or None.
     """
 
     recordings: int
@@ -241,7 +239,7 @@ class RecordedSignals:
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurve:
-    """Friction against speed, all causes that hang on the speed together.
+    """Friction against speed, by all speed-dependent causes.
 
     Attributes:
         speed_m_s: shape (c,) [m/s].
@@ -257,22 +255,21 @@ class DriveFindings:
     """Everything found of one strut drive.
 
     Attributes:
-        mismatch: the recording differs from mass and viscous friction beyond noise.
-        probability: of as much by chance.
-        misfit_rms_n: of mass and viscous friction beyond noise [N].
-        held_back: how models predict a stretch that was held back.
-        parameters: of the last model, base parameters first.
-        parameter_shift: how far what was left out had pulled them.
-        friction: Coulomb and viscous friction per direction; empty where not identifiable.
-        locations: of the base model's misfit, largest share first.
-        sources: causes, best first.
-        cancelling: forces that cancel each other; None where none do.
-        held_out_rms_n: errors of held-out parts; None where not tested.
-        noticed: in the recordings; `notes` in JSON.
-        table: what was compared, sample by sample, by column.
-        before: parameters of the base model.
-        chosen: causes in the last model, those first that move the force most beside mass and viscous friction.
-        curve: friction against speed.
+        mismatch: beyond mass and viscous friction.
+        probability: by chance.
+        misfit_rms_n: beyond noise.
+        held_back: predictions of a stretch.
+        parameters: base first.
+        parameter_shift: bias by missing physics.
+        friction: Coulomb and viscous by direction; may be empty.
+        locations: base misfit, largest share first.
+        sources: best first.
+        cancelling: or None.
+        held_out_rms_n: None if not tested.
+        noticed: `notes` in JSON.
+        table: compared samples by column.
+        before: base parameters.
+        chosen: causes of the last model by force.
     """
 
     mismatch: bool

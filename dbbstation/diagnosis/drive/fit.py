@@ -1,4 +1,4 @@
-"""Mass, viscous friction and the members of a hypothesis fitted together: values, uncertainties, and the force they predict."""
+"""Joint fit of mass, viscous friction and members."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ IMPOSSIBLE_SIGMA = 3.0
 
 @dataclass(frozen=True, eq=False)
 class DriveFit:
-    """A fitted model, base columns first, then amplitudes and slack of each member.
+    """A fit: base, then amplitudes and slack by member.
 
     Attributes:
-        samples: all columns, shape (m, k).
+        samples: shape (m, k).
         values: shape (k,).
         covariance: shape (k, k).
     """
@@ -62,7 +62,7 @@ class DriveFit:
         }
 
     def columns_of(self, name: str) -> slice:
-        """Columns of a member's amplitudes."""
+        """Return a member's amplitude columns."""
         start = len(self.drive.channel.base.names)
         for member in self.members:
             if member.cause.name == name:
@@ -71,11 +71,11 @@ class DriveFit:
         raise KeyError(name)
 
     def member(self, name: str) -> Member:
-        """Member by the name of its cause."""
+        """Return a member by cause."""
         return next(member for member in self.members if member.cause.name == name)
 
     def parameters(self, name: str) -> dict[str, Value]:
-        """Amplitudes and further numbers of one law."""
+        """Return a law's amplitudes and further numbers."""
         member, own = self.member(name), self.columns_of(name)
         _, form = self.drive.of_law[name]
         law = next(law for law in self.drive.channel.laws if law.name == name)
@@ -96,7 +96,7 @@ class DriveFit:
         return found
 
     def at_end(self, name: str) -> dict[str, tuple[float, float]]:
-        """Numbers of a law that lie at the end of the values that are tried, with the first and the last of these."""
+        """Return a law's numbers at grid ends, with these ends."""
         law = next(law for law in self.drive.channel.laws if law.name == name)
         _, form = self.drive.of_law[name]
         found = self.parameters(name)
@@ -113,7 +113,7 @@ class DriveFit:
         return found
 
     def force_n(self, names: Container[str] | None = None) -> NDArray[np.float64]:
-        """Force of the base and of members by name, all if None, at the samples compared, shape (m,) [N]."""
+        """Return the force of base and members at compared samples, shape (m,) [N]; None: all."""
         used = np.zeros(len(self.values), dtype=bool)
         used[: len(self.drive.channel.base.names)] = True
         for member in self.members:
@@ -123,13 +123,13 @@ class DriveFit:
         return np.asarray(self.samples[:, used] @ self.values[used], dtype=np.float64)
 
     def weighted(self, weights: NDArray[np.float64], unit: str) -> Value:
-        """A sum of values, weights of shape (k,)."""
+        """Return a weighted sum of values, weights of shape (k,)."""
         sigma = float(np.sqrt(max(float(weights @ self.covariance @ weights), 0.0)))
         return Value(float(weights @ self.values), sigma, unit)
 
     @property
     def impossible(self) -> list[str]:
-        """Base parameters that are negative beyond their uncertainty, most impossible first."""
+        """Return significantly negative base parameters, worst first."""
         below = {name: -v.value / v.uncertainty for name, v in self.base.items() if v.uncertainty > 0.0}
         return [n for n, s in sorted(below.items(), key=lambda item: -item[1]) if s > IMPOSSIBLE_SIGMA]
 
@@ -137,10 +137,10 @@ class DriveFit:
 def fit(
     drive: DriveChannel, settled: Settled, members: Sequence[Member], rows: NDArray[np.bool_] | None = None
 ) -> DriveFit:
-    """Fit base and members together under the priors of the members.
+    """Fit base and members under priors.
 
     Args:
-        rows: samples to fit, shape (m,); all if None.
+        rows: shape (m,); None: all.
     """
     channel, bank = drive.channel, settled.bank
     samples = np.hstack([channel.base.samples, *(bank.samples(member.columns) for member in members)])
@@ -151,7 +151,7 @@ def fit(
 
 
 class RowsKept:
-    """Base and members of a hypothesis over the rows that a comparison kept, of which some are fitted at a time."""
+    """Base and members over kept rows, some fitted at a time."""
 
     def __init__(self, drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> None:
         channel, bank = drive.channel, settled.bank
@@ -160,7 +160,7 @@ class RowsKept:
         self._triangle = triangle_of(bank.whitened(np.column_stack([self._samples, channel.residual])))
 
     def solved(self, members: Sequence[Member]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Values of base and some of the members, shape (k,), and their columns over all rows, shape (m, k)."""
+        """Return values of base and some members, shape (k,), and columns over all rows, shape (m, k)."""
         width = len(self._drive.channel.base.names)
         own, names = [np.arange(width)], {member.cause.name for member in members}
         for member in self._members:
@@ -173,14 +173,14 @@ class RowsKept:
 
 
 def _prior_sd(drive: DriveChannel, members: Sequence[Member]) -> NDArray[np.float64]:
-    """Prior standard deviations of base and members, shape (k,)."""
+    """Return prior standard deviations, shape (k,)."""
     return np.concatenate([np.full(len(drive.channel.base.names), np.inf), *(member.sd for member in members)])
 
 
 def _solved(
     rows: NDArray[np.float64], sd: NDArray[np.float64], noise: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values and their covariance, from rows of columns with the target last, under priors."""
+    """Return values and covariance of rows, target last, under priors."""
     rows = triangle_of(rows)  # which says the same in as many rows as columns
     norm = np.linalg.norm(rows[:, :-1], axis=0)
     norm = np.where(norm > 0.0, norm, 1.0)  # a pulse elsewhere: its prior alone says what it is
@@ -193,13 +193,11 @@ def _solved(
 
 
 def measured(drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> DriveFit:
-    """Fit base and members for values that are told, with uncertainties that no model of the noise makes too small.
+    """Return the fit for reported values, with conservative uncertainties.
 
-    Rows made white say most if all that is left is noise. They weigh how the force changes from row to row, though, and there laws of
-    friction are least exact: what is wrong beside reversals then moves the values. Ordinary least squares in the band, as is the
-    practice of the field, suffer less from that. Where both differ by more than noise could make them differ, something other than noise
-    is left, and the latter are taken [Hausman, Specification tests in econometrics, Econometrica 46 (1978) 1251, sec. 2]; their covariance
-    is that of noise as it is coloured [Huber, Proc. 5th Berkeley Symp. 1 (1967) 221].
+    Whitened rows weigh force changes, where friction laws are least exact. Ordinary least squares suffers less and is
+    taken if both differ beyond noise [Hausman, Specification tests in econometrics, Econometrica 46 (1978) 1251, sec. 2],
+    with coloured covariance [Huber, Proc. 5th Berkeley Symp. 1 (1967) 221].
     """
     bank, sd = settled.bank, _prior_sd(drive, members)
     white = fit(drive, settled, members)
@@ -215,9 +213,9 @@ def measured(drive: DriveChannel, settled: Settled, members: Sequence[Member]) -
 
 
 def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
-    """Standard deviations of their difference by which values of base and laws differ, at the most, noise being what it is taken for.
+    """Return the greatest standardised difference of estimates.
 
-    The variance of the difference from an efficient estimate is the difference of the variances [Hausman 1978, corollary 2.6].
+    Its variance is the difference of variances [Hausman 1978, corollary 2.6].
     """
     told = list(range(len(efficient.drive.channel.base.names)))
     for member in efficient.members:
@@ -233,10 +231,10 @@ def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
 def _widened(
     settled: Settled, fitted: DriveFit, rows: NDArray[np.float64], sd: NDArray[np.float64], noise: float
 ) -> DriveFit:
-    """The same fit with uncertainties that are no smaller than how its values move when stretches are left out, or the band halved.
+    """Return the fit with uncertainties widened by omitted stretches and half the band.
 
-    What no formula says stays the same over a stretch: noise alone would call the values surer than they are. [Efron and Stein,
-    The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq. 1.5]
+    Noise alone would understate them. [Efron and Stein, The jackknife estimate of variance, Ann. Statist. 9 (1981) 586,
+    eq. 1.5]
     """
     stretch = np.arange(len(rows)) * STRETCHES // len(rows)
     each = [triangle_of(rows[stretch == k]) for k in range(STRETCHES)]
@@ -258,9 +256,9 @@ def _widened(
 def _information(
     settled: Settled, samples: NDArray[np.float64], sd: NDArray[np.float64], counted: float
 ) -> NDArray[np.float64]:
-    """Covariance of what columns take up of noise as it is coloured, and of what their priors say, shape (k, k).
+    """Return the covariance of columns' coloured noise with priors, shape (k, k).
 
-    Rows are divided by the square of the noise that they were `counted` with.
+    Rows are divided by the square of the `counted` noise.
     """
     bank = settled.bank
     taken = samples
@@ -271,7 +269,7 @@ def _information(
 
 
 def _in_half_the_band(settled: Settled, fitted: DriveFit) -> DriveFit:
-    """The same members fitted to means of neighbouring samples, which have half the band."""
+    """Return the members fitted to pair means, of half the band."""
     even = len(fitted.samples) // 2 * 2
     rows = np.column_stack([fitted.samples, fitted.drive.channel.residual])[:even]
     halved = rows.reshape(-1, 2, rows.shape[1]).mean(axis=1)
@@ -288,16 +286,12 @@ RANK = 1e-9
 
 
 def log_possible(fitted: DriveFit) -> float:
-    """Log probability that mass and friction of a fit are not negative: what a prior that knows it makes of its evidence."""
+    """Return the log probability of non-negative mass and friction."""
     return float(sum(log_ndtr(v.value / max(v.uncertainty, 1e-300)) for v in fitted.base.values()))
 
 
 def base_values(drive: DriveChannel, settled: Settled, best: DriveFit) -> dict[str, Value]:
-    """Base parameters with what other likely hypotheses make of them in their uncertainty.
-
-    Args:
-        settled: the comparison.
-    """
+    """Return base parameters with uncertainty over likely hypotheses."""
     posterior = settled.posterior
     likely: list[tuple[float, Hypothesis]] = [
         (posterior.probability_of(h.names.__eq__), h) for h in posterior.hypotheses[:MOST]

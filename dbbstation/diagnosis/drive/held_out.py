@@ -1,4 +1,4 @@
-"""What causes bring in parts of the recordings that took no part in choosing or fitting them."""
+"""Causes' gains in unused parts of recordings."""
 
 from __future__ import annotations
 
@@ -25,13 +25,7 @@ if TYPE_CHECKING:
 
 
 def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> HeldOutForce:
-    """Hold back parts in turn, whole recordings from five on, else ten stretches, and predict them.
-
-    Samples as far from a part as the low-pass reaches take no part either: they contain some of its force.
-
-    Args:
-        progress: called with what is being done.
-    """
+    """Hold back parts: whole recordings from five on, else ten stretches, with the filter's reach excluded."""
     channel = drive.channel
     parts = parts_of(channel)
     gap = int(np.ceil(GAP_PERIODS / drive.scale.cutoff_hz / drive.recordings.samples_apart_s))
@@ -70,10 +64,7 @@ GAP_PERIODS = 0.5
 
 
 def _left(drive: DriveChannel, settled: Settled, of_chosen: RowsKept, members: Sequence[Member]) -> NDArray[np.float64]:
-    """What predictions leave of all samples, fitted to those that were kept, shape (m,) [N].
-
-    What members do in time they were fitted for, and predict nothing with: it says nothing of other times.
-    """
+    """Return residuals of kept-row fits over all samples, shape (m,) [N], without events in time."""
     values, columns = of_chosen.solved(members)
     first = drive.channel.base.samples.shape[1]
     used = np.ones(len(values), dtype=bool)

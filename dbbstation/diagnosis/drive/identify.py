@@ -1,4 +1,4 @@
-"""The diagnosis of a drive: mass and friction, which causes the base model leaves out, and what they are worth."""
+"""The diagnosis of a drive: mass, friction, missing causes."""
 
 from __future__ import annotations
 
@@ -68,16 +68,15 @@ def identify(
     *,
     hold_out: bool = False,
 ) -> DriveFindings:
-    """Identify a drive and find what a model of mass and viscous friction leaves out.
+    """Identify a drive beyond mass and viscous friction.
 
     Args:
-        sources: causes to look for.
-        cutoff_hz: of the band in which force and model are compared; chosen from the data if None.
-        progress: called with what is being done.
-        hold_out: ask what causes bring in parts that they were not chosen from; takes as long again, or twice.
+        sources: to look for.
+        cutoff_hz: of the band; None: by the data.
+        hold_out: test on unused parts; takes up to twice as long again.
 
     Raises:
-        CalibrationError: the recordings cannot carry an identification at all.
+        CalibrationError: the recordings carry no identification.
     """
     progress("speed and acceleration")
     put_together = recordings_of(recordings, cutoff_hz)
@@ -147,7 +146,7 @@ def identify(
 def _table(
     recordings: Recordings, base_n: NDArray[np.float64], model_n: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """What was compared, sample by sample in the band, by column name with its unit."""
+    """Return compared samples by column with unit."""
     return {
         "t_s": recordings.time_s,
         "position_mm": 1e3 * recordings.at(lambda s: s.position_m),
@@ -160,7 +159,7 @@ def _table(
 
 
 def _cancelling(explained: ExplainedDrive) -> Cancelling | None:
-    """Forces of mass, friction and causes that cancel each other [N]; None where none do."""
+    """Return cancelling forces [N], or None."""
     settled, drive = explained.settled, explained.drive
     base, patterns = settled.channel.base, settled.bank.patterns
     shown = {name: source_of(drive, patterns, name) for name in settled.best.names}
@@ -200,7 +199,7 @@ def _number(value: Value, *, is_known: bool) -> DriveValue:
 
 
 def _is_known(viscous: Value, speed_m_s: float, force_n: float) -> bool:
-    """Whether viscous friction is known to a share of itself, or of the force at the greatest speed where it is small."""
+    """Return whether viscous friction is known relative to itself or to the top-speed force."""
     return viscous.uncertainty < VAGUE * max(viscous.value, 0.1 * force_n / speed_m_s)
 
 
@@ -211,7 +210,7 @@ def _left_of_base(explained: ExplainedDrive) -> LeftOver:
 
 
 def _beyond(residual: NDArray[np.float64], sigma: float) -> float:
-    """Root mean square beyond noise."""
+    """Return the rms beyond noise."""
     return float(np.sqrt(max(float(np.mean(residual**2)) - sigma**2, 0.0)))
 
 
@@ -245,7 +244,7 @@ def _rest(explained: ExplainedDrive, verdicts: Verdicts, model_n: NDArray[np.flo
 def _numbers(
     explained: ExplainedDrive, values: dict[str, Value], known: dict[str, bool], limits: DriveLimits
 ) -> dict[str, DriveValue]:
-    """Base parameters, and what shifts the force of both directions."""
+    """Return base parameters, and shifts of both directions."""
     nothing = {name: Value(float("nan"), float("inf"), unit) for name, unit in BASE_UNITS.items()}
     numbers = {name: _number((nothing | values)[name], is_known=known[name]) for name in (MASS, VISCOUS)}
     after = explained.after
@@ -260,7 +259,7 @@ def _numbers(
 
 
 def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict[str, Value]]:
-    """Coulomb and viscous friction forwards and backwards, with the asymmetry where it was found."""
+    """Return Coulomb and viscous friction by direction, with asymmetry if found."""
     sides = {}
     for side, sign in (("forwards", 1.0), ("backwards", -1.0)):
         dry, wet = np.zeros(len(fitted.values)), np.zeros(len(fitted.values))
@@ -286,7 +285,7 @@ def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict
 
 
 def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: NDArray[np.bool_]) -> list[ModelStep]:
-    """Base and one source after another, each fitted without the held-back stretch and judged on it."""
+    """Return models by step, fitted without the held-back stretch."""
     drive, settled = explained.drive, explained.settled
     by_name = {member.cause.name: member for member in settled.best.members}
     predicting = verdicts.predicting
@@ -305,7 +304,7 @@ def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: NDArray[np.
 
 
 def _with_weight(finding: DriveFinding, values: dict[str, Value]) -> DriveFinding:
-    """Say of a constant load how far the axis would be slanted if it were the weight of what is moved."""
+    """Add an axis's slant that would explain a constant load by weight."""
     mass = values.get(MASS)
     load = finding.parameters.get("load_n")
     if (
@@ -324,7 +323,7 @@ def _with_weight(finding: DriveFinding, values: dict[str, Value]) -> DriveFindin
 
 
 def _curve(explained: ExplainedDrive) -> FrictionCurve:
-    """Friction against speed as fitted: viscous friction and all causes that hang on the speed."""
+    """Return fitted friction against speed."""
     drive, fitted = explained.drive, explained.after
     recordings, scale = drive.recordings, drive.scale
     speeds = recordings.at(lambda s: s.speed_m_s)

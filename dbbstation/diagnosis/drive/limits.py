@@ -1,4 +1,4 @@
-"""What recordings cannot show, whatever the model: no acceleration, one speed, no reversal."""
+"""What recordings cannot show: acceleration, speeds, reversals."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class DriveLimits:
     """What cannot be distinguished.
 
     Attributes:
-        accelerates: beyond the noise of the acceleration.
-        several_speeds: so that Coulomb friction of its usual size would be distinguished from viscous friction.
-        reverses: it travels both ways, so that friction and constant load look different.
+        accelerates: beyond acceleration noise.
+        several_speeds: usual Coulomb and viscous friction are separable.
+        reverses: friction and constant load are separable.
     """
 
     accelerates: bool
@@ -38,10 +38,9 @@ class DriveLimits:
 
 
 def limits_of(explained: ExplainedDrive) -> DriveLimits:
-    """Look at what the drive did.
+    """Return the limits of the motion.
 
-    Coulomb friction counts as distinguished from viscous friction where it shows beside mass, viscous friction and a delay between
-    the channels: in ramps alone a delay of a sample looks like either.
+    Coulomb friction must show beside mass, viscous friction and a delay, which ramps confuse.
     """
     recordings, bank = explained.drive.recordings, explained.settled.bank
     acceleration = recordings.motion[:, 0]
@@ -61,12 +60,12 @@ def limits_of(explained: ExplainedDrive) -> DriveLimits:
 
 
 def mass_is_known(limits: DriveLimits, mass: Value | None) -> bool:
-    """Whether the recordings tell the mass."""
+    """Return whether mass is determined."""
     return mass is not None and limits.accelerates and mass.uncertainty < VAGUE * mass.value
 
 
 def sentences(limits: DriveLimits, explained: ExplainedDrive, known: dict[str, bool]) -> tuple[str, ...]:
-    """Sentences for people: what cannot be determined, what can be said still, and what to record."""
+    """Return sentences on undetermined numbers and further recordings."""
     sentences = list(explained.dropped.values())
     if not known[MASS] and MASS not in explained.dropped:
         sentences.append(

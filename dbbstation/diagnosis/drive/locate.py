@@ -1,4 +1,4 @@
-"""Where in time and on the travel a misfit stands out."""
+"""Where a misfit stands out in time and travel."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SLOW = 0.1
 def locate(
     recordings: Recordings, residual_n: NDArray[np.float64], noise: Coloured, variable: str | None
 ) -> tuple[ForceLocation, ...]:
-    """Stretches in which a residual, shape (m,) [N], exceeds the noise, largest share first, and what it follows."""
+    """Return stretches of a residual, shape (m,) [N], beyond noise, largest share first, with variable."""
     smooth = np.convolve(residual_n, np.full(SMOOTHED, 1.0 / SMOOTHED), mode="same")
     together = min(noise.correlation_samples, float(SMOOTHED))
     threshold = COUNTS_SIGMA * noise.sigma * np.sqrt(together / SMOOTHED)
@@ -55,7 +55,7 @@ def locate(
 
 
 def _stretches(marked: NDArray[np.bool_], direction: NDArray[np.float64]) -> list[NDArray[np.int64]]:
-    """Marked samples that stand together, short breaks bridged, parted where the direction changes."""
+    """Return marked stretches, bridged over short gaps, split at reversals."""
     rows = np.flatnonzero(marked)
     if not len(rows):
         return []

@@ -31,10 +31,7 @@ EDGE_PERIODS = 3.0
 
 
 def low_passed(columns: NDArray[np.float64], rate_hz: float, cutoff_hz: float) -> NDArray[np.float64]:
-    """Columns, shape (n,) or (n, p), through the low-pass of the comparison and that of the position, without phase shift.
-
-    Beyond both ends a column goes on as at its end.
-    """
+    """Return low-passed columns, shape (n,) or (n, p), without phase shift, constant beyond ends."""
     bands = (cutoff_hz, POSITION_BAND * cutoff_hz)
     sos = np.vstack([butter(ORDER, band, fs=rate_hz, output="sos") for band in bands])
     beyond = min(_reach(rate_hz, cutoff_hz), len(columns) - 1)
@@ -42,7 +39,7 @@ def low_passed(columns: NDArray[np.float64], rate_hz: float, cutoff_hz: float) -
 
 
 def impulse_response(rate_hz: float, cutoff_hz: float) -> NDArray[np.float64]:
-    """What `low_passed` makes of a single sample of one, in the middle, as far as it rings, shape (2 k + 1,)."""
+    """Return `low_passed` of an impulse, shape (2 k + 1,)."""
     reach = _reach(rate_hz, cutoff_hz)
     at = np.arange(-2 * reach, 2 * reach + 1)
     return low_passed((at == 0).astype(np.float64), rate_hz, cutoff_hz)[reach:-reach]
@@ -53,25 +50,25 @@ def _reach(rate_hz: float, cutoff_hz: float) -> int:
 
 
 def speed_noise_m_s(noise_m: float, rate_hz: float, half: int) -> float:
-    """Standard deviation that white noise of the position puts into its slope over 2 `half` + 1 samples [m/s]."""
+    """Return noise of a slope over 2 `half` + 1 samples [m/s]."""
     return float(noise_m * rate_hz * np.sqrt(3.0 / (half * (half + 1) * (2 * half + 1))))
 
 
 def half_window(noise_m: float, rate_hz: float, allowed_m_s: float, most: int) -> int:
-    """Samples on either side of the shortest window whose slope has no more noise than is allowed, `most` at the most."""
+    """Return the half-width of the shortest window with allowed slope noise, at most `most`."""
     fine = (half for half in range(1, most) if speed_noise_m_s(noise_m, rate_hz, half) <= allowed_m_s)
     return next(fine, most)
 
 
 def within(marked: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:
-    """Samples no farther than `by` from a marked one, shape (n,)."""
+    """Return samples within `by` of marked ones, shape (n,)."""
     count = np.concatenate([[0], np.cumsum(marked)])
     at = np.arange(len(marked))
     return np.asarray(count[np.minimum(at + by + 1, len(marked))] > count[np.maximum(at - by, 0)])
 
 
 def weights(unknown: NDArray[np.bool_], rise: int) -> NDArray[np.float64]:
-    """Weight of every sample, shape (n,): zero where the force is unknown, from there rising to one over so many samples more."""
+    """Return weights, shape (n,): zero at unknown forces, rising to one."""
     if not unknown.any():
         return np.ones(len(unknown))
     away = np.asarray(distance_transform_edt(~unknown), dtype=np.float64)
@@ -79,15 +76,14 @@ def weights(unknown: NDArray[np.bool_], rise: int) -> NDArray[np.float64]:
 
 
 def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_s2: float, most: int) -> int:
-    """Samples over which weights must rise for their edge to add no more noise to the acceleration than is allowed.
+    """Return the rise that limits edge noise in the acceleration.
 
-    A difference of positions that is cut off at an edge keeps what its neighbours would have cancelled: the sharper the edge, the more of
-    the position's noise it lets into the band.
+    Sharp edges admit position noise that neighbours would cancel.
 
     Args:
-        noise_m: standard deviation of the position's white noise [m].
+        noise_m: white, of position.
         cutoff_hz: of the comparison.
-        allowed_m_s2: standard deviation that it may add [m/s²].
+        allowed_m_s2: standard deviation.
     """
     response = impulse_response(rate_hz, cutoff_hz)
     at = np.arange(len(response)) - len(response) // 2
@@ -103,12 +99,11 @@ def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_
 def edge_noise_m_s2(
     weight: NDArray[np.float64], kept: NDArray[np.int64], noise_m: float, rate_hz: float, cutoff_hz: float
 ) -> NDArray[np.float64]:
-    """Standard deviation of noise in the acceleration of samples compared beyond that of a drive that moves all the time.
+    """Return the excess acceleration noise of compared samples.
 
     Args:
-        weight: of every sample, shape (n,).
-        kept: indices of the samples compared, shape (m,).
-        cutoff_hz: of the comparison.
+        weight: shape (n,).
+        kept: compared samples, shape (m,).
 
     Returns:
         shape (m,) [m/s²].
@@ -126,5 +121,5 @@ def edge_noise_m_s2(
 
 
 def _of_second_difference(row: NDArray[np.float64]) -> float:
-    """Variance of a weighted sum of second differences of white noise of variance one."""
+    """Return the variance of weighted second differences of unit white noise."""
     return float(np.sum(np.diff(np.pad(row, 2), 2) ** 2))

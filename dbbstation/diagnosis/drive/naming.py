@@ -1,4 +1,4 @@
-"""Which cause a member of a hypothesis belongs to, and when it acts."""
+"""Members' causes, and when they act."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ DRIFT = "friction-drift"
 
 
 def source_of(drive: DriveChannel, patterns: Mapping[str, Pattern], name: str) -> str:
-    """Name of the source that a member belongs to; empty where it has none.
+    """Return a member's source; empty if none.
 
     Args:
-        patterns: of the comparison, by name.
+        patterns: by name.
     """
     if name in drive.of_law:
         return drive.of_law[name][0].name
@@ -38,5 +38,5 @@ def source_of(drive: DriveChannel, patterns: Mapping[str, Pattern], name: str) -
 
 
 def acts(source: str) -> Acts:
-    """When a cause acts: a force in time and friction that drifts happen once, laws of the motion whenever the drive moves."""
+    """Return whether a cause acts once: forces in time and drift."""
     return Acts.ONCE if source in {TRANSIENT, DRIFT} else Acts.ALWAYS

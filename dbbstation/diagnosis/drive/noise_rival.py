@@ -1,8 +1,7 @@
-"""Whether stretches of time are noise whose neighbours resemble each other.
+"""Whether stretches in time are correlated noise.
 
-Noise of a drive is of first order while causes are compared: noise of any colour takes up laws of friction, which are slow and least exact
-where the force changes fast. Stretches of time have no law, and low-passed or resonant noise looks like some of them. So noise of any
-colour competes with these alone, beside the laws that were found.
+Any-colour noise would absorb slow friction laws, so causes compete beside first-order noise. Lawless stretches alone
+compete with any colour.
 """
 
 from __future__ import annotations
@@ -19,10 +18,9 @@ if TYPE_CHECKING:
 
 
 def probability_beside_noise(settled: Settled) -> float:
-    """Probability of the stretches of time of the best hypothesis, against noise of any colour beside its other members.
+    """Return the stretches' probability against any-colour noise beside other members.
 
-    In both cases the noise is measured beside the members [`Bank.measure`], its parameters are paid for, and the prior odds of the
-    stretches count.
+    Noise is measured beside members [`Bank.measure`], with parameter cost and prior odds.
     """
     patterns = settled.bank.patterns
     others = settled.best.without(

@@ -1,4 +1,4 @@
-"""Pulses and steps of a force in time, as levels between the edges that were found."""
+"""Pulses and steps of a force as levels between edges."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ APART = 4.0
 
 @dataclass(frozen=True)
 class Edges:
-    """Where stretches of time begin and end.
+    """Edges of stretches.
 
     Attributes:
-        count: of beginnings and ends within the recordings.
-        at_turns: how many of them lie where the drive starts, stops or reverses.
-        share: of the time in which it does so, more than none and less than all.
+        count: within recordings.
+        at_turns: at starts, stops or reversals.
+        share: of time there, strictly between 0 and 1.
     """
 
     count: int
@@ -44,10 +44,9 @@ class Edges:
 
     @property
     def pushed(self) -> float:
-        """Probability that what begins and ends there does not know of the motion, against a law that is wrong at turns.
+        """Return the probability that edges ignore the motion, against a wrong law at turns.
 
-        The one has its edges anywhere, the other more often at turns, how much more is not known [binomial likelihood, uniform prior];
-        before, the latter has the odds of any cause, one in twenty.
+        [binomial likelihood, uniform prior], prior odds of one in twenty for the latter.
         """
         turns, others = self.at_turns + 1.0, self.count - self.at_turns + 1.0
         anywhere = self.at_turns * np.log(self.share) + (self.count - self.at_turns) * np.log1p(-self.share)
@@ -60,7 +59,7 @@ def edges_of(recordings: Recordings, parts: Sequence[CausePart]) -> Edges:
     """Where stretches of time begin and end.
 
     Args:
-        parts: that `pulse_parts` found.
+        parts: from `pulse_parts`.
     """
     times = np.array([edge for part in parts for edge in part.t_s or ()])
     times = times[(times > recordings.time_s[0]) & (times < recordings.time_s[-1])]
@@ -71,7 +70,7 @@ def edges_of(recordings: Recordings, parts: Sequence[CausePart]) -> Edges:
 
 
 def _at_turns(recordings: Recordings, times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether a drive starts, stops or reverses at times of all recordings, one after the other, shape (t,)."""
+    """Return whether times, shape (t,), are at starts, stops or reversals."""
     found = np.zeros(len(times), dtype=bool)
     for rows, one in zip(recordings.blocks, recordings.signals, strict=True):
         begins, ends = recordings.time_s[rows.start], recordings.time_s[rows.stop - 1]
@@ -82,16 +81,16 @@ def _at_turns(recordings: Recordings, times: NDArray[np.float64]) -> NDArray[np.
 
 
 def distinct_pushes(parts: Sequence[CausePart]) -> int:
-    """How many pushes stretches of time are, those of one size counted once: a machine that pushes again pushes as hard.
+    """Return the number of distinct sizes.
 
     Args:
-        parts: that `pulse_parts` found.
+        parts: from `pulse_parts`.
     """
     return distinct_sizes(_sizes_of(parts))
 
 
 def equal_pushes(parts: Sequence[CausePart]) -> list[CausePart]:
-    """The most stretches of time that can be of one size together, in their order."""
+    """Return the largest group of one size, in order."""
     return [parts[k] for k in most_of_one_size(_sizes_of(parts))]
 
 
@@ -100,7 +99,7 @@ def _sizes_of(parts: Sequence[CausePart]) -> list[Value]:
 
 
 def complement_of(parts: Sequence[CausePart], first_s: float, last_s: float) -> Complement | None:
-    """The stretches between pulses of one size, with the opposite force; None where there are not two such pulses."""
+    """Return opposite stretches between two or more equal pulses, or None."""
     equal = [part for part in equal_pushes(parts) if part.t_s is not None]
     if len(equal) < 2:  # noqa: PLR2004 - one pulse and the rest of the time say nothing of each other
         return None
@@ -111,14 +110,12 @@ def complement_of(parts: Sequence[CausePart], first_s: float, last_s: float) -> 
 
 
 def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[CausePart]:
-    """Stretches of time in which the force differs from what it is before and behind them, or from what it is most of the time.
+    """Return stretches whose force differs from their surroundings.
 
-    Stretches that were found may overlap; what they are together has levels, of which neighbours that do not differ by
-    `APART` standard uncertainties are one.
+    Overlapping stretches become levels; neighbours within `APART` standard uncertainties merge.
 
     Args:
-        explained: the comparison.
-        names: of members of the best hypothesis that are stretches of time.
+        names: stretches of the best hypothesis.
     """
     # Neighbouring levels have most of their uncertainty in common, which factors for each of them would not know.
     settled, recordings = explained.settled, explained.drive.recordings
@@ -172,10 +169,7 @@ def _peak(
     values: NDArray[np.float64],
     differ: Callable[[NDArray[np.float64], NDArray[np.float64]], bool],
 ) -> tuple[float, float, NDArray[np.float64]] | None:
-    """The shortest level that stands out of those before and behind it, and by what; these two are made one. None where none does.
-
-    What happens slowly in time beside it, a load or a curve, does not matter then.
-    """
+    """Return the shortest outstanding level and its height, its surroundings merged; or None."""
     found: list[tuple[float, int]] = []
     for k in range(1, len(levels) - 1):
         before, own, behind = (level for *_, level in levels[k - 1 : k + 2])
@@ -193,6 +187,6 @@ def _peak(
 
 
 def _distinct(times: NDArray[np.float64], apart: float) -> list[float]:
-    """Times, rising, of which those that are closer together than the band tells apart are one, at their mean."""
+    """Return rising times with inseparable ones averaged."""
     rising = np.sort(times)
     return [float(part.mean()) for part in np.split(rising, np.flatnonzero(np.diff(rising) > apart) + 1)]

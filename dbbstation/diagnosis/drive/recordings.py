@@ -1,4 +1,4 @@
-"""Recordings of one drive, prepared and put together: one after the other, in one band."""
+"""Recordings of one drive, concatenated in one band."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ class Recordings:
     signals: tuple[Signals, ...]
 
     def compared(self, columns: Callable[[Signals], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Columns of every recording in the band, at the samples compared, one recording after the other, (m,) or (m, p)."""
+        """Return band columns at compared samples of all recordings, (m,) or (m, p)."""
         return np.concatenate([one.compared(columns(one)) for one in self.signals])
 
     def at(self, values: Callable[[Signals], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Values of every recording at the samples compared, as they are, shape (m,)."""
+        """Return unfiltered values at compared samples, shape (m,)."""
         return np.concatenate([values(one)[one.kept] for one in self.signals])
 
     @cached_property
@@ -60,22 +60,19 @@ class Recordings:
 
     @cached_property
     def force_n(self) -> NDArray[np.float64]:
-        """In the band, shape (m,) [N]."""
+        """Return the band force, shape (m,) [N]."""
         return self.compared(lambda s: s.force_n)
 
     @cached_property
     def motion(self) -> NDArray[np.float64]:
-        """Acceleration [m/s²] and speed [m/s] in the band, shape (m, 2).
-
-        Of the position as measured: these columns are linear in it and have not passed its filter yet.
-        """
+        """Return band acceleration [m/s²] and speed [m/s], shape (m, 2), from the unfiltered position."""
         return self.compared(lambda s: np.column_stack(derivatives(s.measured_m, s.rate_hz)[::-1]))
 
     @cached_property
     def lost_share(self) -> float:
-        """Share of the acceleration that its differences over one sample lose, from what they lose over two.
+        """Return the acceleration's loss by finite differences.
 
-        With h the time of a sample and w the angular frequency, they lose (w h)²/12 and (2 w h)²/12.
+        Over one and two samples it is (w h)²/12 and (2 w h)²/12.
         """
         over_one = self.motion[:, 0]
         over_two = self.compared(lambda s: acceleration_over_two(s.measured_m, s.rate_hz))
@@ -83,17 +80,14 @@ class Recordings:
 
     @cached_property
     def edge_noise_n(self) -> NDArray[np.float64]:
-        """Noise of the force of a sample beyond that of the others, where it is a mean over less than the whole band, shape (m,) [N].
-
-        It is that of the acceleration times the mass, as mass and friction alone find it: its size matters, not its digits.
-        """
+        """Return excess force noise at weight edges, shape (m,) [N]: acceleration noise times estimated mass."""
         direction = self.compared(lambda s: s.direction)
         mass = np.linalg.lstsq(np.column_stack([self.motion, direction]), self.force_n, rcond=None)[0][0]
         return np.asarray(abs(float(mass)) * np.concatenate([one.edge_noise_m_s2 for one in self.signals]))
 
     @cached_property
     def time_s(self) -> NDArray[np.float64]:
-        """Time, later recordings behind earlier ones, shape (m,) [s]."""
+        """Return concatenated time, shape (m,) [s]."""
         found, end = [], 0.0
         for one in self.signals:
             found.append(one.t_s[one.kept] - one.t_s[0] + end if len(self.signals) > 1 else one.t_s[one.kept])
@@ -118,23 +112,23 @@ class Recordings:
 
     @cached_property
     def least_way(self) -> float:
-        """Share of the samples compared that are travelled in the direction that has fewer of them."""
+        """Return the smaller direction's share of samples."""
         way = self.at(lambda s: s.direction)
         return float(min(np.mean(way > 0.0), np.mean(way < 0.0)))
 
     @cached_property
     def samples_apart_s(self) -> float:
-        """Time from one sample that is compared to the next [s]."""
+        """Return the spacing of compared samples [s]."""
         one = self.signals[0]
         return float(np.median(np.diff(one.kept))) / one.rate_hz
 
     def step_response(self, since: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What the band shows of a force that begins at zero, by samples of the comparison since it."""
+        """Return the band's step response by samples since it."""
         return np.interp(since * self.samples_apart_s, *self._response)
 
     @cached_property
     def response_reach(self) -> float:
-        """Samples of the comparison before and after a step beyond which its response goes on as it is."""
+        """Return samples until the step response is constant."""
         since, _ = self._response
         return float(np.abs(since[[0, -1]]).max()) / self.samples_apart_s
 
@@ -146,17 +140,17 @@ class Recordings:
 
     @property
     def notes(self) -> list[str]:
-        """What was done to each recording."""
+        """Return notes on preparation."""
         if len(self.signals) == 1:
             return list(self.signals[0].notes)
         return [f"{name}: {note}" for name, one in zip(self.names, self.signals, strict=True) for note in one.notes]
 
 
 def recordings_of(recordings: Sequence[DriveRecording], cutoff_hz: float | None = None) -> Recordings:
-    """Prepare recordings of one drive, all in the band of the one that allows least.
+    """Prepare recordings in their narrowest band.
 
     Raises:
-        CalibrationError: as `signals_of`; or force and motion do not agree.
+        CalibrationError: as `signals_of`; or force contradicts motion.
     """
     signals = tuple(signals_of(recording, cutoff_hz) for recording in recordings)
     lowest = min(one.cutoff_hz for one in signals)
@@ -170,13 +164,12 @@ def recordings_of(recordings: Sequence[DriveRecording], cutoff_hz: float | None 
 
 
 def _refuse_wrong_sign(one: Recordings) -> None:
-    """Refuse a force that points against what it drives.
+    """Refuse an inverted force.
 
-    A drive puts power into friction. Inertia, a constant load and a spring give back what they take, and what goes with
-    them is left out of the force first; whatever friction is like, force and speed then agree on average.
+    Without inertia, load and spring, force and speed agree on average by friction.
 
     Raises:
-        CalibrationError: the drive would gain power beyond doubt, in both directions of travel.
+        CalibrationError: the drive gains power in both directions beyond doubt.
     """
     force, speed = one.force_n, one.motion[:, 1]
     if not one.scale.reverses:
@@ -197,5 +190,5 @@ def _refuse_wrong_sign(one: Recordings) -> None:
 
 
 def with_waves(scale: Scale, waves_per_m: tuple[float, ...], tried: float) -> Scale:
-    """The same sizes with waves that a first look found."""
+    """Return sizes with waves of a first look."""
     return replace(scale, waves_per_m=waves_per_m, waves_tried=tried)

@@ -1,4 +1,4 @@
-"""Even sampling: filters and differences need it; recordings have jitter, rounded stamps and gaps."""
+"""Even sampling of jittered, rounded or interrupted recordings."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FEWEST = 100
 
 @dataclass(frozen=True, eq=False)
 class Even:
-    """Evenly sampled signals, as `DriveRecording` has them, shape (n,) each, and what was done to get them."""
+    """Even signals, shape (n,) each, with notes."""
 
     t_s: NDArray[np.float64]
     position_mm: NDArray[np.float64]
@@ -37,9 +37,7 @@ class Even:
 
 
 def evenly_sampled(recording: DriveRecording) -> Even:
-    """Return the longest stretch without a gap, interpolated to even steps where its stamps are not even.
-
-    Stamps that are even but for their last printed digit are taken as even.
+    """Return the longest gapless stretch, interpolated if uneven beyond the last printed digit.
 
     Raises:
         CalibrationError: fewer than a hundred samples stand together without a gap.
@@ -77,7 +75,7 @@ def evenly_sampled(recording: DriveRecording) -> Even:
 
 
 def _printed_resolution(t: NDArray[np.float64]) -> float:
-    """Last digit that stamps were printed with, down to a microsecond [s]; zero where they have more."""
+    """Return the stamps' printed resolution down to a microsecond [s]; zero if finer."""
     for digits in range(7):
         if np.abs(t - np.round(t, digits)).max() < 1e-3 * 10.0**-digits:
             return float(10.0**-digits)

@@ -1,14 +1,10 @@
-"""Speed and acceleration from sampled position, and the band that force and model are compared in.
+"""Speed and acceleration from position, in the band of comparison.
 
-The standard practice of inverse dynamic identification by least squares: position is low-passed without phase shift
-(Butterworth, forwards and backwards), differentiated by central differences, and measured force and every column of
-the model then pass one and the same second low-pass and are decimated together. Here the force passes the position's
-low-pass too: all filters then change both sides alike, and starts and stops that reach beyond the band do no harm. [Gautier, Dynamic identification of robots with power model, ICRA 1997; Janot, Vandanjon and Gautier, A generic
-instrumental variable approach for industrial robot identification, IEEE TCST 22 (2014), sec. II-C]
-
-Friction does not follow the band: it turns over at once where the speed does. Speed is therefore read at the full rate over as few
-samples as its noise allows, and what is computed from it is weighted before the low-pass: samples whose speed was read from a
-standing drive have no weight, those of a force channel that is stuck neither.
+Inverse dynamic identification by least squares: zero-phase low-pass, central differences, and a common second low-pass
+with decimation for force and columns. Here force also passes the position's filter, so edges beyond the band cancel.
+[Gautier, Dynamic identification of robots with power model, ICRA 1997; Janot, Vandanjon and Gautier, A generic
+instrumental variable approach for industrial robot identification, IEEE TCST 22 (2014), sec. II-C] Friction reverses at
+once, so speed is read at full rate, and samples of standing drives or stuck channels have zero weight.
 """
 
 from __future__ import annotations
@@ -86,17 +82,16 @@ class Signals:
     """An evenly sampled recording with its derivatives, and the way to the samples that are compared.
 
     Attributes:
-        t_s: shape (n,) [s].
-        position_m: of a parabola through as few samples as the noise of the speed allows [m].
-        speed_m_s: its slope [m/s].
-        acceleration_m_s2: second difference of the low-passed position [m/s²].
-        cutoff_hz: of the band in which force and model are compared.
-        acceleration_noise_m_s2: root mean square that the position's noise alone puts into the acceleration there.
-        standing_m_s: speed below which the drive counts as standing [m/s].
-        way: direction in which it travels between turning points, +1 or -1, shape (n,).
-        weight: of every sample, zero where nothing is known of its force, shape (n,).
-        kept: indices of the samples that are compared, shape (m,).
-        notes: what was done to the recording, sentences.
+        t_s: shape (n,).
+        position_m: by a local parabola.
+        speed_m_s: its slope.
+        acceleration_m_s2: of the low-passed position.
+        cutoff_hz: of the band.
+        acceleration_noise_m_s2: rms by position noise.
+        standing_m_s: speed of standstill.
+        way: direction between turning points, +1 or -1, shape (n,).
+        weight: zero for unknown forces, shape (n,).
+        kept: compared samples, shape (m,).
     """
 
     t_s: NDArray[np.float64]
@@ -116,39 +111,36 @@ class Signals:
     notes: tuple[str, ...]
 
     def compared(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Means in the band of columns at the full rate, shape (n,) or (n, p), over what has weight about each sample compared."""
+        """Return weighted band means of columns, shape (n,) or (n, p)."""
         weight, share = (self.weight, self.share) if columns.ndim == 1 else (self.weight[:, None], self.share[:, None])
         found = low_passed(weight * columns, self.rate_hz, self.cutoff_hz)[self.kept]
         return np.ascontiguousarray(found / share)
 
     @cached_property
     def share(self) -> NDArray[np.float64]:
-        """Share of the band about each sample compared that has weight, shape (m,)."""
+        """Return the weighted share about each compared sample, shape (m,)."""
         return low_passed(self.weight, self.rate_hz, self.cutoff_hz)[self.kept]
 
     @cached_property
     def edge_noise_m_s2(self) -> NDArray[np.float64]:
-        """Noise in the acceleration of each sample compared beyond that of the others, shape (m,) [m/s²]."""
+        """Return excess acceleration noise of compared samples, shape (m,) [m/s²]."""
         return edge_noise_m_s2(self.weight, self.kept, self.position_noise_m, self.rate_hz, self.cutoff_hz)
 
     @cached_property
     def direction(self) -> NDArray[np.float64]:
-        """Direction of travel, shape (n,); zero where the drive stands: what ringing filters make of rest has no direction.
-
-        A speed against the way that the drive travels is noise.
-        """
+        """Return direction of travel, shape (n,); zero at standstill and for contrary noise."""
         return np.where(self.speed_m_s * self.way > self.standing_m_s, self.way, 0.0)
 
     @cached_property
     def reversals(self) -> NDArray[np.int64]:
-        """Samples at which the direction of travel changes; a stop without a change is none."""
+        """Return samples of direction changes."""
         moving = np.flatnonzero(self.direction != 0.0)
         turned = np.flatnonzero(np.diff(self.direction[moving]) != 0.0)
         return (moving[turned] + moving[turned + 1]) // 2
 
     @cached_property
     def since_reversal_m(self) -> NDArray[np.float64]:
-        """Travel since the last reversal, not negative, shape (n,) [m]; infinite before the first."""
+        """Return travel since the last reversal, shape (n,) [m]; infinite before."""
         last = np.searchsorted(self.reversals, np.arange(len(self.t_s)), side="right") - 1
         if not len(self.reversals):
             return np.full(len(self.t_s), np.inf)
@@ -157,10 +149,7 @@ class Signals:
 
     @cached_property
     def turns(self) -> NDArray[np.bool_]:
-        """Where the drive starts, stops or reverses, and half a period of the band to either side, shape (n,).
-
-        What it accelerates by on its way is none: a force from elsewhere does that, too.
-        """
+        """Return starts, stops and reversals with half a band period around, shape (n,)."""
         acceleration = np.abs(self.acceleration_m_s2)
         changing = (self.direction == 0.0) | (acceleration > ACCELERATING_SHARE * acceleration.max())
         stretch, _ = label(changing)
@@ -172,11 +161,10 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     """Prepare a recording.
 
     Args:
-        cutoff_hz: of the band of the comparison; chosen from the data if None.
+        cutoff_hz: None: by the data.
 
     Raises:
-        CalibrationError: it is too short, the drive does not move, the force is dead or mostly saturated, or the cut-off does not
-            suit the sampling rate.
+        CalibrationError: too short, no motion, dead or saturated force, or unsuitable cut-off.
     """
     even = evenly_sampled(recording)
     notes = list(even.notes)
@@ -248,7 +236,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
 
 
 def _rests(standing: NDArray[np.bool_], force_n: NDArray[np.float64], rate_hz: float, step: int) -> list[str]:
-    """One sentence where the drive rests for longer than the filters reach."""
+    """Return a note on rests longer than the filter."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(np.int64)))
     long = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > RESTS * step]
     if not long:
@@ -267,41 +255,38 @@ RESTS = 10
 
 
 def derivatives(position_m: NDArray[np.float64], rate_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Speed [m/s] and acceleration [m/s²] by central differences, shape (n,) each; the latter zero at both ends."""
+    """Return speed [m/s] and acceleration [m/s²] by central differences, shape (n,) each, the latter zero at ends."""
     acceleration = np.zeros_like(position_m)
     acceleration[1:-1] = (position_m[2:] - 2.0 * position_m[1:-1] + position_m[:-2]) * rate_hz**2
     return np.gradient(position_m, 1.0 / rate_hz), acceleration
 
 
 def acceleration_over_two(position_m: NDArray[np.float64], rate_hz: float) -> NDArray[np.float64]:
-    """Acceleration [m/s²] by central differences over two samples to either side, shape (n,); zero at both ends."""
+    """Return acceleration [m/s²] over two samples each side, shape (n,), zero at ends."""
     found = np.zeros_like(position_m)
     found[2:-2] = (position_m[4:] - 2.0 * position_m[2:-2] + position_m[:-4]) * (0.5 * rate_hz) ** 2
     return found
 
 
 def _noise_floor(position_m: NDArray[np.float64], rate_hz: float) -> float:
-    """Power of the position's noise per hertz [m²/Hz], from the upper quarter of its spectrum."""
+    """Return position noise per hertz [m²/Hz], from the upper quarter spectrum."""
     frequency, power = _spectrum(position_m, rate_hz)
     return float(np.median(power[frequency > 0.375 * rate_hz]))
 
 
 def _spectrum(position_m: NDArray[np.float64], rate_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Frequencies [Hz] and power per hertz [m²/Hz]."""
+    """Return frequencies [Hz] and power [m²/Hz]."""
     frequency, power = welch(position_m, rate_hz, "hann", min(len(position_m), 4096))
     return np.asarray(frequency), np.asarray(power)
 
 
 def _acceleration_noise(floor: float, cutoff_hz: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
-    """Mean square of the second derivative of white noise below a cut-off [m²/s⁴]."""
+    """Return the mean square acceleration of white noise below a cut-off [m²/s⁴]."""
     return floor * (2.0 * np.pi) ** 4 * cutoff_hz**5 / 5.0
 
 
 def _chosen_cutoff(position_m: NDArray[np.float64], rate_hz: float, floor: float) -> float:
-    """Widest band in which the acceleration still stands far out of its noise [Hz].
-
-    Where it does so nowhere, as at constant speed, a band that leaves speed and force a hundred samples.
-    """
+    """Return the widest band with significant acceleration [Hz], else one of a hundred samples."""
     frequency, power = _spectrum(position_m, rate_hz)
     widest = min(rate_hz * WIDEST, HIGHEST_HZ)
     tried = np.geomspace(min(2.0, 0.5 * widest), widest, 40)

@@ -1,4 +1,4 @@
-"""Force channels that do not follow: dead ones, and ones that ran against the end of their range."""
+"""Dead or saturated force channels."""
 
 from __future__ import annotations
 
@@ -24,18 +24,15 @@ MOST_STUCK = 0.3
 def stuck_samples(
     force_n: NDArray[np.float64], t_s: NDArray[np.float64], moving: NDArray[np.bool_], name: str
 ) -> tuple[NDArray[np.bool_], list[str]]:
-    """Samples in which the force channel did not follow, shape (n,), and sentences about them.
-
-    A force that stays the same while the drive rests is no fault of the channel: the motor may be off.
+    """Return samples with a stuck force, shape (n,), and notes; rest does not count.
 
     Args:
-        force_n: shape (n,) [N].
-        t_s: shape (n,) [s].
-        moving: samples in which the drive moves, shape (n,).
-        name: of the recording, for messages.
+        force_n: shape (n,).
+        t_s: shape (n,).
+        moving: shape (n,).
 
     Raises:
-        CalibrationError: the force does not change at all, or is stuck for most of the recording.
+        CalibrationError: the force never changes, or is stuck mostly.
     """
     if not np.ptp(force_n) > 0.0:
         raise CalibrationError(

@@ -1,8 +1,7 @@
-"""Which way a drive travels: it turns where its position retreats beyond what noise, resolution and stamps make of it.
+"""A drive's direction: it turns when position retreats beyond noise, resolution and jitter.
 
-The sign of a speed that is read from noisy positions changes without any turn. Turning points of a position are those of its
-zigzag: extremes from which it comes back by more than a given way [rainflow counting with a hysteresis gate: ASTM E1049-85,
-sec. 5.4.4; Amzallag et al., Int. J. Fatigue 16 (1994) 287, sec. 3.1].
+Turning points are zigzag extremes with a minimum return [rainflow counting with a hysteresis gate: ASTM E1049-85, sec.
+5.4.4; Amzallag et al., Int. J. Fatigue 16 (1994) 287, sec. 3.1].
 """
 
 from __future__ import annotations
@@ -22,21 +21,20 @@ WHOLE = 0.02
 
 
 def retreat_m(noise_m: float, resolution_m: float) -> float:
-    """Way back beyond which a drive has turned [m].
+    """Return the retreat that is a turn [m].
 
     Args:
-        noise_m: standard deviation of the measured position; what jitter of the stamps makes of it at speed is part of it [m].
-        resolution_m: step that positions were rounded to, zero if unknown [m]; slower than a step per sample, rounding is no white
-            noise and does not show in a spectrum.
+        noise_m: of position, jitter at speed included.
+        resolution_m: rounding step, zero if unknown; below a step per sample it is no white noise.
     """
     return RETREAT_SIGMA * noise_m + 1.5 * resolution_m
 
 
 def resolution_of(position: NDArray[np.float64]) -> float:
-    """Step that positions were rounded to, in their unit; zero where they are not whole steps of anything.
+    """Return the position's rounding step, zero if none.
 
     Args:
-        position: as measured, shape (n,).
+        position: shape (n,).
     """
     steps = np.abs(np.diff(position))
     steps = steps[steps > 0.0]
@@ -50,11 +48,11 @@ def resolution_of(position: NDArray[np.float64]) -> float:
 
 
 def turning_points(position_m: NDArray[np.float64], retreat: float) -> NDArray[np.int64]:
-    """Samples at which a position turns, rising, shape (t,).
+    """Return turning samples, rising, shape (t,).
 
     Args:
-        position_m: shape (n,) [m].
-        retreat: way from an extreme back beyond which it has turned [m].
+        position_m: shape (n,).
+        retreat: [m].
     """
     found: list[int] = []
     way = 0
@@ -77,10 +75,10 @@ def turning_points(position_m: NDArray[np.float64], retreat: float) -> NDArray[n
 
 
 def ways(position_m: NDArray[np.float64], turns: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Direction of travel of every sample, +1 or -1, shape (n,); zero where the position does not change at all.
+    """Return direction, +1 or -1, shape (n,); zero without motion.
 
     Args:
-        position_m: shape (n,) [m].
+        position_m: shape (n,).
     """
     ends = np.concatenate([[0], turns, [len(position_m) - 1]])
     signs = np.sign(np.diff(position_m[ends]))

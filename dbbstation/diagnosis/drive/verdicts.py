@@ -1,4 +1,4 @@
-"""Verdicts on the causes of force, read off the probabilities of the comparison, and what has no name."""
+"""Verdicts on causes of force, and unnamed effects."""
 
 from __future__ import annotations
 
@@ -36,9 +36,8 @@ class Verdicts:
     """Everything that is said of causes, named and unnamed.
 
     Args:
-        explained: what the comparison came to.
-        several_speeds: the recordings tell Coulomb friction from viscous friction.
-        held: predictions of held-out parts; None: not asked for.
+        several_speeds: Coulomb and viscous friction are separable.
+        held: held-out predictions; None: not tested.
     """
 
     def __init__(self, explained: ExplainedDrive, *, several_speeds: bool, held: HeldOutForce | None = None) -> None:
@@ -50,16 +49,15 @@ class Verdicts:
         self._of = {name: [f for f in self._raw if self._source_of[f.name] == name] for name in self._drive.sources}
 
     def findings(self) -> tuple[DriveFinding, ...]:
-        """One per source, best first."""
+        """Return a finding per source, best first."""
         found = [self._finding(source) for source in self._drive.sources.values()]
         return tuple(sorted(found, key=lambda f: (f.verdict.rank, -f.gain)))
 
     @property
     def named(self) -> list[str]:
-        """Members of the best hypothesis that belong to a source, of the source first that moves the force most.
+        """Return the best hypothesis's named members by force.
 
-        Not the Bayes factor orders them: noise has less power at some frequencies than at others, so that a newton of ripple is
-        surer than five newtons that change slowly, and yet explains less of the force.
+        Bayes factors would rank a newton of ripple above slower five newtons.
         """
         best = self._explained.settled.best
         faint = {f.name for f in self._raw if f.rms < self._least_n}
@@ -73,21 +71,19 @@ class Verdicts:
 
     @property
     def predicting(self) -> list[str]:
-        """Those of `named` that a model is to predict with, largest first.
+        """Return members of `named` for prediction, largest first.
 
-        Of named causes that nothing tells apart one is there, and any of them predicts alike. A cause that is ambiguous by itself,
-        since its size differs between parts of the recording or nothing decides on it, is fitted beside the others as forces without
-        a name are, and does not predict.
+        Of equivalent causes one predicts; causes ambiguous by themselves are fitted but do not predict.
         """
         sure = {f.name for f in self.findings() if f.verdict in PREDICTS or f.ambiguous_with}
         return [name for name in self.named if self.source_of(name) in sure]
 
     def source_of(self, name: str) -> str:
-        """Source that a member belongs to; empty where it has no name."""
+        """Return a member's source; empty without name."""
         return self._source_of.get(name, "")
 
     def effects(self) -> tuple[UnexplainedForce, ...]:
-        """Unmodelled forces that are there, largest first."""
+        """Return present unmodelled forces, largest first."""
         found = []
         for one in self._raw:
             if self._source_of[one.name] or one.verdict is not Verdict.IDENTIFIED:
@@ -110,7 +106,7 @@ class Verdicts:
         return tuple(sorted(found, key=lambda e: -e.rms_n))
 
     def _source(self, finding: CauseFinding) -> str:
-        """Name of the source that a finding belongs to; empty where it has none."""
+        """Return a finding's source; empty without one."""
         return source_of(self._drive, self._explained.settled.bank.patterns, finding.name)
 
     def _finding(self, source: DriveSource) -> DriveFinding:
@@ -180,7 +176,7 @@ class Verdicts:
         return {name: f"{low:.3g} to {high:.3g}" for name, (low, high) in ends}
 
     def _as_sure_as_it_is(self, finding: CauseFinding) -> CauseFinding:
-        """A finding whose values are known as well as stretches and bands agree on them: noise alone would call them surer."""
+        """Return a finding with values as certain as stretches and bands agree."""
         if finding.verdict is Verdict.IDENTIFIED and finding.family is Family.PULSES:
             return self._as_sure_as_its_edges(finding)
         if finding.verdict is not Verdict.IDENTIFIED or finding.name not in self._drive.of_law:
@@ -198,7 +194,7 @@ class Verdicts:
         return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
 
     def _as_sure_as_its_edges(self, finding: CauseFinding) -> CauseFinding:
-        """Stretches of time that are few, are no noise, and do not begin and end with the motion as where a law is wrong."""
+        """Return stretches that are few, no noise, and independent of motion."""
         if not self._pulses:
             why = "None of its stretches stands out of those beside it."
             return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
@@ -233,7 +229,7 @@ class Verdicts:
 
     @cached_property
     def _pulses(self) -> tuple[CausePart, ...]:
-        """Levels of all stretches of time that are there and do not turn with the travel."""
+        """Return levels of stretches independent of direction."""
         names = [
             f.name for f in self._raw if f.family is Family.PULSES and f.verdict in CLAIMS and f.name in self.named
         ]
@@ -261,7 +257,7 @@ class Verdicts:
         return tuple(sorted(names))
 
     def _could_be(self, one: str, other: str) -> bool:
-        """Whether a law could stand in the place of another with the size that this has."""
+        """Return whether a law could replace another at its size."""
         laws = self._drive.of_law
         inside, outside = (one, other) if one in self._explained.settled.best.names else (other, one)
         if outside not in laws or inside not in laws or inside not in self._explained.settled.best.names:
@@ -308,7 +304,7 @@ class Verdicts:
         return Verdict.RULED_OUT, refused[0] if refused else not_needed
 
     def _hidden(self, source: DriveSource, own: Sequence[CauseFinding]) -> str:
-        """Why a cause could not have been seen, whatever was compared; empty where it could."""
+        """Return why a cause was invisible, or an empty text."""
         scale = self._drive.scale
         if faint := [f for f in own if self._is_member(f)]:
             return f"What it would explain, {faint[0].rms:.2g} N rms, is less than filters and differences leave of a perfect drive."
@@ -324,7 +320,7 @@ class Verdicts:
         return ""
 
     def _no_cogging(self, own: Sequence[CauseFinding]) -> tuple[Verdict, str]:
-        """No wave was found: within the band there is none, and beyond it there may be."""
+        """Return that no wave exists within the band."""
         scale, shortest = self._drive.scale, self._drive.shortest_wave_mm
         if not np.isfinite(shortest):
             return Verdict.NOT_TESTABLE, f"Within {scale.cutoff_hz:.3g} Hz no wave fits three times into the travel."
@@ -343,12 +339,12 @@ class Verdicts:
         )
 
     def _beyond_band_n(self) -> float:
-        """Root mean square of the force beyond the band, at the samples compared [N]."""
+        """Return the rms force beyond the band [N]."""
         recordings = self._drive.recordings
         return float(np.sqrt(np.mean((recordings.at(lambda s: s.force_n) - recordings.force_n) ** 2)))
 
     def _no_transient(self) -> tuple[Verdict, str]:
-        """No stretch of time stands out; the shortest that would have been seen is said."""
+        """Return that no stretch stands out, with the shortest visible."""
         settled, scale = self._explained.settled, self._drive.scale
         apart = self._drive.recordings.samples_apart_s
         size = 0.3 * scale.force_n

@@ -1,1 +1,1 @@
-"""A simulator in the loop: refitted, asked at its ports, and compared with recordings."""
+"""A simulator in the loop: refitted, probed at ports, compared."""

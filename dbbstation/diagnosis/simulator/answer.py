@@ -1,4 +1,4 @@
-"""What a simulator in the loop says: which port, which form, how large, what had hidden it, and whether it predicts."""
+"""Findings on a simulator: port, form, size, prediction."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ class Moved:
     """A parameter of the simulator.
 
     Attributes:
-        before: refitted without any term.
-        after: with what was found put in.
-        confounded: share of what it does that what was found can do as well, R²; zero where nothing was.
-        alike: parameters that the recordings cannot tell from it.
+        before: without terms.
+        after: with findings.
+        confounded: R² on findings; zero without.
+        alike: indistinguishable parameters.
     """
 
     name: str
@@ -70,16 +70,14 @@ class SimulatorComparison:
     """What is said of a simulator and its recordings.
 
     Attributes:
-        findings: of terms that are there or that the recordings cannot exclude, those that are there first.
-        left: tests of the residual.
-        levels: whether anything differs, which signals at which ports it follows, which term it is.
-        held_out: error of parts that took no part; None where it was not asked for.
-        as_simulated: measured less simulated values with the parameters as stated, shape (n,).
-        nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term; not a
-            number where no simulations were left to ask for it.
-        not_asked: candidates that were not compared in the end, and why.
-        separations: what would distinguish terms that these recordings do not.
-        stopped: why it ended early; empty where it did not.
+        findings: present or possible terms, present first.
+        levels: existence, signals and ports, and term of a difference.
+        held_out: None if not tested.
+        as_simulated: measured less simulated at stated parameters, shape (n,).
+        nonlinear: departure from linearity per standard uncertainty, by term; nan without budget.
+        not_asked: with reasons.
+        separations: proposals.
+        stopped: may be empty.
     """
 
     model: Model
@@ -103,23 +101,23 @@ class SimulatorComparison:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """That were put in, with their numbers."""
+        """Return inserted terms with numbers."""
         return self.found.state.terms
 
     @property
     def is_there(self) -> bool:
-        """Whether the simulator lacks anything; where the search ended early, also what it would have put in next."""
+        """Return whether anything is missing, with an unfinished search's next term."""
         next_in = bool(self.stopped) and bool(self.found.settled.best.members)
         return bool(self.terms) or not self.left.is_noise or next_in
 
     @property
     def identified(self) -> tuple[CauseFinding, ...]:
-        """Findings of what is there and predicts, where that was asked."""
+        """Return findings that are present and predict, if tested."""
         return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)
 
     @property
     def rms(self) -> tuple[float, float, float]:
-        """Of measured less simulated values: as simulated, refitted, corrected."""
+        """Return rms as simulated, refitted, corrected."""
         every = (self.as_simulated, self.base.fitted.residual, self.found.residual)
         return tuple(float(np.sqrt(np.mean(rows**2))) for rows in every)  # type: ignore[return-value]  # three of them
 
@@ -133,16 +131,15 @@ def find(
     matters: float | None = None,
     progress: Callable[..., None] = lambda *_: None,
 ) -> SimulatorComparison:
-    """Find what a simulator lacks, and at which of its ports.
+    """Find what a simulator lacks, and at which port.
 
     Args:
-        own: physics of the user's own.
-        hold_out: choose everything anew without each part; takes most of the time.
-        matters: size of an effect that matters, in the unit of the first output; None: what the refitted simulator leaves.
-        progress: called with what is being done, and how much of how much where that can be counted.
+        own: own physics.
+        hold_out: choose anew without each part; takes most of the time.
+        matters: size of interest, in the first output's unit; None: the refitted residual.
 
     Raises:
-        CalibrationError: a simulation that failed, with its input.
+        CalibrationError: a simulation failed; with its input.
     """
     stated = FittedState(tuple(p.value for p in model.parameters))
     work = SimulationRuns(model, run, np.ones(len(model.outputs)))
@@ -165,7 +162,7 @@ def find(
 
 
 def _scales(work: SimulationRuns, stated: FittedState) -> NDArray[np.float64]:
-    """What outputs are divided by, so that all have the noise of the first: from what differs between neighbouring residuals."""
+    """Return divisors that equalise outputs' noise, by neighbouring residuals."""
     residual, outputs = work.residuals([stated])[0], len(work.model.outputs)
     noise = []
     for k in range(outputs):
@@ -222,7 +219,7 @@ def _said(
 def _judged(
     one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, float], open_to: Mapping[str, Challenge]
 ) -> CauseFinding:
-    """A finding whose values are those of the term, and without a claim where linear and true answer differ, or a curve does better."""
+    """Return a finding with the term's values, unclaimed if nonlinear or beaten by a curve."""
     inside = {c.name: (c, term) for c, term in zip(found.node.inside, found.state.terms, strict=True)}
     if one.name not in inside:
         if one.verdict.rank < Verdict.AMBIGUOUS.rank:
@@ -243,7 +240,7 @@ def _judged(
 
 
 def _why_open(name: str, found: SearchOutcome, nonlinear: float, curve: Challenge | None) -> str:
-    """Why there is no claim about a term that was put in; empty where there may be one."""
+    """Return why a term is unclaimed; may be empty."""
     farthest = max(moves(found.node, found.settled).items(), key=lambda pair: pair[1], default=("", 0.0))
     if farthest[1] > MOST_ASKED:
         it = "it" if farthest[0] == name else farthest[0]
@@ -266,7 +263,7 @@ is put in is not what these answers are about, and no term beside it is sure."""
 
 
 def _nonlinear(work: SimulationRuns, found: SearchOutcome) -> dict[str, float]:
-    """By how much the true answer to a move of one standard uncertainty of an amplitude departs from the linear one, by term."""
+    """Return departures from linearity per standard uncertainty, by term."""
     weigh, sigma = noise_of(found.settled)
     fitted, first, apart = found.node.fitted, len(work.model.parameters), {}
     known = np.array([1.0 / p.uncertainty**2 if p.uncertainty else 0.0 for p in work.model.parameters])
@@ -309,7 +306,7 @@ def _parameters(base: Node, found: SearchOutcome) -> tuple[Moved, ...]:
 
 
 def _uncertainties(rows: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard uncertainties of a fit of white rows of unit size, shape (m,)."""
+    """Return standard uncertainties of unit white rows, shape (m,)."""
     normal = rows.T @ rows + np.diag(known)
     norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal / np.outer(norm, norm), rcond=1e-14, hermitian=True)

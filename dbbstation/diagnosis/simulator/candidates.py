@@ -1,4 +1,4 @@
-"""Candidates at the ports of a simulator: every form over every signal that is known there."""
+"""Candidates at ports: every form over every signal."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ DISTINCT = 3
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A term that may be missing.
+    """A possible missing term.
 
     Attributes:
-        term: with no amplitude, and the middle of its grid.
-        names: of its amplitudes, then of its shape.
+        term: zero amplitude, mid-grid.
+        names: amplitudes, then shape.
         grids: of its shape.
-        positive: which amplitudes cannot be negative.
-        tried: sizes at which the answer is taken, of a form that puts something in the place of a signal; empty for the others.
+        positive: amplitudes that cannot be negative.
+        tried: sizes for forms that replace a signal; else empty.
     """
 
     term: Term
@@ -77,9 +77,9 @@ def candidates(
     """Every form at every port.
 
     Args:
-        signals: at each port by name, `t` among them, of all calls, shape (calls,).
-        own: physics of the user's own.
-        times: of the rows of the longest run, rising, shape (n,): from these come time constants.
+        signals: by port and name with `t`, of all calls, shape (calls,).
+        own: own physics.
+        times: of the longest run, rising, shape (n,), for time constants.
     """
     found: list[Candidate] = []
     for port in ports:
@@ -107,13 +107,13 @@ def candidates(
 
 
 def _span(times: NDArray[np.float64]) -> tuple[float, float]:
-    """Middle step and whole length of a time axis."""
+    """Return a time axis's median step and length."""
     steps = np.diff(np.unique(times))
     return float(np.median(steps)), float(times.max() - times.min())
 
 
 def _at(port: SimulatorPort, signals: Mapping[str, NDArray[np.float64]], span: tuple[float, float]) -> list[Candidate]:
-    """Forms at one port over signals that change there, shape (calls,)."""
+    """Return a port's forms over varying signals, shape (calls,)."""
     found = [_candidate(port, TermForm.CONSTANT, (), ("value",), (port.unit,))]
     greatest = sizes(signals)
     for name, values in signals.items():
@@ -168,7 +168,7 @@ def _in_place(
     span: tuple[float, float],
     widths: tuple[float, ...],
 ) -> list[Candidate]:
-    """Forms that put something else in the place of a signal, shape (calls,)."""
+    """Return forms that replace a signal, shape (calls,)."""
     unit = port.signals[name]
     whiles = tuple(np.geomspace(span[0], max(0.1 * span[1], 2.0 * span[0]), LENGTHS + 1).tolist())
     forms = [
@@ -207,7 +207,7 @@ def _candidate(
 
 
 def inner_quantiles(values: NDArray[np.float64], count: int) -> tuple[float, ...]:
-    """Quantiles between the ends of a signal, rising, each once: fewer where values repeat, none where it is only at its ends."""
+    """Return a signal's distinct inner quantiles, rising; may be empty."""
     every = np.unique(np.quantile(values, np.linspace(0.0, 1.0, count + 2)[1:-1]))
     return tuple(every[(every > values.min()) & (every < values.max())].tolist())
 
@@ -215,7 +215,7 @@ def inner_quantiles(values: NDArray[np.float64], count: int) -> tuple[float, ...
 def _curve(
     port: SimulatorPort, values: NDArray[np.float64]
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
-    """Names, units and knots of a cubic spline over the range of a signal, its inner knots where as many values lie below as between."""
+    """Return a spline's names, units and knots by quantiles."""
     low, high = float(values.min()), float(values.max())
     room = 0.05 * (high - low)
     inner = inner_quantiles(values, INNER)
@@ -229,7 +229,7 @@ def _per(unit: str, other: str, power: str = "") -> str:
 
 
 def basis(term: Term, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What each amplitude of a curve does at values of its signal, shape (n, p)."""
+    """Return a curve's functions at signal values, shape (n, p)."""
     inside = np.clip(values, term.fixed[0], term.fixed[-1])
     splines = BSpline.design_matrix(inside, np.array(term.fixed), DEGREE).toarray()
     return np.asarray(splines @ bends(term.fixed))

@@ -1,7 +1,6 @@
-"""Whether refitted terms are worth what they cost, and named terms in the place of a curve.
+"""Refitted terms' worth, and names against curves.
 
-A curve over a signal contains most terms over it. So it is challenged by each of these alone and in pairs, and stays only where it
-refutes them all.
+A curve contains most terms of its signal, so it must refute each alone and in pairs.
 """
 
 from __future__ import annotations
@@ -37,10 +36,9 @@ WORTH = math.log(SURE / ABSENT)
 
 
 def cost(nodes: Nodes, node: Node, settled: Settled) -> float:
-    """Less its log posterior, of a node refitted to the rows of a comparison, in the noise that it leaves itself.
+    """Return a refitted node's negative log posterior in its own noise.
 
-    The noise is part of what is compared: that of a comparison is measured beside linear answers, which may be far from the true ones.
-    What its forms may be off by is averaged over, by answers to curves and memories.
+    A comparison's noise is beside linear answers. Slack of forms is averaged over.
     """
     work, fitted, channel = nodes.work, node.fitted, settled.channel
     state, residual = fitted.state, fitted.residual
@@ -64,9 +62,9 @@ def cost(nodes: Nodes, node: Node, settled: Settled) -> float:
 
 
 def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
-    """A node with one or two named terms in the place of a curve, unless odds of 19 are for the curve; None where there is none.
+    """Return a node with one or two names for a curve, unless odds of 19 favour it; or None.
 
-    A curve says any smooth law over its signal, so it tests the form of a name rather than being another cause.
+    A curve tests the form of a name and is no own cause.
     """
     for one in node.inside:
         if one.term.form is not TermForm.CURVE:
@@ -87,7 +85,7 @@ def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
 
 
 def _best_named(settled: Settled, others: list[Member], outside: dict[str, Candidate]) -> list[Member]:
-    """The most probable one or two terms of those outside, beside others, by linear answers."""
+    """Return the best one or two outside terms beside others, linearly."""
 
     def scanned(beside: list[Member], causes: list[Cause]) -> list[tuple[float, Member]]:
         scan = settled.comparison.scan(beside, causes)

@@ -1,4 +1,4 @@
-"""The contract of a simulator of one's own: outputs from inputs, parameters and what acts at its ports; and one simulation by it."""
+"""The contract of a simulator, and one simulation."""
 
 from __future__ import annotations
 
@@ -22,22 +22,21 @@ if TYPE_CHECKING:
 
 
 class Simulator(ABC):
-    """A simulation that is run many times with other parameters. Instances carry no state from one run to the next."""
+    """A simulation, without state between runs."""
 
     @abstractmethod
     def simulate(
         self, inputs: Mapping[str, NDArray[np.float64]], parameters: Mapping[str, float], ports: Ports
     ) -> Mapping[str, NDArray[np.float64]]:
-        """Return each output at the times of the recording, shape (n,), in its unit.
+        """Return outputs at recording times, shape (n,), in their units.
 
-        Call `ports.NAME(t, signals)` where something may act, at every step, with the signals that `model.yaml` lists for that port
-        as they are then; add what it returns. It is zero until a term is tried there. A step may be asked for more than once, and a
-        solver may step back: what has a memory follows the time that it is given.
+        Call `ports.NAME(t, signals)` at every step and add its value, which is zero until tried. Steps may repeat or go
+        back.
 
         Args:
-            inputs: `t`, the time of the rows [s], and each input of `model.yaml`, shape (n,).
-            parameters: of `model.yaml`, its initial states included, by name.
-            ports: of `model.yaml`, by name.
+            inputs: `t` [s] and inputs by name, shape (n,).
+            parameters: with initial states, by name.
+            ports: by name.
         """
 
 
@@ -45,8 +44,8 @@ def simulated(simulator: Simulator, model: Model, ask: SimulationRequest) -> Sim
     """Run a simulator once.
 
     Raises:
-        SimulationFault: its outputs are not those of the model.
-        Exception: whatever the simulator raises.
+        SimulationFault: outputs differ from the model's.
+        Exception: of the simulator.
     """
     acting: dict[str, list[Evaluate]] = {}
     for term in ask.terms:

@@ -1,7 +1,6 @@
-"""How probable rows are that took no part, as a refit to the others predicts them.
+"""Predictive density of unused rows after a refit.
 
-The noise that the refit leaves in the others counts with its memory: a slow drift of the part that is predicted is as free for one
-refit as for another. What the others leave open of the fitted numbers is averaged over.
+Noise counts with its memory; uncertain numbers are averaged over.
 """
 
 from __future__ import annotations
@@ -28,15 +27,13 @@ def log_density(
     residual: NDArray[np.float64],
     columns: NDArray[np.float64],
 ) -> float:
-    """Log density of rows under a refit to others, in the noise that it leaves there [Good, J. R. Stat. Soc. B 14 (1952) 107].
-
-    Where that noise has long tails, rows count by Student's t about the prediction alone.
+    """Return log density of rows under a refit to others [Good, J. R. Stat. Soc. B 14 (1952) 107]; long-tailed noise uses Student's t.
 
     Args:
-        channel: whose kept rows were refitted.
-        rows: that are predicted, shape (n,).
-        residual: measured less simulated at the refit, scaled, of all rows, shape (n,).
-        columns: what one more of each fitted number does, shape (n, m).
+        channel: refitted to its kept rows.
+        rows: predicted, shape (n,).
+        residual: scaled, all rows, shape (n,).
+        columns: of fitted numbers, shape (n, m).
     """
     bank = noise_left(work, residual, columns, rows=channel)
     noise, kinds = bank.noise, work.output[channel.kept]

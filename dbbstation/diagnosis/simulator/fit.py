@@ -1,4 +1,4 @@
-"""Refit of a simulator: bounded trust-region least squares, from several starts."""
+"""Bounded trust-region least squares of a simulator from several starts."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ class SimulatorFit:
     """A refit.
 
     Attributes:
-        residual: measured less simulated there, shape (n,).
-        columns: what one more of each number does to the simulated values, shape (n, m).
-        curved: by how much the answers to two doses differ, shape (m,).
-        squares: of weighed residuals and of what was known before, in sum.
-        starts: sums of squares that other starts ended at.
+        residual: shape (n,).
+        columns: per fitted number, shape (n, m).
+        curved: difference of two doses, shape (m,).
+        squares: weighted, with priors.
+        starts: squares of other starts.
     """
 
     state: FittedState
@@ -64,12 +64,12 @@ class SimulatorFit:
 
 
 def plain(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows as they are."""
+    """Return rows unchanged."""
     return rows
 
 
 def directions_of(work: SimulationRuns, state: FittedState) -> list[PerturbedParameter]:
-    """All numbers of a state, each with a first dose inside its bounds."""
+    """Return a state's numbers with first doses within bounds."""
     low, high = bounds_of(work, state)
     numbers = state.numbers
     keys: list[tuple[str, ...]] = [(p.name,) for p in work.model.parameters]
@@ -88,7 +88,7 @@ def directions_of(work: SimulationRuns, state: FittedState) -> list[PerturbedPar
 
 
 def bounds_of(work: SimulationRuns, state: FittedState) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Least and greatest value of each number of a state, shape (m,)."""
+    """Return each number's bounds, shape (m,)."""
     low = [p.low for p in work.model.parameters]
     high = [p.high for p in work.model.parameters]
     for term in state.terms:
@@ -108,12 +108,12 @@ def fit(
     several: bool = False,
     most_steps: int = MOST_STEPS,
 ) -> SimulatorFit:
-    """Fit all numbers of a state to the recordings [Branch, Coleman and Li, SIAM J. Sci. Comput. 21 (1999) 1].
+    """Fit all numbers [Branch, Coleman and Li, SIAM J. Sci. Comput. 21 (1999) 1].
 
     Args:
-        weigh: what makes rows comparable, such as whitening; its rows have the standard deviation `sigma`.
-        sigma: of a weighed row; 0: what was known of parameters is weighed against what the start leaves.
-        several: begin elsewhere, too.
+        weigh: such as whitening, to deviation `sigma`.
+        sigma: 0: priors against the start's residual.
+        several: further starts.
     """
     begun = work.residuals([start])[0]
     sigma = sigma or rms(weigh(begun)) or 1.0
@@ -183,7 +183,7 @@ def _from(
 def _weighed(
     work: SimulationRuns, state: FittedState, residual: NDArray[np.float64], weigh: Weigh, sigma: float
 ) -> NDArray[np.float64]:
-    """Weighed rows, and parameters less what was known of them, in standard uncertainties."""
+    """Return weighted rows, and parameters in prior uncertainties."""
     if not np.isfinite(residual).all():
         return np.full(len(weigh(np.zeros(len(residual)))) + len(_known(work.model.parameters, 0)[1]), np.inf)
     rows, stated = _known(work.model.parameters, len(state.numbers))
@@ -191,7 +191,7 @@ def _weighed(
 
 
 def _known(parameters: Sequence[SimulatorParameter], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What was known of parameters as rows of a fit, shape (p, m), and their right side, shape (p,)."""
+    """Return priors as rows, shape (p, m), and right side, shape (p,)."""
     known = [(k, p) for k, p in enumerate(parameters) if p.uncertainty is not None]
     rows = np.zeros((len(known), max(count, len(parameters))))
     for row, (k, p) in enumerate(known):
@@ -209,7 +209,7 @@ def _squares(work: SimulationRuns, weigh: Weigh, sigma: float, states: Sequence[
 def _elsewhere(
     work: SimulationRuns, start: FittedState, squares: Callable[[Sequence[FittedState]], list[float]]
 ) -> list[FittedState]:
-    """The best of several states spread over what the parameters may be."""
+    """Return the best of states spread over parameters."""
     parameters = work.model.parameters
     if not parameters:
         return []
@@ -226,10 +226,10 @@ def _elsewhere(
 def near(
     work: SimulationRuns, fitted: SimulatorFit, weigh: Weigh, sigma: float, rounds: int = 6
 ) -> tuple[FittedState, NDArray[np.float64]]:
-    """Refit to some of the rows, from a fit to all of them: Gauss-Newton steps by the answers there, each simulated anew.
+    """Refit to some rows by simulated Gauss-Newton steps.
 
     Args:
-        weigh: takes all rows to those that are fitted, whitened.
+        weigh: from all rows to fitted, whitened.
     """
     low, high = bounds_of(work, fitted.state)
     state, residual = fitted.state, fitted.residual
@@ -268,11 +268,11 @@ SMALLEST = 0.1
 
 
 def not_told_apart(names: Sequence[str], columns: NDArray[np.float64]) -> list[tuple[str, tuple[str, ...]]]:
-    """Parameters whose doing others can do as well, with those that do so, most of it first.
+    """Return indistinguishable parameters with their substitutes.
 
     Args:
-        names: of the parameters, shape (k,).
-        columns: weighed, what one more of each does, shape (n, k).
+        names: shape (k,).
+        columns: weighted, shape (n, k).
     """
     norm = np.linalg.norm(columns, axis=0)
     found: list[tuple[str, tuple[str, ...]]] = []

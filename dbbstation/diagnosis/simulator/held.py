@@ -1,7 +1,6 @@
-"""Held-out error of a simulator: parts are left out, terms are chosen anew, and the whole is simulated again.
+"""Held-out error of a simulator: omit, choose anew, simulate.
 
-A part is predicted by a simulation that runs through it: the state at its beginning is simulated, too. Linear answers are those about
-refits to all rows; values that predict come from the other rows alone.
+Simulations run through the part. Linear answers are about all rows; predicting values are from other rows.
 """
 
 from __future__ import annotations
@@ -40,9 +39,8 @@ class PredictedPart(Fold):
     """One part, and what classes of signals bring there.
 
     Attributes:
-        where: its rows, shape (n,).
-        of_classes: by what is followed, log density of the prediction with all that follows it less that without, and root mean square error
-            without it; of everything under no name.
+        where: shape (n,).
+        of_classes: by followed signals, log density with less without, and rms error without; all under no name.
     """
 
     where: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
@@ -50,27 +48,27 @@ class PredictedPart(Fold):
 
 
 class PredictedPartsError(HeldOutError):
-    """Parts that were held back, and what each term brought there as log density of the prediction."""
+    """Held-back parts with terms' log density gains."""
 
     def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
-        """What terms brought together in each part; nothing where none of them was chosen."""
+        """Return terms' joint gain per part; may be empty."""
         gains = super().gains_of(kinds)
         return DensityGains(gains.parts, gains.rows)
 
 
 @dataclass(frozen=True)
 class PredictedGains:
-    """What held-out parts of a simulator say of classes."""
+    """Held-out gains of classes."""
 
     parts: tuple[PredictedPart, ...]
 
     @property
     def rows(self) -> list[NDArray[np.bool_]]:
-        """Of the parts, shape (n,) each."""
+        """Return the parts' rows, shape (n,) each."""
         return [part.where for part in self.parts]
 
     def of(self, wanted: Collection[str] | None) -> ClassGain:
-        """What all that follows some signals brings there; all terms if None."""
+        """Return the gain over some signals; None: all."""
         key = frozenset(wanted or ())
         every = [part.of_classes[key] for part in self.parts]
         counts = np.array([part.rows for part in self.parts], dtype=np.float64)
@@ -83,7 +81,7 @@ class PredictedGains:
 
 
 def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Parts that are held back [`part_numbers` of the runs], all outputs together."""
+    """Return parts [`part_numbers` of the runs], all outputs together."""
     runs, outputs = work.model.runs, len(work.model.outputs)
     number = part_numbers([len(run) for run in runs])
     of_run = np.split(number, np.cumsum([len(run) for run in runs])[:-1])
@@ -106,13 +104,12 @@ def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:
 def predicted_parts(
     nodes: Nodes, base: Node, found: SearchOutcome, stated: FittedState, progress: Callable[[str, int, int], None]
 ) -> Iterator[PredictedPart]:
-    """Hold parts back in turn; choose terms anew, refit, simulate; one after the other, since simulations may be spent.
+    """Hold parts back in turn, limited by the simulation budget.
 
     Args:
-        base: the simulator as it is, refitted.
-        found: what all rows came to.
-        stated: parameters as the model states them, which are the reference.
-        progress: called with what is being done, and how much of how much.
+        base: refitted simulator.
+        found: from all rows.
+        stated: reference parameters.
     """
     work, channel = nodes.work, found.node.channel
     as_simulated = work.residuals([stated])[0]
@@ -154,5 +151,5 @@ def predicted_parts(
 
 
 def _without(channel: Channel, out: NDArray[np.bool_], found: SearchOutcome) -> Settled:
-    """Comparison without some rows, shape (n,)."""
+    """Return the comparison without rows, shape (n,)."""
     return compared_quickly(channel.without(out).thinned(FOLD_ROWS), found.settled.beginning)

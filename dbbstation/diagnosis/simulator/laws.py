@@ -1,8 +1,7 @@
-"""Candidates as laws of a channel: their columns are the simulator's own answers.
+"""Candidates as laws whose columns are simulated answers to small doses.
 
-A column is the answer to a small dose. Between the points of a grid (a time constant, a width, a place) answers are interpolated; the
-refit that follows moves such a number by simulations of its own. What comes in the place of a signal (a delay, a lag, a play) is
-answered at several sizes, since small ones say little about large ones; the law then says which size fits, and by which share of it.
+Grid numbers are interpolated and later refitted by simulation. Replaced signals (delay, lag, play) are answered at
+several sizes; the law gives size and share.
 """
 
 from __future__ import annotations
@@ -44,11 +43,11 @@ def laws(
     size: float,
     curved_most: float,
 ) -> tuple[list[Law], dict[str, str]]:
-    """Candidates as laws about a state, and those that cannot be asked, with the reason.
+    """Return candidates as laws about a state, and reasons against others.
 
     Args:
-        size: of the residual, root mean square.
-        curved_most: difference between the answers to two doses, over the answer, from which on a candidate cannot be asked.
+        size: rms residual.
+        curved_most: relative difference of doses that excludes a candidate.
     """
     dosed = [one for one in found if not one.tried]
     points = [(one, point) for one in dosed for point in product(*one.grids)]
@@ -84,12 +83,12 @@ parts, and what lags behind these or sticks. A spring has a little of a hysteres
 
 
 def departing(one: Candidate) -> tuple[str, TermForm, tuple[str, ...]]:
-    """Port, form and signals of what others may depart along."""
+    """Return port, form and signals of possible departures."""
     return one.term.port, one.term.form, one.term.signals
 
 
 def departures(work: SimulationRuns, state: FittedState, found: Sequence[Candidate], size: float) -> Departures:
-    """What other terms about a state may be off by, from candidates that are none of them; what nothing answers to is left out."""
+    """Return other terms' slack about a state; silent ones are omitted."""
     points = [(one, point) for one in found for point in product(*(grid[::EVERY] for grid in one.grids))]
     answers = work.answers(state, [d for one, point in points for d in _directions(one, point)], size)
     off: dict[tuple[str, TermForm, tuple[str, ...]], list[NDArray[np.float64]]] = {}
@@ -103,7 +102,7 @@ def departures(work: SimulationRuns, state: FittedState, found: Sequence[Candida
 
 
 def of_unit_size(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Columns of one form at several points, each shape (n, p), that are together as large as one of root mean square one."""
+    """Return columns of one form, shape (n, p) each, scaled to rms one."""
     columns = np.hstack(parts)
     rms = np.maximum(np.sqrt(np.mean(np.square(columns), axis=0)), 1e-300)
     return np.asarray(columns / (rms * np.sqrt(len(parts))))
@@ -114,19 +113,19 @@ EVERY = 2
 
 
 def _off(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What other forms may be off by, from columns of a candidate at all points of its grid, shape (points, n, p)."""
+    """Return forms' slack from columns over a grid, shape (points, n, p)."""
     return of_unit_size(list(columns[::EVERY]))
 
 
 def form_uncertainty(one: Candidate) -> float:
-    """Share of its effect by which real objects depart from a candidate's form."""
+    """Return real objects' relative departure from a form."""
     if one.term.form in {TermForm.CONSTANT, TermForm.OWN}:
         return 0.0
     return LOOSE_FORM_UNCERTAINTY if one.term.form in LOOSE else FORM_UNCERTAINTY
 
 
 def discrepancy(one: Candidate, off: Departures) -> Discrepancy | None:
-    """Columns of what a form may be off by: curves, lags and stick-slip over the signals of its port, each as large as the effect."""
+    """Return a form's slack: curves, lags and stick-slip over its port, as large as the effect."""
     own = [columns for key, columns in off.items() if key[0] == one.term.port and not _is_of(one, key)]
     if not own or not form_uncertainty(one):
         return None
@@ -152,7 +151,7 @@ def _directions(one: Candidate, point: tuple[float, ...]) -> list[PerturbedParam
 
 
 def _law(one: Candidate, columns: NDArray[np.float64], size: float, off: Departures) -> Law:
-    """Law of a candidate from its columns at all points of its grid, shape (points, n, p)."""
+    """Return a law from columns over a grid, shape (points, n, p)."""
     rms = np.sqrt(np.mean(np.square(columns), axis=(0, 1)))
     return Law(
         name=one.name,
@@ -172,7 +171,7 @@ def _law(one: Candidate, columns: NDArray[np.float64], size: float, off: Departu
 
 
 def _in_place(work: SimulationRuns, state: FittedState, one: Candidate, size: float) -> Law | None:
-    """Law of what comes in the place of a signal: its share, at sizes between those that were tried; None where nothing answers."""
+    """Return a replaced signal's law by share and size; None if silent."""
     before = work.residuals([state])[0]
     states = [PerturbedParameter((one.name,), 0.0, 0, one.term).at(state, value) for value in one.tried]
     answers = [before - after for after in work.residuals(states, strict=False)]
@@ -197,12 +196,12 @@ def _in_place(work: SimulationRuns, state: FittedState, one: Candidate, size: fl
 
 
 def followed(one: Candidate) -> tuple[str, ...]:
-    """Signals at its port that a candidate follows; the port where it follows none."""
+    """Return a candidate's signals, or its port."""
     return tuple(f"{signal} at {one.term.port}" for signal in one.term.signals) or (f"port {one.term.port}",)
 
 
 def way(one: Candidate) -> str:
-    """How it follows them; empty: by value."""
+    """Return the way of following; empty: by value."""
     if one.term.form in {TermForm.SLIP, TermForm.PLAY}:
         return "direction"
     return "late" if one.term.form in MEMORIES else ""
@@ -220,7 +219,7 @@ MOST_ANSWER = 100.0
 def _between(
     grids: tuple[tuple[float, ...], ...], columns: NDArray[np.float64]
 ) -> Callable[[tuple[float, ...]], NDArray[np.float64]]:
-    """Columns between the points of a grid, by straight lines, from those at all points, shape (points, n, p)."""
+    """Return columns interpolated from grid points, shape (points, n, p)."""
     table = columns.reshape(*(len(grid) for grid in grids), *columns.shape[1:])
 
     def at(point: tuple[float, ...]) -> NDArray[np.float64]:

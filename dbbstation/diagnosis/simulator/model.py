@@ -1,4 +1,4 @@
-"""What is known of a simulator and its recordings: parameters, ports, outputs, runs."""
+"""A simulator and its recordings: parameters, ports, outputs, runs."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SimulatorParameter:
-    """A number of the simulator that is fitted anew with every hypothesis.
+    """A number refitted with every hypothesis.
 
     Attributes:
-        name: unique; that of an initial state has the number of its run, from 1, where there are several.
-        unit: of it; empty where none is stated.
-        uncertainty: standard uncertainty to which it was known before; None: nothing was known.
-        run: number of the only run that it is of, from 0; None: of all runs.
+        name: unique; initial states have the run's number from 1.
+        unit: may be empty.
+        uncertainty: prior standard; None: unknown.
+        run: from 0; None: all.
     """
 
     name: str
@@ -37,7 +37,7 @@ class SimulatorParameter:
 
     @property
     def size(self) -> float:
-        """About how far it may move: its uncertainty, or its value."""
+        """Return its scale: uncertainty or value."""
         return self.uncertainty or abs(self.value) or 1.0
 
 
@@ -46,8 +46,8 @@ class SimulatorPort:
     """A place of the simulator where something may act.
 
     Attributes:
-        name: by which `simulate` calls it.
-        signals: that are known there, unit by name.
+        name: in `simulate`.
+        signals: unit by name.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Output:
     """What is measured of the simulated object.
 
     Attributes:
-        filter_s: time constant of the sensor's first-order filter, which the simulated values pass; 0: none [s].
+        filter_s: first-order sensor filter of simulated values; 0: none.
     """
 
     name: str
@@ -74,8 +74,8 @@ class SimulatorRecording:
     """One recording.
 
     Attributes:
-        inputs: `t` [s], and inputs by name, shape (n,).
-        measured: outputs by name, shape (n,).
+        inputs: `t` [s] and inputs, shape (n,).
+        measured: by output, shape (n,).
     """
 
     name: str
@@ -91,8 +91,7 @@ class Model:
     """A simulator with its recordings.
 
     Attributes:
-        parameters: initial states of each run included.
-        ports: where something may act.
+        parameters: with each run's initial states.
     """
 
     name: str
@@ -102,7 +101,7 @@ class Model:
     runs: tuple[SimulatorRecording, ...]
 
     def of_run(self, run: int, values: Sequence[float]) -> tuple[tuple[str, float], ...]:
-        """What `simulate` is given of values of all parameters, shape (k,), in one run."""
+        """Return one run's arguments of `simulate` from values, shape (k,)."""
         pairs = zip(self.parameters, values, strict=True)
         return tuple((p.key, float(value)) for p, value in pairs if p.run is None or p.run == run)
 
@@ -112,7 +111,7 @@ class TrialInput:
     """Inputs that nobody recorded yet.
 
     Attributes:
-        inputs: `t` [s], and inputs by name, shape (n,).
+        inputs: `t` [s] and inputs, shape (n,).
     """
 
     run: int
@@ -125,10 +124,10 @@ class SimulationRequest:
     """One simulation.
 
     Attributes:
-        run: number of the recording whose inputs it takes.
-        terms: what acts at the ports.
-        records: whether signals at the ports are wanted.
-        trial: inputs that it takes in place of those of the recording; None: it takes these.
+        run: whose inputs it takes.
+        terms: at the ports.
+        records: return port signals.
+        trial: other inputs, or None.
     """
 
     run: int
@@ -143,8 +142,8 @@ class SimulationOutcome:
     """What came of one simulation.
 
     Attributes:
-        outputs: in the order of the model, shape (o, n); not finite where the simulation ran away.
-        signals: at each port, by its name and theirs, `t` among them, where they were asked for, shape (calls,).
+        outputs: in model order, shape (o, n); not finite if it ran away.
+        signals: by port and name with `t`, if requested, shape (calls,).
     """
 
     outputs: NDArray[np.float64]

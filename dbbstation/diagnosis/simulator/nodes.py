@@ -1,7 +1,6 @@
-"""Simulators with sets of terms put in, each refitted; and the channel in which more terms are compared about such a refit.
+"""Refitted simulators with terms, and channels about them.
 
-Columns of a channel are answers of the simulator with the terms that are in it already. The residual has what these do added back, so
-that a hypothesis without them is compared, too.
+Columns are answers with present terms; the residual adds these back, so that sets without them compete.
 """
 
 from __future__ import annotations
@@ -54,8 +53,8 @@ class Node:
     """A simulator with some terms, refitted.
 
     Attributes:
-        size: of what the simulator without any term leaves, root mean square: what candidates may explain.
-        own: physics of the user's own.
+        size: rms without terms, a bound of explanation.
+        own: own physics.
     """
 
     work: SimulationRuns
@@ -71,7 +70,7 @@ class Node:
 
     @cached_property
     def outside(self) -> tuple[Candidate, ...]:
-        """Candidates that are not put in."""
+        """Return candidates not inserted."""
         work = self.work
         longest = max(work.model.runs, key=len).inputs["t"]
         found = candidates(work.model.ports, work.signals(self.fitted.state), self.own, longest)
@@ -85,12 +84,12 @@ class Node:
 
     @cached_property
     def asked(self) -> tuple[list[Law], dict[str, str]]:
-        """Laws of the candidates outside, and those that cannot be asked, with the reason."""
+        """Return outside laws, and reasons against others."""
         return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST)
 
     @cached_property
     def off(self) -> Departures:
-        """What the terms that are put in may be off by: answers to curves, lags and stick-slip at their ports."""
+        """Return inserted terms' slack: curves, lags, stick-slip."""
         found = {
             departing(one): of_unit_size([self.answers_of(one.name)]) for one in self.inside if one.term.form in OFF
         }
@@ -99,7 +98,7 @@ class Node:
         return {**found, **departures(self.work, self.fitted.state, others, self.size)}
 
     def answers_of(self, name: str) -> NDArray[np.float64]:
-        """What one more of each amplitude of a term does, shape (n, p)."""
+        """Return a term's answers, shape (n, p)."""
         first = len(self.work.model.parameters)
         for one, term in zip(self.inside, self.fitted.state.terms, strict=True):
             if one.name == name:
@@ -109,12 +108,12 @@ class Node:
 
     @cached_property
     def channel(self) -> Channel:
-        """Channel of everything that may be put in, and of what is."""
+        """Return the channel of all terms."""
         return self._channel(self.off, self.asked[0])
 
     @cached_property
     def alone(self) -> Channel:
-        """Channel of what is put in, without rivals and as if it had no uncertainty of form: it asks for no simulations."""
+        """Return the channel of inserted terms without rivals and slack, without simulations."""
         return self._channel({}, ())
 
     def _channel(self, off: Departures, others: Sequence[Law]) -> Channel:
@@ -137,12 +136,12 @@ class Node:
         return channel_of(work, residual, base, (*mine, *others))
 
     def but_for(self, refuted: Collection[str]) -> Channel:
-        """The channel without some of the terms that may be put in."""
+        """Return the channel without some outside terms."""
         laws_left = tuple(law for law in self.channel.laws if law.name not in refuted)
         return replace(self.channel, laws=laws_left)
 
     def _law(self, one: Candidate, columns: NDArray[np.float64], numbers: Sequence[float], off: Departures) -> Law:
-        """Law of a term that is put in: its numbers of all kinds are amplitudes of its answers there."""
+        """Return an inserted term's law, all numbers as amplitudes."""
         amplitudes, rms = len(one.term.amplitudes), np.sqrt(np.mean(np.square(columns), axis=0))
         usual = self.size / np.maximum(rms, 1e-300)
         usual[amplitudes:] = np.abs(numbers[amplitudes:])
@@ -160,10 +159,10 @@ class Node:
         )
 
     def numbers_of(self, settled: Settled, one: Candidate, beside: Sequence[Member] | None = None) -> tuple[float, ...]:
-        """Numbers that a comparison about this node gives a candidate.
+        """Return a comparison's numbers for a candidate.
 
         Args:
-            beside: what it stands beside, itself there or not; None: the best hypothesis.
+            beside: members; None: the best hypothesis.
         """
         beside = settled.best.members if beside is None else beside
         others = [m for m in beside if m.cause.name != one.name]
@@ -192,10 +191,10 @@ CURVED_MOST = 3.0 * AGREE
 
 @dataclass(frozen=True)
 class Challenge:
-    """Named terms in the place of a curve.
+    """Names against a curve.
 
     Attributes:
-        log_odds: for the curve, all that both cost being counted.
+        log_odds: for the curve, with all costs.
     """
 
     curve: str
@@ -205,14 +204,13 @@ class Challenge:
 
 @dataclass(eq=False)
 class Nodes:
-    """Nodes that were visited, by the names of their terms.
+    """Visited nodes by terms.
 
     Attributes:
-        own: physics of the user's own.
-        progress: called with what is being done.
-        begun: from which terms others were refitted already.
-        bettered: terms for which a better minimum was found than that which had been compared.
-        challenges: curves that names were put in the place of in the search that goes on.
+        own: own physics.
+        begun: starts already used.
+        bettered: terms with a later better minimum.
+        challenges: of the current search.
     """
 
     work: SimulationRuns
@@ -224,11 +222,11 @@ class Nodes:
     challenges: list[Challenge] = field(default_factory=list)
 
     def withstood(self, node: Node) -> list[Challenge]:
-        """Those in which a node has the names, and not the curve."""
+        """Return challenges in which a node has the names."""
         return [one for one in self.challenges if one.names <= node.names and one.curve not in node.names]
 
     def base(self, start: FittedState) -> Node:
-        """The simulator as it is, refitted from several starts."""
+        """Return the refitted simulator without terms."""
         self.progress("refit")
         fitted = fit(self.work, start, several=True)
         size = float(np.sqrt(np.mean(np.square(fitted.residual)))) or 1.0
@@ -237,7 +235,7 @@ class Nodes:
         return node
 
     def with_more(self, node: Node, one: Candidate, settled: Settled) -> Node | None:
-        """A node with one more term, from what a comparison says of it alone; None where simulations with it run away."""
+        """Return a node with one more term; None if it runs away."""
         names = node.names | {one.name}
         if names not in self.known:
             self.progress(f"refit with {one.name}")
@@ -254,10 +252,7 @@ class Nodes:
         return self.known.get(names)
 
     def _beginnings(self, node: Node, one: Candidate, numbers: NDArray[np.float64]) -> list[FittedState]:
-        """States at which a refit with one more term may begin, the closest to the recordings first.
-
-        The linear comparison says how large the term is, which may be far too much.
-        """
+        """Return starts with one more term, closest first, at reduced linear sizes too."""
         amplitudes, states = len(one.term.amplitudes), []
         for share in SHARES:
             term = one.term.with_numbers([*(share * numbers[:amplitudes]), *numbers[amplitudes:]])
@@ -268,11 +263,11 @@ class Nodes:
     def instead(
         self, node: Node, more: Sequence[Candidate], settled: Settled, beside: Sequence[Member] | None = None
     ) -> Node | None:
-        """A node with other terms; None where simulations with it run away.
+        """Return a node with other terms; None if it runs away.
 
         Args:
-            settled: comparison about that.
-            beside: members of the comparison that are put in, those of `more` among them; None: those of its best hypothesis.
+            settled: its comparison.
+            beside: inserted members; None: the best hypothesis's.
         """
         beside = settled.best.members if beside is None else beside
         names = frozenset(member.cause.name for member in beside) & node.names | {one.name for one in more}
@@ -283,16 +278,16 @@ class Nodes:
         return self._known_or_begun(node, state, (*(one for one, _ in kept), *more))
 
     def without(self, node: Node, name: str) -> Node:
-        """A node with one term less."""
+        """Return a node without a term."""
         terms = zip(node.inside, node.fitted.state.terms, strict=True)
         kept = [(one, term) for one, term in terms if one.name != name]
         state = FittedState(node.fitted.state.values, tuple(term for _, term in kept))
         return self._known_or_begun(node, state, tuple(one for one, _ in kept)) or node
 
     def _known_or_begun(self, node: Node, state: FittedState, inside: tuple[Candidate, ...]) -> Node | None:
-        """The better of a node that is known and the same terms refitted from another state; None where simulations run away.
+        """Return the better of a known node and a new start; None if it runs away.
 
-        A refit may end in a wrong minimum: with more terms, or others in their place, a better place to begin from is found.
+        Refits may end in wrong minima.
         """
         names = frozenset(one.name for one in inside)
         place = node.names, names
@@ -312,17 +307,16 @@ class Nodes:
         return self.known.get(names)
 
     def again(self, node: Node, weigh: Weigh, sigma: float) -> Node:
-        """The same terms, refitted in other noise."""
+        """Return the node refitted in other noise."""
         self.known[node.names] = replace(node, fitted=fit(self.work, node.fitted.state, weigh, sigma=sigma))
         return self.known[node.names]
 
     def _fitted(
         self, node: Node, state: FittedState, inside: tuple[Candidate, ...], most: float = np.inf
     ) -> Node | None:
-        """Refit rows as they are, then in the noise that each refit leaves, until that is the same.
+        """Refit plainly, then in own noise until stable.
 
-        The noise of a comparison is that beside linear answers, which may be far from the true ones: it is no place to begin from.
-        None where more than `most` is left, root mean square: a term more cannot leave clearly more, so this is a wrong minimum.
+        A comparison's noise is beside linear answers. None if more than `most` remains: a wrong minimum.
         """
         fitted, before = fit(self.work, state), None
         if _rms(fitted.residual) > most:
@@ -346,7 +340,7 @@ def _left(node: Node) -> float:
 
 
 def _rms(values: NDArray[np.float64]) -> float:
-    """Root mean square; infinite, or not a number, where a simulation ran away."""
+    """Return the rms; not finite after a runaway."""
     with np.errstate(over="ignore", invalid="ignore"):
         return float(np.sqrt(np.mean(np.square(values))))
 
@@ -360,11 +354,11 @@ def _inside(one: Candidate, numbers: Sequence[float]) -> list[float]:
 
 
 def noise_of(settled: Settled) -> tuple[Weigh, float]:
-    """How rows are made white in the noise that a comparison found, and the standard deviation that they then have."""
+    """Return a comparison's whitening and standard deviation."""
     return settled.bank.whitened, settled.noise.innovation
 
 
 def spread_of(work: SimulationRuns, settled: Settled) -> NDArray[np.float64]:
-    """Noise of each output that a comparison found, over that of all rows, shape (o,)."""
+    """Return outputs' relative noise, shape (o,)."""
     kinds, spread = work.output[settled.channel.kept], settled.bank.spread
     return np.array([float(np.mean(spread[kinds == k])) for k in range(len(work.model.outputs))])

@@ -1,4 +1,4 @@
-"""The noise that a refitted simulator leaves, and how probable the refit is in it."""
+"""A refit's noise and probability."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def channel_of(work: SimulationRuns, residual: NDArray[np.float64], base: Base, 
     """Channel of all rows of a simulator's recordings.
 
     Args:
-        residual: measured less simulated, scaled, shape (n,).
-        base: what is fitted anew with every hypothesis.
+        residual: scaled, shape (n,).
+        base: refitted with every hypothesis.
     """
     outputs = work.model.outputs
     return Channel(
@@ -50,13 +50,13 @@ def noise_left(
     off: NDArray[np.float64] | None = None,
     rows: Channel | None = None,
 ) -> Bank:
-    """Noise of what a refit leaves, measured beside everything that was fitted.
+    """Return a refit's noise, measured beside all fitted columns.
 
     Args:
-        residual: of the refit, shape (n,).
-        columns: what one more of each fitted number does, shape (n, m).
-        off: what its terms may be off by, each of standard deviation one, shape (n, q); None: nothing.
-        rows: channel whose kept rows are taken; None: all rows.
+        residual: shape (n,).
+        columns: per fitted number, shape (n, m).
+        off: slack of unit size, shape (n, q); None: none.
+        rows: channel of kept rows; None: all.
     """
     off = np.zeros((len(residual), 0)) if off is None else off
     fitted, free = columns.shape[1], off.shape[1]
@@ -76,11 +76,11 @@ def noise_left(
 
 
 def log_probability_of(bank: Bank, residual: NDArray[np.float64], off: NDArray[np.float64], numbers: int) -> float:
-    """Log probability of rows in a noise, with what so many fitted numbers cost [Schwarz's criterion], up to a constant.
+    """Return rows' log probability with parameter cost [Schwarz's criterion], up to a constant.
 
     Args:
         residual: shape (n,).
-        off: what terms may be off by, each of standard deviation one, shape (n, q): it is averaged over.
+        off: slack of unit size, averaged over, shape (n, q).
     """
     rows = bank.whitened(residual) / bank.noise.innovation
     beside = bank.whitened(off) / bank.noise.innovation

@@ -1,4 +1,4 @@
-"""The contract of physics of one's own at a port of a simulator."""
+"""The contract of own physics at a port."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class PortSource(ABC):
-    """One physical cause that acts at a port. Instances carry no state."""
+    """A physical cause at a port, without state."""
 
     name: ClassVar[str]
     """Unique, in small letters with hyphens."""
@@ -22,12 +22,12 @@ class PortSource(ABC):
 
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
-        """Return its numbers: amplitudes first, which it is proportional to, then those with a `grid`, which it is not."""
+        """Return amplitudes, then numbers with a `grid`."""
 
     @abstractmethod
     def value(self, t: float, signals: Mapping[str, float], parameters: Mapping[str, float]) -> float:
         """Return what acts at the port, in its unit.
 
         Args:
-            t: time [s].
+            t: [s].
         """

@@ -1,4 +1,4 @@
-"""Ports as a simulator sees them."""
+"""Ports for a simulator."""
 
 from __future__ import annotations
 
@@ -16,14 +16,11 @@ if TYPE_CHECKING:
 
 
 class SimulationFault(Exception):  # noqa: N818 - a fault of the user's simulator, told as a refusal
-    """What a simulator returned is not what its model says."""
+    """Invalid outputs of a simulator."""
 
 
 class Ports:
-    """Ports of one simulation: `ports.NAME(t, signals)` returns what acts there.
-
-    Time and signals are numbers, or arrays of all rows where a port acts on what has been simulated, such as a sensor.
-    """
+    """`ports.NAME(t, signals)` returns what acts there, for numbers or arrays of rows."""
 
     def __init__(
         self, ports: Sequence[SimulatorPort], acting: Mapping[str, Sequence[Evaluate]], *, records: bool
@@ -39,7 +36,7 @@ class Ports:
         raise SimulationFault(f"`ports.{name}` is no port of the model; there are {there or 'none'}")
 
     def recorded(self) -> dict[str, dict[str, NDArray[np.float64]]]:
-        """Times and signals of all calls, by port, shape (calls,)."""
+        """Return times and signals of all calls by port, shape (calls,)."""
         found = {}
         for name, rows in self._kept.items():
             signals = ("t", *self._signals[name])
@@ -79,7 +76,7 @@ PortCall: TypeAlias = "Callable[[float, Mapping[str, float]], float | NDArray[np
 
 
 def _quickly(acting: Sequence[Evaluate], called: PortCall) -> PortCall:
-    """The same as `called` by a short way, where time is a number: a port is called some ten times per row."""
+    """Return `called` by a fast path for scalar times."""
     if not acting:
         return lambda _t, _signals: 0.0
     if len(acting) == 1:

@@ -1,4 +1,4 @@
-"""Which terms are missing: compare, put the best one in, refit, ask the ports anew, until nothing moves."""
+"""Find missing terms: compare, insert, refit, probe, until stable."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ class SearchOutcome:
     """What a search ended at.
 
     Attributes:
-        node: the simulator with what was found, refitted.
-        settled: comparison about it.
-        state: values, as fitted to the rows of that comparison.
-        residual: measured less simulated at that state, shape (n,).
-        is_settled: whether everything moved by less than a tenth of its uncertainty in the end, and the comparison wants nothing else.
-        refuted: terms that linear answers asked for and that compete no more beside it, and why.
-        stopped: why it ended early; empty where it did not.
-        withstood: curves in whose place names are.
+        node: with findings, refitted.
+        settled: about it.
+        state: values for those rows.
+        residual: shape (n,).
+        is_settled: all moves below a tenth of uncertainty, and nothing further wanted.
+        refuted: rejected terms with reasons.
+        stopped: may be empty.
+        withstood: curves replaced by names.
     """
 
     node: Node
@@ -68,28 +68,21 @@ class SearchOutcome:
 
 
 def compared(channel: Channel, progress: Callable[[str], None] = lambda _: None) -> Settled:
-    """Compare everything that may be put in, in all kinds of noise."""
+    """Compare everything in all noises."""
     return settle(channel, look=False, static=False, progress=progress)
 
 
 def compared_quickly(channel: Channel, beginning: Beginning) -> Settled:
-    """The same less widely, as where rows are held back: in noise from one beginning, or beside everything.
-
-    The beginning is that which suits what all rows came to. About a simulator that lacks something large yet, that may be none.
-    """
+    """Compare fast from one beginning or beside everything, which may miss large gaps."""
     beginnings = tuple(dict.fromkeys((beginning, Beginning.EVERYTHING)))
     return settle(channel, look=False, static=False, most_expanded=0, thorough=False, beginnings=beginnings)
 
 
 def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, refits: bool = True) -> SearchOutcome:
-    """Put in what is missing, one term after the other.
-
-    Terms that linear answers ask for, and that are not worth it once they are refitted, compete no more about the same terms.
+    """Insert missing terms one by one; unworthy ones are rejected about the same terms.
 
     Args:
-        compare: everything about a node.
-        refits: refit each node in the noise that is found beside it, until nothing moves; False: where rows are held back, which
-            are refitted from the node each time.
+        refits: refit in own noise until stable; False for held-back rows.
     """
     nodes.challenges.clear()  # those of other rows say nothing here
     node, been, refuted, refitted, stopped = base, {base.names}, dict[str, str](), 0, ""
@@ -143,10 +136,7 @@ WITHIN = "it is less than what the terms at its port may be off by"
 
 
 def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Mapping[str, str]]:
-    """Node that a comparison wants next: with the term that is worth most, or without one that is not needed; None: this one.
-
-    With it come terms that the comparison wants, and that are to compete no more about this node, with the reason.
-    """
+    """Return the next wanted node, or None; with rejected terms."""
     outside = {one.name: one for one in node.outside}
     more = [member.cause.name for member in settled.best.members if member.cause.name in outside]
     if settled.averaged(settled.posterior.probability(outside), outside) < SURE:
@@ -173,11 +163,10 @@ def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Ma
 
 
 def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str]:
-    """Those of some members of the best hypothesis that do less than others at the same port may be off by.
+    """Return members smaller than the slack of others at their port.
 
-    They would be told from a departure of the others' forms by their shape only, and real objects depart from forms in any shape. Of all
-    effects what the parameters take up is left out. What terms do together counts, too: two that are alike may each be large, and
-    cancel each other.
+    Real objects depart from forms in any shape. Absorbed parts are excluded; joint effects count, since similar ones may
+    cancel.
     """
     every = {one.name: one for one in (*node.inside, *node.outside)}
     members = [every[member.cause.name] for member in settled.best.members]
@@ -203,10 +192,10 @@ def _within_forms_refitted(node: Node, but_for: Collection[str]) -> list[str]:
 
 
 def _less(members: Sequence[Candidate], size: Callable[[Sequence[str]], float], names: Sequence[str]) -> list[str]:
-    """Those of some members that do less, alone or all of them together, than the others at their port may be off by.
+    """Return members smaller than others' slack, alone or together.
 
     Args:
-        size: of what some of them do together, root mean square.
+        size: joint rms.
     """
     ports = {one.name: one.term.port for one in members}
     off = {one.name: form_uncertainty(one) * size([one.name]) for one in members}
@@ -223,7 +212,7 @@ def _less(members: Sequence[Candidate], size: Callable[[Sequence[str]], float], 
 
 
 def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidate]:
-    """Candidates that may be in the place of one, by the linear comparison beside what is put in already, best first."""
+    """Return possible replacements by linear comparison, best first."""
     members = [member for member in settled.best.members if member.cause.name in node.names]
     outside = {one.name: one for one in node.outside}
     causes = [cause for cause in settled.causes if cause.name in outside]
@@ -235,7 +224,7 @@ def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidat
 
 
 def moves(node: Node, settled: Settled) -> dict[str, float]:
-    """By how much the numbers of each term differ from those that a comparison about it has, at the most, in standard uncertainties."""
+    """Return each term's greatest move in standard uncertainties."""
     terms = {one.name: (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
     largest = dict.fromkeys((name for name, _ in _said(node, settled)), 0.0)
     for (name, number), (value, uncertainty) in _said(node, settled).items():
@@ -267,7 +256,7 @@ def _said(node: Node, settled: Settled) -> dict[tuple[str, str], tuple[float, fl
 def _still(
     before: Mapping[tuple[str, str], tuple[float, float]], after: Mapping[tuple[str, str], tuple[float, float]]
 ) -> bool:
-    """Whether comparisons about two refits of the same terms say the same."""
+    """Return whether comparisons about two refits agree."""
     return before.keys() == after.keys() and all(
         abs(after[key][0] - before[key][0]) < STILL * after[key][1] for key in after
     )

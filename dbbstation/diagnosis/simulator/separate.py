@@ -1,4 +1,4 @@
-"""What would distinguish terms that these recordings do not: the input under which their answers differ most."""
+"""The input that best separates indistinguishable terms."""
 
 from __future__ import annotations
 
@@ -34,12 +34,11 @@ class Separation:
     """What would distinguish two terms.
 
     Attributes:
-        part: stretch of the recordings in which they differ most.
-        sigmas: standard deviations by which they differ there.
-        repeats: of that stretch until they are distinguished.
-        trial: input under which they would differ most; None where the simulator has no inputs, or none of those tried does
-            better.
-        trial_sigmas: standard deviations by which they would differ under it, in a recording as long.
+        part: stretch of greatest difference.
+        sigmas: difference there in standard deviations.
+        repeats: until distinguished.
+        trial: best input, or None.
+        trial_sigmas: under it, for equal length.
     """
 
     terms: tuple[str, str]
@@ -66,11 +65,9 @@ class Separation:
 
 
 def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> tuple[Separation, ...]:
-    """Proposals for each pair of terms that the recordings do not distinguish.
+    """Return proposals for indistinguishable pairs.
 
-    The answers of both are compared beside the parameters: in which stretch of the recordings they differ most, in units of noise, and
-    how often that must be repeated until they are `OUT` standard deviations apart; and under which of the trial inputs they would
-    differ most, in simulations under these.
+    Both answers are compared beside parameters by stretch, until `OUT` standard deviations, and under trial inputs.
     """
     settled = found.settled
     base = settled.bank.whitened(settled.channel.base.samples) / settled.noise.innovation
@@ -91,7 +88,7 @@ def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding
 
 
 def _wanted(found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> list[tuple[str, str]]:
-    """Pairs of which at least one term was put in first, then those of which none was."""
+    """Return pairs with an inserted term first."""
     laws = {cause.name for cause in found.settled.causes}
     wanted: list[tuple[str, str]] = []
     for one in findings:
@@ -103,7 +100,7 @@ def _wanted(found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> list[tu
 
 
 def _tried(nodes: Nodes, found: SearchOutcome, pair: tuple[str, str]) -> tuple[TrialInput | None, float, float]:
-    """Trial input under which two terms differ most, by how much, and by how much under the inputs as recorded."""
+    """Return the best trial input with its difference, and that as recorded."""
     trials = trial_inputs(nodes.work.model)
     if not trials:
         return None, 0.0, 0.0
@@ -132,7 +129,7 @@ def _repeated(repeats: int) -> str:
 
 
 def _column(found: SearchOutcome, name: str) -> NDArray[np.float64]:
-    """Effect of a term over all rows, as large as it is, or as it would be in the best place of another."""
+    """Return a term's effect over all rows, actual or in a best replacement."""
     settled, best = found.settled, found.settled.best
     if name in best.names:
         return settled.effect([name])

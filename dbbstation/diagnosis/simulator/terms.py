@@ -1,7 +1,6 @@
-"""Terms that may act at a port of a simulator: forms over the signals that are known there.
+"""Terms at a port: forms over its signals.
 
-A term with a memory follows the time that it is given: a time that is asked for again, or an earlier one, is answered from what was
-known before it, so that every integrator gets the same answer for the same step.
+Terms with memory depend only on earlier times, so every integrator gets equal answers.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class TermForm(StrEnum):
-    """How a term follows its signals x (and z); a is its amplitude."""
+    """Forms over signals x (and z) with amplitude a."""
 
     CONSTANT = "constant"  # a
     LINEAR = "linear"  # a x
@@ -60,12 +59,11 @@ class Term:
     """What acts at a port.
 
     Attributes:
-        form: how it follows the signals.
         amplitudes: shape (p,).
-        shape: numbers that the term is not proportional to, such as a time constant, shape (s,).
-        fixed: numbers that are not fitted: knots of a curve, period of an angle and order.
-        own: physics of the user's own.
-        bounds: least and greatest value of each number of the shape, shape (s, 2); empty where they are not limited.
+        shape: nonlinear numbers, shape (s,).
+        fixed: knots, or period and order.
+        own: own physics.
+        bounds: of the shape, shape (s, 2); may be empty.
     """
 
     port: str
@@ -79,7 +77,7 @@ class Term:
 
     @property
     def name(self) -> str:
-        """What it is called in results."""
+        """Return its name in results."""
         if self.own is not None:
             return f"{self.own.name} at {self.port}"
         of = f" of {' and '.join(self.signals)}" if self.signals else ""
@@ -88,17 +86,17 @@ class Term:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Amplitudes, then shape."""
+        """Return amplitudes, then shape."""
         return (*self.amplitudes, *self.shape)
 
     def with_numbers(self, numbers: Sequence[float]) -> Term:
-        """The same with other amplitudes and shape, shape (p + s,)."""
+        """Return the term with other numbers, shape (p + s,)."""
         values, count = tuple(float(number) for number in numbers), len(self.amplitudes)
         return replace(self, amplitudes=values[:count], shape=values[count:])
 
 
 def evaluator(term: Term) -> Evaluate:
-    """What a term does at a time and signals, by name."""
+    """Return a term's function of time and signals."""
     if term.own is not None:
         return _own(term)
     if term.form in MEMORIES:
@@ -123,7 +121,7 @@ def _momentary(term: Term) -> Evaluate:
 
 
 def _of_one_signal(form: TermForm, x: str, a: float, place: float) -> Evaluate:
-    """Evaluate a times a function of one signal; each is one call, since a simulation asks some ten times per row."""
+    """Return a times a function of one signal, as one fast call."""
     rounding = place * place
 
     def square(_t: float, signals: Mapping[str, float]) -> float:
@@ -194,18 +192,14 @@ DEGREE = 3
 
 
 def bends(knots: Sequence[float]) -> NDArray[np.float64]:
-    """Coefficients of splines in which there is no straight line, orthonormal, shape (k, k - 2): lines are terms of their own.
-
-    A line has the coefficients of a constant and of the means of the knots inside each spline [Greville abscissae; de Boor, A Practical
-    Guide to Splines, ch. IX].
-    """
+    """Return spline coefficients without straight lines, orthonormal, shape (k, k - 2) [Greville abscissae; de Boor, A Practical Guide to Splines, ch. IX]."""
     count = len(knots) - DEGREE - 1
     means = np.array([np.mean(knots[k + 1 : k + 1 + DEGREE]) for k in range(count)])
     return np.asarray(null_space(np.vstack([np.ones(count), means - means.mean()])))
 
 
 def _remembering(term: Term) -> Evaluate:
-    """Evaluate a term with a memory: what was at or behind the time asked for is dropped first, since solvers take steps back."""
+    """Return a term with memory, which drops later times first."""
     x, a = term.signals[0], term.amplitudes[0]
     if term.form is TermForm.DELAY:
         return _delayed(x, a)
@@ -228,7 +222,7 @@ Step: TypeAlias = "Callable[[tuple[float, float, float], float, float], float]"
 
 
 def _lagging(constant: float) -> Step:
-    """How far a first-order lag is behind [triangle-hold equivalent, as `inference.memory.lagging`]; it begins settled."""
+    """Return a first-order lag [triangle-hold equivalent, as `inference.memory.lagging`], initially settled."""
     if constant <= 0.0:
         return lambda _past, _t, _now: 0.0
 
@@ -242,7 +236,7 @@ def _lagging(constant: float) -> Step:
 
 
 def _playing(half: float) -> Step:
-    """Output of a play less its input; it begins in the middle."""
+    """Return a play's output less input, initially centred."""
 
     def step(past: tuple[float, float, float], _t: float, now: float) -> float:
         apart = past[2] + past[1] - now
@@ -252,7 +246,7 @@ def _playing(half: float) -> Step:
 
 
 def _delayed(x: str, dead: float) -> Evaluate:
-    """Signal a while ago, less what it is."""
+    """Return a delayed signal less the present."""
     times: list[float] = []
     past: list[float] = []
 

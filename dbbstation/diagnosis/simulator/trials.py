@@ -1,7 +1,4 @@
-"""Inputs that would distinguish terms: trials made from the recorded inputs, each simulated with one term and with the other.
-
-What both do to the outputs is compared beside the parameters and the other terms, whose answers are asked for under the same inputs.
-"""
+"""Trial inputs from recorded ones, simulated with each of two terms."""
 
 from __future__ import annotations
 
@@ -33,7 +30,7 @@ QUARTER = 0.25
 
 
 def trial_inputs(model: Model) -> list[TrialInput]:
-    """Inputs made from those of the longest recording, that itself first; none where the simulator has no inputs."""
+    """Return the longest run's inputs and variations; none without inputs."""
     run = max(range(len(model.runs)), key=lambda k: len(model.runs[k]))
     recorded = model.runs[run]
     t = recorded.inputs["t"]
@@ -78,10 +75,10 @@ def trial_inputs(model: Model) -> list[TrialInput]:
 def apart(
     work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Sequence[Term], noise: NDArray[np.float64]
 ) -> float:
-    """By how many standard deviations two terms would be distinguished under an input.
+    """Return the standardised difference of two terms under an input.
 
     Args:
-        noise: of each output, that of rows that count as one, in units of its residual, shape (o,).
+        noise: per independent row of each output, shape (o,).
     """
     model = work.model
     own = [k for k, p in enumerate(model.parameters) if p.run in {None, trial.run}]
@@ -105,7 +102,7 @@ def apart(
 
 
 def beside(columns: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What columns, shape (n, p), cannot take up of rows, shape (n,)."""
+    """Return rows beyond columns, shape (n, p), shape (n,)."""
     norm = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     values = np.linalg.lstsq(columns / norm, wanted, rcond=1e-10)[0]
     return np.asarray(wanted - (columns / norm) @ values)

@@ -1,7 +1,7 @@
-"""Simulations that a comparison asks for: residuals, and what one more of each number does to them.
+"""Residuals and derivatives of simulations.
 
-A derivative is taken from two doses, h and 2 h: (4 f(h) - f(2h) - 3 f(0)) / 2h, of second order [Abramowitz and Stegun, eq. 25.3.4 for
-one side]. The doses are as large as answers that are a hundredth of the residual, and less where the two do not agree.
+Doses h and 2 h give (4 f(h) - f(2h) - 3 f(0)) / 2h, second order [Abramowitz and Stegun, eq. 25.3.4 for one side]; doses
+answer with a hundredth of the residual, or less if they disagree.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 
 class BudgetSpentError(CalibrationError):
-    """All simulations that were allowed have been run."""
+    """The simulation budget is spent."""
 
 
 class RanAwayError(CalibrationError):
-    """A simulation ran away: its outputs are not finite."""
+    """A simulation's outputs are not finite."""
 
 
 ANSWER = 0.01
@@ -52,10 +52,10 @@ UNSEEN = 1e-9
 
 @dataclass(frozen=True)
 class FittedState:
-    """Values of all numbers that are fitted.
+    """Values of all fitted numbers.
 
     Attributes:
-        values: of the parameters of the model, shape (k,).
+        values: of model parameters, shape (k,).
     """
 
     values: tuple[float, ...]
@@ -63,11 +63,11 @@ class FittedState:
 
     @property
     def numbers(self) -> NDArray[np.float64]:
-        """Values, then the numbers of the terms, shape (m,)."""
+        """Return values, then terms' numbers, shape (m,)."""
         return np.array([*self.values, *(number for term in self.terms for number in term.numbers)])
 
     def with_numbers(self, numbers: NDArray[np.float64]) -> FittedState:
-        """The same terms with other numbers, shape (m,)."""
+        """Return the terms with other numbers, shape (m,)."""
         own, first, terms = numbers.tolist(), len(self.values), []
         for term in self.terms:
             terms.append(term.with_numbers(own[first : first + len(term.numbers)]))
@@ -75,7 +75,7 @@ class FittedState:
         return FittedState(tuple(own[: len(self.values)]), tuple(terms))
 
     def moved(self, place: int, by: float) -> FittedState:
-        """The same with one number moved."""
+        """Return the state with one number moved."""
         numbers = self.numbers
         numbers[place] += by
         return self.with_numbers(numbers)
@@ -83,12 +83,12 @@ class FittedState:
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """What one more of some numbers does.
+    """Derivatives by numbers.
 
     Attributes:
-        columns: to the simulated values, scaled as residuals are, shape (n, m).
-        curved: by how much the answers to two doses differ, over the answer, shape (m,).
-        seen: which have an answer at all, shape (m,).
+        columns: scaled, shape (n, m).
+        curved: relative difference of doses, shape (m,).
+        seen: answering numbers, shape (m,).
     """
 
     columns: NDArray[np.float64]
@@ -101,10 +101,10 @@ class SimulationRuns:
     """Simulations of a model.
 
     Attributes:
-        run: simulates; what was simulated before is not simulated again.
-        scales: unit of the residual of each output, in that of the output, shape (o,).
-        doses: that gave answers of the right size, by number.
-        trial: inputs in place of those of the only run of the model; None: the runs have their own.
+        run: simulates, cached.
+        scales: of residuals by output, shape (o,).
+        doses: suitable ones by number.
+        trial: inputs of the model's only run, or None.
     """
 
     model: Model
@@ -128,10 +128,10 @@ class SimulationRuns:
         return len(self.time)
 
     def simulated(self, states: Sequence[FittedState], *, strict: bool = True) -> list[NDArray[np.float64]]:
-        """Simulated values of all rows at each state, in units of the outputs, shape (n,).
+        """Return all rows at each state, shape (n,).
 
         Raises:
-            RanAwayError: one ran away, if `strict`.
+            RanAwayError: not finite, if `strict`.
         """
         runs = range(len(self.model.runs))
         asks = [
@@ -158,12 +158,12 @@ class SimulationRuns:
         return found
 
     def residuals(self, states: Sequence[FittedState], *, strict: bool = True) -> list[NDArray[np.float64]]:
-        """Measured less simulated values, scaled, shape (n,)."""
+        """Return scaled residuals, shape (n,)."""
         with np.errstate(over="ignore", invalid="ignore"):
             return [(self.measured - values) / self.scale for values in self.simulated(states, strict=strict)]
 
     def signals(self, state: FittedState) -> dict[str, dict[str, NDArray[np.float64]]]:
-        """Signals at all ports, by port and name, of all calls in all runs."""
+        """Return port signals of all calls and runs."""
         runs = range(len(self.model.runs))
         answers = self.run(
             [SimulationRequest(k, self.model.of_run(k, state.values), state.terms, records=True) for k in runs]
@@ -177,10 +177,10 @@ class SimulationRuns:
         }
 
     def answers(self, state: FittedState, directions: Sequence[PerturbedParameter], size: float) -> Answers:
-        """Answers to small doses.
+        """Return answers to small doses.
 
         Args:
-            size: of the residual, root mean square.
+            size: rms residual.
         """
         before = self.residuals([state])[0]
         floor = UNSEEN * float(np.std(self.measured / self.scale))
@@ -223,11 +223,11 @@ class SimulationRuns:
 
 @dataclass(frozen=True)
 class PerturbedParameter:
-    """One number that is dosed: one of the state, or one of a term that is not in it.
+    """A dosed number, of the state or of a new term.
 
     Attributes:
-        dose: to begin with; its sign is the side.
-        term: that is not in the state yet; None where the number is one of the state.
+        dose: initial; its sign is the side.
+        term: not in the state, or None.
     """
 
     key: tuple[str, ...]
@@ -245,7 +245,7 @@ class PerturbedParameter:
 
 
 def told(model: Model, ask: SimulationRequest) -> str:
-    """A simulation in words: its run, parameters and terms."""
+    """Return a simulation in words."""
     values = ", ".join(f"{key} = {value:.6g}" for key, value in ask.parameters)
     terms = "".join(f"; {term.name}: {', '.join(f'{n:.4g}' for n in term.numbers)}" for term in ask.terms)
     inputs = ask.trial.about if ask.trial else model.runs[ask.run].name
@@ -256,7 +256,7 @@ MEND = "narrow the bounds of the parameters, or mend `simulate` for these values
 
 
 def sizes(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, float]:
-    """Greatest absolute value of each signal; one where it is zero throughout."""
+    """Return signals' greatest absolute values; one for zero."""
     return {name: float(np.abs(values).max(initial=0.0)) or 1.0 for name, values in columns.items()}
 
 

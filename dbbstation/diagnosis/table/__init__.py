@@ -1,1 +1,1 @@
-"""Any table of measured and simulated values: where they differ, in what form, and what was left out."""
+"""Compare measured and simulated values of any table."""

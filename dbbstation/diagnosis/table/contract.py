@@ -1,4 +1,4 @@
-"""The contract of physics of one's own on a table: columns from variables."""
+"""The contract of own physics on a table."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class TableSource(ABC):
-    """One physical cause of a difference between measured and simulated values. Instances carry no state."""
+    """A physical cause of a difference, without state."""
 
     name: ClassVar[str]
     """Unique, in small letters with hyphens."""
@@ -35,13 +35,13 @@ class TableSource(ABC):
 
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
-        """Return its numbers: amplitudes, which the effect is proportional to, and those with a `grid`, which it is not."""
+        """Return amplitudes, and numbers with a `grid`."""
 
     @abstractmethod
     def columns(self, variables: Mapping[str, NDArray[np.float64]], shapes: Mapping[str, float]) -> NDArray[np.float64]:
-        """Return what one of each amplitude adds to the measured value, shape (n, p), in its unit.
+        """Return one of each amplitude, shape (n, p), in the measured unit.
 
         Args:
-            variables: columns that it needs, by name, shape (n,); rows of a run in time order.
-            shapes: values of the parameters that have a `grid`, by name.
+            variables: by name, shape (n,), in time order by run.
+            shapes: parameters with a `grid`, by name.
         """

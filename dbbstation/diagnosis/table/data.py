@@ -1,4 +1,4 @@
-"""A table as it is compared: measured and simulated values, variables, derivatives, blocks; and the channel made of it."""
+"""A table for comparison, and its channel."""
 
 from __future__ import annotations
 
@@ -28,21 +28,20 @@ OFFSET = "offset"
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Rows of all blocks, one block after the other, each in time order.
+    """Rows by block in time order.
 
     Attributes:
         measured: shape (n,).
         simulated: shape (n,).
-        unit: of both; empty where none is known.
-        variables: that the difference may follow.
-        derivatives: of the simulated value by parameters, by name of these, shape (n,).
-        columns: all numeric columns by name, for physics of one's own, shape (n,).
-        blocks: rows of each file or run.
-        clock: variable that orders the rows; None where nothing does.
-        in_row_order: rows stand in the order in which they were measured, though no column says when.
-        known: standard uncertainty to which parameters were known before, by name, in their own units.
-        free: parameters of which nothing is known, such as initial states.
-        has_offset: whether measured and simulated values may differ by a constant that is of no interest.
+        unit: may be empty.
+        derivatives: of the simulated value by parameter name, shape (n,).
+        columns: numeric, by name, shape (n,).
+        blocks: rows of each.
+        clock: ordering variable, or None.
+        in_row_order: measured in row order.
+        known: prior standard uncertainty by name.
+        free: without prior.
+        has_offset: a constant difference is allowed.
     """
 
     measured: NDArray[np.float64]
@@ -65,11 +64,11 @@ class Table:
 
     @property
     def is_ordered(self) -> bool:
-        """Whether rows follow one another in time."""
+        """Return whether rows are ordered in time."""
         return self.clock is not None or self.in_row_order
 
     def spread_of(self, name: str) -> float:
-        """Standard deviation of what a parameter may be off by, before the recording is looked at; infinite where it is free."""
+        """Return a parameter's prior standard deviation; infinite if free."""
         if name == OFFSET or name in self.free:
             return np.inf
         if name in self.known:
@@ -83,7 +82,7 @@ class Table:
         """Channel of measured less simulated.
 
         Args:
-            sources: physics of the user's own; those that lack a column are left out by the caller.
+            sources: own physics with its columns.
         """
         columns = {OFFSET: np.ones(len(self)), **self.derivatives} if self.has_offset else dict(self.derivatives)
         samples = np.column_stack([np.zeros((len(self), 0)), *columns.values()])
@@ -149,7 +148,7 @@ class Table:
 def _sizes_of_noise(
     variables: Sequence[Variable], time: NDArray[np.float64] | None, blocks: Sequence[slice]
 ) -> Iterator[tuple[str, NDArray[np.float64]]]:
-    """What a part of the noise may be in proportion to: how far a variable is from either end of its range, and its speed."""
+    """Return candidates for proportional noise: distances from range ends, and speeds."""
     for variable in variables:
         yield f"{variable.name} less its least value", variable.values - variable.low
         yield f"its largest value less {variable.name}", variable.high - variable.values
@@ -158,14 +157,14 @@ def _sizes_of_noise(
 
 
 def step_of(values: NDArray[np.float64]) -> float:
-    """Step that values, shape (n,), are multiples of: the least difference of two of them."""
+    """Return the least difference, of which values, shape (n,), are multiples."""
     steps = np.diff(np.unique(values))
     steps = steps[steps > EQUAL * np.ptp(values)]
     return float(steps.min()) if len(steps) else 0.0
 
 
 def rounding_of(values: NDArray[np.float64]) -> float:
-    """Standard deviation of what was rounded off values that are multiples of a step [JCGM 100:2008, sec. F.2.2.1]."""
+    """Return rounding's standard deviation [JCGM 100:2008, sec. F.2.2.1]."""
     return step_of(values) / float(np.sqrt(12.0))
 
 
@@ -174,7 +173,7 @@ EQUAL = 1e-9
 
 
 def _is_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Whether two columns are one but for scale, origin and a thousandth."""
+    """Return whether columns are equal but for scale and origin, within a thousandth."""
     return abs(float(np.corrcoef(one, other)[0, 1])) > SAME
 
 

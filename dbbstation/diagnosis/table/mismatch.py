@@ -1,4 +1,4 @@
-"""Where a simulation and a recording differ: is there a mismatch, which variable leads it, which form it has, how large the residual is."""
+"""Whether simulation and recording differ, by which variable, form and size."""
 
 from __future__ import annotations
 
@@ -56,11 +56,11 @@ class RefittedParameter:
     """A base parameter before and after.
 
     Attributes:
-        before: with the base alone, by ordinary least squares; its uncertainty allows for neighbours that resemble each other.
-        after: with what was found beside it.
-        confounded: share of what the parameter does that this can do as well, R².
-        known: standard uncertainty to which it was known before; None where it was free.
-        stated: whether the user gave that; else it is what moves the simulated value twice as far as that was off.
+        before: base alone, ordinary least squares, correlation-adjusted.
+        after: with findings.
+        confounded: R² on findings.
+        known: prior standard uncertainty; None if free.
+        stated: by the user; else twice the simulated difference.
     """
 
     name: str
@@ -72,18 +72,18 @@ class RefittedParameter:
 
     @property
     def is_far(self) -> bool:
-        """Whether it moved so far that its derivative, or what was known of it, must be asked again."""
+        """Return whether derivative or prior must be renewed."""
         return self.known is not None and abs(self.after.value) > (FAR_STATED if self.stated else 1.0) * self.known
 
 
 @dataclass(frozen=True)
 class Share:
-    """What of the mismatch follows one variable.
+    """The mismatch's part of one variable.
 
     Attributes:
-        rms: of all effects over it, shared ones as well, in the unit of the table.
-        share: of the reduction of the weighted sum of squares, what these bring alone.
-        lost: what of it is lost without them, since others make up for part of them.
+        rms: of all its effects, in the table's unit.
+        share: of the reduction, alone.
+        lost: without them.
     """
 
     variable: str
@@ -98,18 +98,15 @@ class Mismatch:
     """What is said of a table.
 
     Attributes:
-        settled: what the comparison came to.
-        shares: of variables, largest first.
-        resembles: of smooth curves that are there, which named forms they follow: share of each, R², by name of finding.
-        left: tests of the residual.
-        levels: whether anything differs, what it follows, which law it is.
-        is_worse_here: whether what was found leaves more of the rows than the values as simulated do.
-        held_out: error of rows that took no part; None where it was not asked for.
-        lacking: physics of the user's own that could not be asked, and why.
-        texts: of that which was asked, by name.
-        second_start: log odds of what a search that begins with nothing ends at, over what was found; zero where both are the
-            same.
-        cancelling: effects that cancel each other; None where they do not.
+        shares: largest first.
+        resembles: named forms of smooth curves, R² by finding.
+        levels: existence, variables and law of a difference.
+        is_worse_here: than simulated, on the rows.
+        held_out: None if not tested.
+        lacking: physics not tested, with reasons.
+        texts: of own physics.
+        second_start: log odds of a search from nothing; zero if equal.
+        cancelling: or None.
     """
 
     table: Table
@@ -129,32 +126,32 @@ class Mismatch:
 
     @property
     def there(self) -> tuple[CauseFinding, ...]:
-        """Findings of what is there, or happened once."""
+        """Return findings that are present or happened."""
         return tuple(one for one in self.findings if one.verdict in {Verdict.IDENTIFIED, Verdict.HAPPENED})
 
     @property
     def identified(self) -> tuple[CauseFinding, ...]:
-        """Findings of what is there and predicts other rows, where that was asked."""
+        """Return findings that are present and predict, if tested."""
         return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)
 
     @property
     def is_worse(self) -> bool:
-        """Whether held-out parts, or where none were asked for all rows, are predicted worse than by the values as simulated."""
+        """Return whether predictions are worse than simulated, on held-out parts if tested."""
         return self.is_worse_here if self.held_out is None else self.held_out.is_worse
 
     @property
     def is_there(self) -> bool:
-        """Whether measured and simulated values differ beyond noise and what base parameters take up."""
+        """Return whether a difference exceeds noise and base parameters."""
         return bool(self.settled.best.members) or not self.left.is_noise
 
     @property
     def offset(self) -> Value | None:
-        """Constant that lies between measured and simulated values; None where there may be none."""
+        """Return the constant difference, or None if not allowed."""
         return next((one.before for one in self.fitted if one.name == OFFSET), None)
 
     @property
     def offset_is_there(self) -> bool:
-        """Whether a constant lies between them that is none of chance."""
+        """Return whether the constant exceeds chance."""
         return self.offset is not None and abs(self.offset.value) >= OUT * self.offset.uncertainty
 
     @property
@@ -164,18 +161,18 @@ class Mismatch:
 
     @property
     def explained(self) -> NDArray[np.float64]:
-        """What was found, base parameters included, over all rows, shape (n,)."""
+        """Return findings with base parameters over all rows, shape (n,)."""
         return self.settled.predicted()
 
     @property
     def rms_before(self) -> float:
-        """Of the residual that base parameters leave, in the unit of the table."""
+        """Return the rms beyond base parameters, in the table's unit."""
         base = self.settled.channel.base.samples @ np.array([f.before.value for f in self.fitted])
         return _rms(self.settled.channel.residual - base)
 
     @property
     def rms_after(self) -> float:
-        """Of what everything found leaves."""
+        """Return the rms beyond all findings."""
         return _rms(self.settled.channel.residual - self.explained)
 
 
@@ -192,15 +189,14 @@ def find_mismatch(
     """Compare measured with simulated values.
 
     Args:
-        table: rows of all blocks.
-        sources: physics of the user's own that the table has the columns for.
-        hold_out: repeat everything for each held-out part; takes most of the time.
-        lacking: physics that could not be asked, and why.
-        matters: size of an effect that matters, in the unit of the table; None: what base parameters leave of the rows.
-        progress: called with what is being done, and how much of how much where that can be counted.
+        table: all blocks.
+        sources: own physics with its columns.
+        hold_out: repeat for each held-out part; takes most of the time.
+        lacking: physics not tested, with reasons.
+        matters: size of interest, in the table's unit; None: the refitted residual.
 
     Raises:
-        CalibrationError: the difference is so much larger than its noise that rounding hides what it follows.
+        CalibrationError: rounding hides what so large a difference follows.
     """
     try:
         with np.errstate(over="raise"):
@@ -251,10 +247,7 @@ def _found(
 
 
 def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progress: Callable[..., None]) -> HeldOutError:
-    """Held-out error; the reference is the values as simulated, and a constant where one may lie between.
-
-    What was chosen without each part is added to `chosen`.
-    """
+    """Return the held-out error against simulated values (and a constant); choices go to `chosen`."""
     residual = settled.channel.residual
     parts = iter(parts_of(settled.channel))
 
@@ -275,16 +268,13 @@ def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progres
 def choose_without(
     channel: Channel, rows: NDArray[np.bool_], *, beginning: Beginning = Beginning.EVERYTHING
 ) -> Settled:
-    """Repeat the whole selection without some rows, shape (n,), from one beginning of the noise.
-
-    It is searched less widely than all rows are, from one beginning, which can only make the error of its predictions larger.
-    """
+    """Repeat the selection without rows, shape (n,), less widely, which can only raise the error."""
     kept = channel.without(rows).thinned(FOLD_ROWS)
     return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,))
 
 
 def _second_start(settled: Settled, findings: Sequence[CauseFinding]) -> float:
-    """Log odds of another end of the search, zero where it is the same but for names that nothing here tells apart."""
+    """Return the log odds of another search's end; zero if equivalent."""
     classes = {name: finding.name for finding in findings for name in finding.equivalent}
     other = settled.second_start()
     same = {classes.get(name, name) for name in other.names} == {classes.get(n, n) for n in settled.best.names}
@@ -292,7 +282,7 @@ def _second_start(settled: Settled, findings: Sequence[CauseFinding]) -> float:
 
 
 def _shares(settled: Settled) -> tuple[Share, ...]:
-    """Variables by what of the explanation all that follows them brings alone."""
+    """Return variables by their own explanation."""
     comparison, best, patterns = settled.comparison, settled.best, settled.bank.patterns
     whole = comparison.explained(best.members) if best.members else 0.0
     found = []
@@ -312,7 +302,7 @@ def _shares(settled: Settled) -> tuple[Share, ...]:
 
 
 def _resembles(settled: Settled) -> dict[str, dict[str, float]]:
-    """Shares of curves that named forms of the same variable follow, alone and together."""
+    """Return named forms' shares of curves, alone and together."""
     found = {}
     for member in settled.best.members:
         pattern = settled.bank.patterns.get(member.cause.name)
@@ -340,7 +330,7 @@ def _followed(effect: NDArray[np.float64], columns: NDArray[np.float64]) -> floa
 
 
 def _cancelling(settled: Settled, unit: str) -> Cancelling | None:
-    """Effects and parameters larger than all together, where most of their squares cancel."""
+    """Return cancelling effects and parameters."""
     base = settled.channel.base
     parameters = zip(base.names, settled.base_values(), strict=True)
     of_base = {n: base.samples[:, k] * v for k, (n, v) in enumerate(parameters)}
@@ -348,7 +338,7 @@ def _cancelling(settled: Settled, unit: str) -> Cancelling | None:
 
 
 def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[RefittedParameter, ...]:
-    """Base parameters with the base alone, and beside everything that was found; uncertainties as `read_off` has them."""
+    """Return base parameters alone and beside findings, uncertainties as `read_off`."""
     channel, bank, members = settled.channel, settled.bank, settled.best.members
     noise, known, size = settled.noise.innovation, channel.known, channel.base.samples.shape[1]
     alone = channel.fitted(channel.target, _noise_alone(channel))
@@ -380,7 +370,7 @@ def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple
 
 
 def _noise_alone(channel: Channel) -> float:
-    """Standard deviation of white noise that leaves values of the base alone as uncertain as what it leaves does."""
+    """Return white noise of equal effect on the base alone."""
     left = channel.target - channel.base.samples[channel.kept] @ channel.refitted()
     runs = [left[rows] for rows in channel.stretches] if channel.time is not None else [left]
     found = noise_of(runs, channel.base.samples.shape[1])

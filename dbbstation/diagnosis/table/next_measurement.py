@@ -1,4 +1,4 @@
-"""What to measure next on a table: what would tell apart what these rows do not."""
+"""What to measure next on a table."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Next:
 
 @with_one_thread
 def next_measurements(found: Mismatch) -> tuple[Next, ...]:
-    """What would decide most, first."""
+    """Return proposals, the most decisive first."""
     return tuple(list(_suggested(found))[:MOST])
 
 
@@ -66,7 +66,7 @@ def _denser(found: Mismatch) -> Iterator[Next]:
 
 
 def _rest_of_turns(found: Mismatch) -> Iterator[Next]:
-    """Angles that what was found follows, and that did not turn all the way."""
+    """Return followed angles without full turns."""
     led = {name for finding in found.there for name in finding.variables}
     for variable in found.settled.channel.variables:
         if variable.name in led and variable.period is not None and variable.extent < WHOLE * variable.period:
@@ -94,7 +94,7 @@ ONE_WAY = 0.02
 
 
 def _apart(found: Mismatch) -> Iterator[Next]:
-    """Variables that move together, where what was found follows one of them."""
+    """Return variables that move with a followed one."""
     variables = [v for v in found.settled.channel.variables if v.name != found.table.simulated_name]
     led = {name for finding in found.findings if finding.verdict in LIKELY for name in finding.variables}
     values = np.array([v.scaled for v in variables])

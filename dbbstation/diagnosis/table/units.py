@@ -1,4 +1,4 @@
-"""Units and kinds of the columns of a table, guessed from their names or stated."""
+"""Units and kinds of columns, guessed or stated."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Meaning:
     """What a column is.
 
     Attributes:
-        unit: as printed; empty where none is known.
-        period: one turn of an angle, in its unit; None for all others.
-        driven: whether it results from what is simulated, as a motor's torque does from its motion.
+        unit: may be empty.
+        period: of an angle's turn, else None.
+        driven: results from the simulation, as a motor's torque.
     """
 
     unit: str
@@ -99,7 +99,7 @@ RATE_WORDS = 2
 
 
 def meaning_of(name: str) -> Meaning:
-    """Guess from a name: `travel_mm`, `t_s`, `oil_temp_c`, `temperature`, `angle_deg`; `PLAIN` where it says nothing."""
+    """Return the meaning of a name such as `travel_mm`, `t_s`, `oil_temp_c`, `angle_deg`; else `PLAIN`."""
     words = [word for word in _WORDS.split(name.lower()) if word]
     if (found := _unit_at_end(words)) is not None:
         return found
@@ -113,7 +113,7 @@ def meaning_of(name: str) -> Meaning:
 
 
 def _unit_at_end(words: list[str]) -> Meaning | None:
-    """What the last words of a name say, one word being the name itself; None where they are no unit."""
+    """Return the unit at a name's end, or None."""
     for count in (2, 1):
         found = UNITS.get("_".join(words[-count:]))
         if len(words) <= count or found is None:
@@ -126,7 +126,7 @@ def _unit_at_end(words: list[str]) -> Meaning | None:
 
 
 def stated_meaning(text: str) -> Meaning | None:
-    """Meaning of a unit or kind that somebody states, such as `deg`, `mm/s` or `time`; None where it is neither."""
+    """Return the meaning of a stated unit or kind, such as `deg` or `time`; or None."""
     word = text.strip().lower().replace("/", "_").replace(" ", "_").replace("°", "deg")
     if word in UNITS:
         return UNITS[word]

@@ -1,4 +1,4 @@
-"""Sentences about findings of a table, made from their typed values."""
+"""Sentences about findings of a table."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ MEANINGS: dict[Family, str] = {
 
 
 def sentence_of(found: Mismatch, finding: CauseFinding) -> str:
-    """Where an effect is, what its form may mean, and what it resembles; one or more sentences."""
+    """Return place, possible meaning and resemblance of an effect."""
     parts = [_where(found, finding)]
     if finding.family is not None:
         parts.append(MEANINGS[finding.family])

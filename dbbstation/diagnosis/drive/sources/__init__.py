@@ -1,1 +1,1 @@
-"""What a model of mass and viscous friction may leave out, one cause per file."""
+"""Causes beyond mass and viscous friction, one per file."""

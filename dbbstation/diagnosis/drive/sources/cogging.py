@@ -1,4 +1,4 @@
-"""Cause: a force that repeats along the travel."""
+"""A force that repeats along the travel."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Cogging(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Cosine and sine at each of the periods that a first look found; a drive may have several."""
+        """Return cosine and sine at the first look's periods."""
         size = 0.1 * scale.force_n
         cosine = DriveParameter("cosine_n", "N", size, "amplitude of the cosine, position zero is where it is greatest")
         sine = DriveParameter("sine_n", "N", size, "amplitude of the sine")

@@ -1,4 +1,4 @@
-"""Cause: a load that is there in both directions of travel."""
+"""A load in both directions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, Drive
 
 
 class ConstantLoad(DriveSource):
-    """A constant force: the share of a weight along the drive, or the zero of the force channel."""
+    """A constant force: a weight's share, or the channel's zero."""
 
     name = "constant-load"
     varies_with = "speed"
@@ -25,6 +25,6 @@ class ConstantLoad(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """One amplitude."""
+        """Return one amplitude."""
         size = DriveParameter("load_n", "N", 0.3 * scale.force_n, "force that the drive must add at every position")
         return (DriveForm((size,), lambda s, _: np.ones((len(s.t_s), 1))),)

@@ -1,4 +1,4 @@
-"""Cause: Coulomb friction."""
+"""Coulomb friction."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ COULOMB_SHARE = 0.5
 
 
 class CoulombFriction(DriveSource):
-    """A force against the direction of travel that does not depend on the speed: F = F_c sign(v)."""
+    """Friction independent of speed: F = F_c sign(v)."""
 
     name = "coulomb-friction"
     varies_with = "speed"
@@ -28,7 +28,7 @@ class CoulombFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """One amplitude."""
+        """Return one amplitude."""
         size = DriveParameter(
             "coulomb_n", "N", COULOMB_SHARE * scale.force_n, "force against the direction of travel", positive=True
         )

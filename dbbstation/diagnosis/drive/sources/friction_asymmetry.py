@@ -1,4 +1,4 @@
-"""Cause: friction that is not the same in both directions of travel."""
+"""Friction that differs by direction."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 class FrictionAsymmetry(DriveSource):
-    """Friction that differs by direction: in its Coulomb part by 2 A, in its viscous part by 2 B.
+    """Coulomb friction differs by 2 A, viscous by 2 B.
 
-    F = A + B |v|, beside F_c sign(v) + F_v v: forwards the friction is (F_c + A) + (F_v + B) v, backwards
-    (F_c - A) + (F_v - B) |v|. While the drive moves, A alone looks exactly like a constant load; B does not.
+    F = A + B |v|, beside F_c sign(v) + F_v v: forwards (F_c + A) + (F_v + B) v, backwards (F_c - A) + (F_v - B) |v|. In
+    motion A equals a constant load; B does not.
     """
 
     name = "friction-asymmetry"
@@ -37,7 +37,7 @@ class FrictionAsymmetry(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Coulomb part and viscous part; a drive may have both."""
+        """Return Coulomb and viscous part, which may coexist."""
         if not scale.both_ways:
             return ()
         dry = DriveParameter("coulomb_asymmetry_n", "N", 0.2 * scale.force_n, "half of forwards minus backwards")
@@ -53,5 +53,5 @@ class FrictionAsymmetry(DriveSource):
         )
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
-        """Friction takes energy out in both directions: beyond Coulomb friction it would be a load."""
+        """Return whether friction dissipates both ways."""
         return abs(values.get("coulomb_asymmetry_n", 0.0)) <= max(values.get("coulomb_n", 0.0), 0.0)

@@ -1,4 +1,4 @@
-"""Cause: friction that changes while the drive warms."""
+"""Friction that changes as the drive warms."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SHARES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 5.0)
 
 
 class FrictionDrift(DriveSource):
-    """Friction that goes to a new value over time: F = (C sign(v) or V v) g(t), g = 1 - exp(-t / tau) less its mean."""
+    """Friction drifts: F = (C sign(v) or V v) g(t), g = 1 - exp(-t / tau) less its mean."""
 
     name = "friction-drift"
     varies_with = "time by direction"
@@ -36,7 +36,7 @@ class FrictionDrift(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Coulomb or viscous part at several time constants."""
+        """Return Coulomb or viscous part at time constants."""
         dry = DriveParameter("coulomb_change_n", "N", 0.2 * scale.force_n, "change of Coulomb friction in the end")
         wet = DriveParameter(
             "viscous_change_n_s_m", "N·s/m", 0.2 * scale.force_n / scale.speed_m_s, "change of viscous friction"
@@ -50,7 +50,7 @@ class FrictionDrift(DriveSource):
 
 
 def _growth(signals: Signals, time_constant_s: float) -> NDArray[np.float64]:
-    """Share of the change that is done, normed to 1 at the end of the recording, less its mean, shape (n,)."""
+    """Return the drift normed to 1 at the end, less its mean, shape (n,)."""
     since = signals.t_s - signals.t_s[0]
     done = -np.expm1(-since / time_constant_s)
     return np.asarray(done / done[-1] - np.mean(done / done[-1]))

@@ -1,4 +1,4 @@
-"""Cause: play between the drive and what it moves."""
+"""Play between drive and load."""
 
 from __future__ import annotations
 
@@ -26,10 +26,9 @@ MOST_OF_COULOMB = 1.5
 
 
 class LostMotion(DriveSource):
-    """After a reversal the drive moves alone until play is taken up: F = -F_l sign(v) r(d).
+    """After a reversal the load is missing until play is taken up: F = -F_l sign(v) r(d).
 
-    The share r of the load that is not yet taken up is 1 over a travel g since the reversal and falls to 0 over a further
-    w. Beside Coulomb friction of the same size F_l this is friction that acts behind the play only.
+    r is 1 over a travel g and falls to 0 over w. With equal Coulomb friction, friction acts behind the play only.
     """
 
     name = "lost-motion"
@@ -47,7 +46,7 @@ class LostMotion(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """One amplitude, the play, and the way over which the load comes back."""
+        """Return amplitude, play, and way of return."""
         if not (scale.reverses and scale.both_ways):
             return ()
         size = DriveParameter(
@@ -59,7 +58,7 @@ class LostMotion(DriveSource):
         return (DriveForm((size,), _columns, (gap, rise), (gaps, RISES)),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
-        """Within the play the force falls to zero and not below: what is missing there is the Coulomb friction."""
+        """Return whether the missing force is at most Coulomb friction."""
         return values["lost_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)
 
 

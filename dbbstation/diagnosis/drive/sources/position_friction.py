@@ -1,4 +1,4 @@
-"""Cause: friction that depends on the place."""
+"""Friction that depends on place."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class PositionFriction(DriveSource):
-    """Coulomb friction that changes along the travel: F = sign(v) (p_1 s + p_2 s²), s from -1 to 1 over the travel."""
+    """Coulomb friction along the travel: F = sign(v) (p_1 s + p_2 s²), s from -1 to 1."""
 
     name = "position-friction"
     varies_with = "position by direction"
@@ -31,7 +31,7 @@ class PositionFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Slope and bow."""
+        """Return slope and bow."""
         size = 0.2 * scale.force_n
         slope = DriveParameter("slope_n", "N", size, "friction at the upper end of the travel less that in the middle")
         bow = DriveParameter("bow_n", "N", size, "friction at both ends of the travel less that in the middle")

@@ -1,4 +1,4 @@
-"""Cause: friction that grows faster than the speed."""
+"""Friction that grows faster than speed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ unnamed shapes."""
 
 
 class PowerLawFriction(DriveSource):
-    """Beside the viscous friction that is proportional to speed: F = F_p sign(v) (|v| / v_max)^a."""
+    """Beyond viscous friction: F = F_p sign(v) (|v| / v_max)^a."""
 
     name = "power-law-friction"
     varies_with = "speed"
@@ -35,7 +35,7 @@ class PowerLawFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """One amplitude at several powers."""
+        """Return one amplitude at powers."""
         size = DriveParameter(
             "at_greatest_speed_n", "N", 0.2 * scale.force_n, "friction at the greatest speed", positive=True
         )

@@ -1,4 +1,4 @@
-"""Cause: friction that builds up over a short travel after a reversal."""
+"""Friction that builds up after a reversal."""
 
 from __future__ import annotations
 
@@ -23,10 +23,9 @@ MOST_OF_COULOMB = 1.5
 
 
 class Presliding(DriveSource):
-    """After a reversal friction passes from one sign to the other over a travel: F = -2 F_p sign(v) exp(-d / d_0).
+    """Friction reverses over a travel: F = -2 F_p sign(v) exp(-d / d_0).
 
-    Beside Coulomb friction of the same size F_p this is the model of Dahl, F = F_c sign(v) (1 - 2 exp(-d / d_0)), with
-    d the travel since the reversal.
+    With Coulomb friction F_p it is Dahl's F = F_c sign(v) (1 - 2 exp(-d / d_0)), d since the reversal.
     """
 
     name = "presliding"
@@ -46,7 +45,7 @@ class Presliding(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """One amplitude at several lengths."""
+        """Return one amplitude at lengths."""
         if not scale.reverses:
             return ()
         size = DriveParameter(
@@ -58,7 +57,7 @@ class Presliding(DriveSource):
         return (DriveForm((size,), _columns, (length,), (tuple(1e3 * share * scale.travel_m for share in SHARES),)),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
-        """What turns round after a reversal is the Coulomb friction, as closely as either is known."""
+        """Return whether it equals Coulomb friction within uncertainty."""
         return values["presliding_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)
 
 

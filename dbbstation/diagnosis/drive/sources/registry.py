@@ -1,4 +1,4 @@
-"""All causes of force by name: one file each in this folder, found by looking, not by a list."""
+"""All causes of force by name, found in this folder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @cache
 def known_drive_sources() -> Mapping[str, DriveSource]:
-    """All causes of the package, sorted by name."""
+    """Return all causes, sorted by name."""
     return in_folders(DriveSource, sources)  # type: ignore[type-abstract]  # what derives from it is made
 
 
@@ -24,7 +24,7 @@ def drive_sources_named(names: Iterable[str]) -> tuple[DriveSource, ...]:
     """Causes by their names.
 
     Raises:
-        ModelError: a name that no cause has.
+        ModelError: an unknown name.
     """
     known = known_drive_sources()
     return tuple(looked_up(name, known, called="cause of force in a drive", error=ModelError) for name in names)

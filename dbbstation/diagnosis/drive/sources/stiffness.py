@@ -1,4 +1,4 @@
-"""Cause: a force that grows with position."""
+"""A force that grows with position."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, Drive
 
 
 class Stiffness(DriveSource):
-    """A spring: F = k (x - x_m), with x_m the mean position, so that a constant load is another cause."""
+    """A spring: F = k (x - x_m), x_m the mean position."""
 
     name = "stiffness"
     varies_with = "position"
@@ -22,7 +22,7 @@ class Stiffness(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """One amplitude."""
+        """Return one amplitude."""
         size = DriveParameter(
             "stiffness_n_mm",
             "N/mm",

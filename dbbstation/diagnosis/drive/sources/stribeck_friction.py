@@ -1,4 +1,4 @@
-"""Cause: friction that falls with growing speed near standstill."""
+"""Friction that falls with speed near standstill."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SHARES = (0.02, 0.04, 0.07, 0.1, 0.14, 0.2, 0.28)
 
 
 class StribeckFriction(DriveSource):
-    """Static friction above Coulomb friction that decays with speed: F = F_s sign(v) exp(-|v| / v_s)."""
+    """Static friction above Coulomb: F = F_s sign(v) exp(-|v| / v_s)."""
 
     name = "stribeck-friction"
     varies_with = "speed"
@@ -35,7 +35,7 @@ class StribeckFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """One amplitude at several Stribeck speeds."""
+        """Return one amplitude at Stribeck speeds."""
         size = DriveParameter(
             "static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction", positive=True
         )

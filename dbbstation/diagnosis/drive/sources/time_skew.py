@@ -1,4 +1,4 @@
-"""Cause: force and position that were not sampled at the same time."""
+"""Force and position of different times."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_SAMPLES = 5.0
 
 
 class ForceTimeSkew(DriveSource):
-    """A force channel that is late by d: F(t) = F_true(t - d), to first order F_true - d dF/dt."""
+    """A force late by d: F(t) = F_true(t - d), to first order F_true - d dF/dt."""
 
     name = "time-skew"
     varies_with = "rate of force"
@@ -37,12 +37,12 @@ class ForceTimeSkew(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """One amplitude."""
+        """Return one amplitude."""
         size = DriveParameter("delay_ms", "ms", 1e3 * scale.sample_s, "of the force; negative: it is early")
         return (DriveForm((size,), _columns),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:
-        """Channels of one logger are apart by a few of its samples; a longer delay is something else."""
+        """Return whether the delay is a few samples."""
         return abs(values.get("delay_ms", 0.0)) <= MOST_SAMPLES * 1e3 * scale.sample_s
 
 

@@ -1,4 +1,4 @@
-"""Cause: a force that comes and goes in time."""
+"""A force that comes and goes."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Scale, T
 
 
 class TransientForce(DriveSource):
-    """Pulses and steps in time: F = sum of a_k over t_k to t_k + d_k.
+    """Pulses and steps: F = sum of a_k over t_k to t_k + d_k.
 
-    Where and how long is not said beforehand: every stretch of time is looked at, and the best are taken in one beside the
-    other (`dbbstation/inference/stretches.py`). It therefore has no form of its own here.
+    The engine looks for stretches (`dbbstation/inference/stretches.py`), so it has no form.
     """
 
     name = "transient-force"
@@ -27,5 +26,5 @@ class TransientForce(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:  # noqa: ARG002
-        """None: stretches of time are looked for by the engine."""
+        """Return none."""
         return ()

@@ -44,7 +44,8 @@ def without_tests(explained: Explained) -> ChosenAnew | None:
 
     def choose(comparison: ModelComparison) -> Sequence[Member]:
         begin = [settled.best.members]
-        return search(comparison, settled.causes, begin, most_members=MOST_MEMBERS, likely=CLOSE).best.members
+        found = search(comparison, settled.causes, begin, most_members=MOST_MEMBERS, likely=CLOSE, thorough=False)
+        return found.best.members
 
     of_all = channel.beside_base(noise_mm, settled.scatter).comparison(target)
     return chosen_anew(of_all, of_others(), choose, lambda name: (name,), lambda cause: cause.named)

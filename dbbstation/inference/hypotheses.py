@@ -131,6 +131,8 @@ def search(
     most_expanded: int = MOST_EXPANDED,
     most_members: int | None = None,
     likely: float = LIKELY,
+    *,
+    thorough: bool = True,
 ) -> Posterior:
     """Posterior over sets of causes.
 
@@ -139,8 +141,9 @@ def search(
         most_expanded: sets whose neighbours are examined.
         most_members: None: unlimited.
         likely: log odds of examined sets below the best; `CLOSE` for the best alone.
+        thorough: also replace two members by one, and one by two.
     """
-    return _Search(comparison, causes, most_expanded, most_members, likely).run(seeds)
+    return _Search(comparison, causes, most_expanded, most_members, likely, thorough=thorough).run(seeds)
 
 
 class _Search:
@@ -151,8 +154,10 @@ class _Search:
         most_expanded: int,
         most_members: int | None,
         likely: float,
+        *,
+        thorough: bool,
     ) -> None:
-        self._comparison = comparison
+        self._comparison, self._thorough = comparison, thorough
         self._causes = {cause.name: cause for cause in causes}
         self._seen: dict[frozenset[str], Hypothesis] = {}
         self._scored: dict[frozenset[str], float] = {}
@@ -190,7 +195,7 @@ class _Search:
                 self._expand(best)
                 continue
             best = max(self._seen.values(), key=lambda h: h.log_posterior)
-            if best.names in challenged:
+            if best.names in challenged or not self._thorough:
                 break
             challenged.add(best.names)
             self._challenge(best)

@@ -73,7 +73,8 @@ def selection_frequency(
         drawn = every.without(reduce(add, out)) if out else every
         left = np.where(np.isin(group_of, [*kept]), target, 0.0)
         comparison = BesideBase(drawn, known, held, noise).comparison(left)
-        for name in search(comparison, causes, [begin], most_members=most_members, likely=CLOSE).best.names:
+        found = search(comparison, causes, [begin], most_members=most_members, likely=CLOSE, thorough=not begin)
+        for name in found.best.names:
             times[name] += 1
     return {name: count / DRAWS for name, count in times.items()}
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from dbbstation.inference.forms import (
-    Behind,
+    BehindReversal,
     Form,
     LinearSplines,
     Lobes,
@@ -367,7 +367,9 @@ def shapes(extent: Ranges) -> list[Shape]:
             for strut in range(1, STRUTS + 1)
         ]
         found += [
-            Shape("travel since its reversal", "", strut, EVERY, Behind(length_mm), tried=float(len(STICKING_MM)))
+            Shape(
+                "travel since its reversal", "", strut, EVERY, BehindReversal(length_mm), tried=float(len(STICKING_MM))
+            )
             for length_mm in STICKING_MM
             for strut in range(1, STRUTS + 1)
         ]

@@ -389,7 +389,7 @@ class Ringing(Form):
 
 
 @dataclass(frozen=True, eq=False)
-class Behind(Form):
+class BehindReversal(Form):
     """What stays behind when the direction turns: any curve of the way since then, which has the sign of the new direction.
 
     Straight between its points, nothing at the turn itself and from `length` on.

@@ -13,10 +13,13 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 from tests.plant.foreign.judge import commit_of, judge
 from tests.plant.foreign.score import as_table, scored
 from tests.plant.foreign.sessions import make
+
+LIMITS = "Each commit judged another number of sessions; the command goes on where it ended."
 
 
 def main() -> None:
@@ -27,6 +30,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=48, help="of everything")
     parser.add_argument("--count", type=int, default=60, help="sessions")
     parser.add_argument("--only", default="", help="sessions to run or score, in this order, as in 12,3,20-40")
+    parser.add_argument("--former", type=Path, help="score: an earlier score, for commits whose verdicts are gone")
+    parser.add_argument("--limits", default=LIMITS, help="score: what the stored table says of its limits")
     parser.add_argument("--out", type=Path, help="score: write the figures here as JSON, too")
     given = parser.parse_args()
     numbers = _numbers(given.only) or list(range(1, given.count + 1))
@@ -41,12 +46,15 @@ def main() -> None:
             verdict = judge(given.folder, checkout, commit, f"{number:04d}")
             sys.stderr.write(f"{commit} {number:04d} {verdict['processor_s']:.0f} s, {verdict['memory_mb']:.0f} MB\n")
     else:
-        figures = scored(given.folder, given.of, [f"{number:04d}" for number in numbers], given.seed)
-        text = json.dumps(figures, indent=1, ensure_ascii=False) + "\n"
-        sys.stdout.write(text)
+        figures = scored(given.folder, given.of, [f"{number:04d}" for number in numbers], given.seed, given.former)
+        sys.stdout.write(_text(figures))
         if given.out:
             given.out.parent.mkdir(parents=True, exist_ok=True)
-            given.out.write_text(json.dumps(as_table(figures), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+            given.out.write_text(_text(as_table(figures, given.limits)), encoding="utf-8")
+
+
+def _text(figures: dict[str, Any]) -> str:
+    return json.dumps(figures, indent=1, ensure_ascii=False) + "\n"
 
 
 def _numbers(text: str) -> list[int]:

@@ -19,35 +19,55 @@ SILENT = ("clean", "walk", "stick-slip")
 """Kinds of session in which nothing of the list is."""
 
 
-def scored(folder: Path, commits: Sequence[str], sessions: Sequence[str], seed: int) -> dict[str, Any]:
-    verdicts = {commit: _verdicts(folder / "verdicts" / commit, sessions) for commit in commits}
-    answers = {name: _read(folder / "answers" / f"{name}.json") for of in verdicts.values() for name in of}
-    shared = [name for name in sessions if all(name in of for of in verdicts.values())]
+def scored(
+    folder: Path, commits: Sequence[str], sessions: Sequence[str], seed: int, former: Path | None = None
+) -> dict[str, Any]:
+    """Score what each commit said; sessions of a former score stand in for verdicts that are gone."""
+    earlier = {} if former is None else _read(former)
+    if earlier and earlier["seed"] != seed:
+        raise ValueError(f"{former} is of seed {earlier['seed']}, not {seed}")
+    rows: dict[str, dict[str, Any]] = {}
+    for commit in commits:
+        kept = earlier.get("commits", {}).get(commit, {"each": {}})["each"]
+        rows[commit] = {name: kept[name] for name in sessions if name in kept}
+        for name, verdict in _verdicts(folder / "verdicts" / commit, sessions).items():
+            rows[commit][name] = compare(_read(folder / "answers" / f"{name}.json"), verdict)
+    shared = [name for name in sessions if all(name in of for of in rows.values())]
     return {
         "question": "Do causes whose laws are not the textbook's keep their names, beside what is on no list?",
         "command": "python -m tests.plant.foreign make|run|score FOLDER",
         "seed": seed,
         "date": datetime.now(UTC).date().isoformat(),
-        "commits": {commit: _figures(answers, of, sorted(of)) for commit, of in verdicts.items()},
-        "sessions_that_all_have": {commit: _figures(answers, of, shared) for commit, of in verdicts.items()},
+        "commits": {commit: _figures(of) for commit, of in rows.items()},
+        "sessions_that_all_have": {commit: _figures({k: of[k] for k in shared}) for commit, of in rows.items()},
     }
 
 
-def as_table(figures: Mapping[str, Any]) -> dict[str, Any]:
-    of = figures["commits"].values()
+def as_table(figures: Mapping[str, Any], limits: str) -> dict[str, Any]:
+    """The figures as the validation page takes them: a column a commit, over all its sessions and over those that all have."""
+    groups = {"": figures["commits"], ", same sessions": figures["sessions_that_all_have"]}
+    columns = {f"{commit}{which}": one for which, of in groups.items() for commit, one in of.items()}
+    of = [one for one in columns.values() if one["sessions"]]
     rows = {
         "sessions": [one["sessions"] for one in of],
         "without any answer": [len(one["without_answer"]) for one in of],
         "listed causes that were named": [f"{one['named_right']} of {one['listed']}" for one in of],
         "sessions with a wrong name": [len(one["wrong_names"]) for one in of],
+        "nothing listed is there, and nothing is named": [
+            f"{sum(int(text.split()[0]) for text in one['silent'].values())} of "
+            f"{sum(int(text.split()[-1]) for text in one['silent'].values())}"
+            for one in of
+        ],
         "values within 3u": [f"{one['values_within_3u']} of {one['values']}" for one in of],
+        "median residual with causes / µm": [round(one["residual_um_median"]["after"], 2) for one in of],
+        "median processor time / s": [round(one["processor_s"]["median"]) for one in of],
         "most processor time / s": [round(one["processor_s"]["most"]) for one in of],
         "most memory / MB": [one["memory_mb_most"] for one in of],
     }
     head = {key: figures[key] for key in ("question", "command", "date", "seed")}
     data = "Sessions of two simulated robots whose laws are not the program's own."
-    limits = "Each commit judged another number of sessions; the command goes on where it ended."
-    return {**head, "data": data, "limits": limits, "columns": list(figures["commits"]), "figures": rows}
+    names = [name for name, one in columns.items() if one["sessions"]]
+    return {**head, "data": data, "limits": limits, "columns": names, "figures": rows}
 
 
 def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,10 +115,7 @@ def _told(effect: Mapping[str, Any]) -> str:
     return f"{effect['name']} {effect['largest_amplitude']:.3g} {effect['unit']}" + (f" ({forms})" if forms else "")
 
 
-def _figures(
-    answers: Mapping[str, Mapping[str, Any]], verdicts: Mapping[str, Mapping[str, Any]], sessions: Sequence[str]
-) -> dict[str, Any]:
-    rows = {name: compare(answers[name], verdicts[name]) for name in sessions}
+def _figures(rows: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     causes = [row for row in rows.values() if row["kind"] not in SILENT]
     values = np.abs([z for row in rows.values() for z in row["values_u"].values()])
     seconds = [row["processor_s"] for row in rows.values()]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.errors import OutputError
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
-    from dbbstation.facts.value import Value
     from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.left_over import LeftOver
+    from dbbstation.inference.levels import Levels
     from dbbstation.inference.verdict import Gains
 
 SURELY_FOUND = ("identified", "happened", "does-not-predict")
@@ -20,12 +23,6 @@ LIKELY = 0.5
 
 MOST_NAMES = 6
 """Names that are printed in a row."""
-
-
-def with_uncertainty(number: Value) -> str:
-    """Return value, standard uncertainty and unit for people."""
-    known = f"{number.value:.4g} ± {number.uncertainty:.2g}" if number.is_known else f"{number.value:.4g}"
-    return f"{known} {number.unit}".rstrip()
 
 
 def first_names(names: Sequence[str]) -> str:
@@ -56,3 +53,18 @@ def residual_text(left: LeftOver, unit: str) -> str:
         return "Nothing is left beyond noise."
     where = f", {left.worst.where}" if left.worst.where else ""
     return f"Something is left beyond noise: {left.worst.name}{where}, {left.worst.rms:.2g} {unit}."
+
+
+def not_written(out: Path, levels: Levels) -> OutputError:
+    """Refuse to write a correction that is worse than none.
+
+    Args:
+        out: file that was asked for.
+        levels: say why.
+    """
+    from dbbstation.results.levels_text import no_correction
+
+    return OutputError(f"not written. {no_correction(levels)}", where=str(out), remedy=MEND)
+
+
+MEND = "free or state the parameters that hide the difference, or record more runs"

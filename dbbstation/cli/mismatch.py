@@ -13,9 +13,9 @@ from dbbstation.cli.effects import (
     SURELY_FOUND,
     cancelling_text,
     first_names,
+    not_written,
     parts_with_gain,
     residual_text,
-    with_uncertainty,
 )
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.number_options import number_language, number_options
@@ -203,7 +203,8 @@ def mismatch(
             progress=progress,
             say=lambda text: say(f"note: {text}"),
         )
-    if out is not None:
+    offered = result.levels.correction is not False
+    if out is not None and offered:
         write_table(out, table_csv(list(result.table), list(result.table.values())), provenance(), force=force)
         result = replace(result, out=str(out))
     if figure is not None and result.drawing is not None:
@@ -213,6 +214,8 @@ def mismatch(
         print_result(result)
     else:
         _print(result)
+    if out is not None and not offered:
+        raise not_written(out, result.levels)
 
 
 def _refuse_mixed(simulator: Path | None, of_tables: Mapping[str, object], of_simulators: Mapping[str, object]) -> None:
@@ -227,15 +230,10 @@ def _refuse_mixed(simulator: Path | None, of_tables: Mapping[str, object], of_si
 
 def _print(result: MismatchResult) -> None:
     from dbbstation.cli.output import print_table
-    from dbbstation.report.levels_text import level_sentences
 
     unit, held_out = result.unit, result.held_out_rms
-    if held_out and held_out.worse:
-        echo(
-            f"Held-out rows are predicted worse than as simulated: {held_out.after:.3g} corrected, {held_out.as_simulated:.3g} "
-            f"{unit} rms as simulated. Nothing is identified.\n".replace("  ", " ")
-        )
-    echo("\n".join((*level_sentences(result.levels, unit), "")))
+    _print_first(result)
+    echo("\n".join((*result.sentences(), "")))
     print_table(
         ["variable", "kind", "unit", "from", "to"],
         [[v.name, v.kind, v.unit or "none", f"{v.low:.5g}", f"{v.high:.5g}"] for v in result.variables],
@@ -273,14 +271,24 @@ def _print(result: MismatchResult) -> None:
             echo(f"  {step.text}")
 
 
+def _print_first(result: MismatchResult) -> None:
+    """What is wrong with the answer as a whole."""
+    unit, held_out = result.unit, result.held_out_rms
+    if held_out and held_out.worse:
+        echo(
+            f"Held-out rows are predicted worse than as simulated: {held_out.after:.3g} corrected, {held_out.as_simulated:.3g} "
+            f"{unit} rms as simulated.\n".replace("  ", " ")
+        )
+    if result.stopped:
+        echo(f"Ended early: {result.stopped}. This is the best answer so far; fewer columns (--variables) take less.\n")
+
+
 def _print_whether(result: MismatchResult) -> None:
     """Print existence, size, noise and leading variable of a mismatch."""
     unit, noise, rms = result.unit, result.noise, result.residual_rms
     offset = result.offset
     if offset and offset.significant:
-        echo(
-            f"Measured less simulated is {with_uncertainty(offset)} on average; this is fitted and is not counted below."
-        )
+        echo(f"Measured less simulated is {offset.in_words} on average; this is fitted and is not counted below.")
     if not result.mismatch:
         echo(f"No mismatch: what differs, {rms.before:.3g} {unit} rms, is noise.".replace("  ", " "))
     else:
@@ -327,7 +335,7 @@ def _print_findings(there: Sequence[EffectResult], unit: str) -> None:
         if f.verdict == "ambiguous" and len(there) > MOST_TOLD:
             continue
         echo(f"\n{f.name}")
-        values = ", ".join(f"{name} {with_uncertainty(value)}" for name, value in f.values.items())
+        values = ", ".join(f"{name} {value.in_words}" for name, value in f.values.items())
         if values and len(f.values) <= MOST_VALUES:
             echo(f"  {values}")
         echo(f"  {f.text}")
@@ -346,7 +354,7 @@ def _print_parameters(result: MismatchResult) -> None:
         return
     echo("\nparameters of the simulation, fitted anew:")
     for p in parameters:
-        before, after = with_uncertainty(p.before), with_uncertainty(p.after)
+        before, after = p.before.in_words, p.after.in_words
         echo(f"  {p.name}: {before} alone, {after} beside what was found; R² {p.confounded:.2f} with it")
         if p.far:
             echo(f"    {TOO_FAR_STATED if p.stated else TOO_FAR}")

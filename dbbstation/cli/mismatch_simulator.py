@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dbbstation.cli.effects import LIKELY, SURELY_FOUND, first_names, parts_with_gain, residual_text, with_uncertainty
+from dbbstation.cli.effects import LIKELY, SURELY_FOUND, first_names, not_written, parts_with_gain, residual_text
 from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
@@ -36,14 +36,12 @@ def mismatch_with_simulator(
     """Compare a simulator with recordings; print and write the results."""
     from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import stage_bar
-    from dbbstation.cli.provenance import provenance
     from dbbstation.diagnosis.simulator.answer import find
     from dbbstation.diagnosis.simulator.model import SimulationRequest
-    from dbbstation.files.atomic import refuse_existing, write_bytes, write_text
-    from dbbstation.files.provenance import refuse_existing_table, write_table
+    from dbbstation.files.atomic import refuse_existing
+    from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.results.of_simulator import simulator_result
     from dbbstation.results.simulator import SimulationsRun
-    from dbbstation.simulators.code import missing_code
     from dbbstation.simulators.loading import load_simulator
     from dbbstation.simulators.running import MOST_SECONDS, Runs
 
@@ -72,6 +70,31 @@ def mismatch_with_simulator(
 
             answer = find(model, runs, own=loaded.own, hold_out=hold_out, matters=matters, progress=told)
         result = simulator_result(answer, SimulationsRun(runs.ran, runs.most, one_s, runs.found))
+    offered = result.levels.correction is not False
+    result = _written(answer, result, out if offered else None, corrected, figure, force=force)
+    if as_json:
+        print_result(result)
+    else:
+        _print(result)
+    if out is not None and not offered:
+        raise not_written(out, result.levels)
+
+
+def _written(
+    answer: SimulatorComparison,
+    result: SimulatorResult,
+    out: Path | None,
+    corrected: Path | None,
+    figure: Path | None,
+    *,
+    force: bool,
+) -> SimulatorResult:
+    """Write what is asked for, and return the result with the names of the files."""
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.files.atomic import write_bytes, write_text
+    from dbbstation.files.provenance import write_table
+    from dbbstation.simulators.code import missing_code
+
     if out is not None:
         write_text(out, missing_code(answer), force=force)
         result = replace(result, out=str(out))
@@ -84,10 +107,7 @@ def mismatch_with_simulator(
 
         write_bytes(figure, simulator_figure(answer, format_of(figure)), force=force)
         result = replace(result, figure=str(figure))
-    if as_json:
-        print_result(result)
-    else:
-        _print(result)
+    return result
 
 
 STAGES = {"refit": 0, "look": 5, "sets of causes": 10, "held-out part": 40}
@@ -147,17 +167,15 @@ def _print(result: SimulatorResult) -> None:
 
 
 def _print_whether(result: SimulatorResult) -> None:
-    from dbbstation.report.levels_text import level_sentences
-
     unit, rms, held_out = result.unit, result.rms, result.held_out_rms
     if held_out and held_out.worse:
         echo(
             f"Held-out parts are predicted worse than as simulated: {held_out.corrected:.3g} corrected, "
-            f"{held_out.as_simulated:.3g} {unit} rms as simulated. Nothing is identified.\n".replace("  ", " ")
+            f"{held_out.as_simulated:.3g} {unit} rms as simulated.\n".replace("  ", " ")
         )
     if result.stopped:
         echo(f"Ended early: {result.stopped}. Allow more with --most-runs.\n")
-    echo("\n".join((*level_sentences(result.levels, unit), "")))
+    echo("\n".join((*result.sentences(), "")))
     if result.mismatch:
         echo(
             f"There is a mismatch: {rms.as_simulated:.3g} {unit} rms as simulated, {rms.refitted:.3g} refitted, "
@@ -210,7 +228,7 @@ def _print_findings(there: Sequence[PortTerm]) -> None:
     print_table(["term", "verdict", "probability", "log Bayes factor", "concealed", "parts with a gain"], rows)
     for f in there:
         echo(f"\n{f.name}" + (f" ({f.about})" if f.about else ""))
-        values = ", ".join(f"{name} {with_uncertainty(value)}" for name, value in f.values.items())
+        values = ", ".join(f"{name} {value.in_words}" for name, value in f.values.items())
         if values and len(f.values) <= MOST_VALUES:
             echo(f"  {values}")
         if f.text:
@@ -227,8 +245,8 @@ def _print_parameters(parameters: Sequence[SimulatorParameterResult]) -> None:
         [
             p.name,
             f"{p.stated:.4g}",
-            with_uncertainty(replace(p.refitted, unit="")),
-            with_uncertainty(replace(p.corrected, unit="")),
+            replace(p.refitted, unit="").in_words,
+            replace(p.corrected, unit="").in_words,
             p.unit,
             f"{100.0 * p.confounded:.0f} %",
         ]

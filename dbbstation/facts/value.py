@@ -34,6 +34,12 @@ class Value:
         """Whether its uncertainty is known."""
         return math.isfinite(self.uncertainty)
 
+    @property
+    def in_words(self) -> str:
+        """Value with its standard uncertainty and unit, as people read it."""
+        known = f"{self.value:.4g} ± {self.uncertainty:.2g}" if self.is_known else f"{self.value:.4g}"
+        return f"{known} {self.unit}".rstrip()
+
     def at_least(self, uncertainty: float) -> Value:
         """Return it with at least this standard uncertainty; nan changes nothing."""
         return replace(self, uncertainty=uncertainty) if uncertainty > self.uncertainty else self

@@ -87,6 +87,7 @@ class Law:
         family: of patterns; None for a client's physics.
         variables: followed, within a family.
         followed: names that are no variables, such as port signals.
+        driven: those that result from the simulation.
         way: `direction` or `late` outside families; empty: by value.
         acts_once: no other rows can show it.
     """
@@ -108,6 +109,7 @@ class Law:
     family: Family | None = None
     variables: tuple[Variable, ...] = ()
     followed: tuple[str, ...] = ()
+    driven: frozenset[str] = frozenset()
     way: str = ""
     acts_once: bool = False
 

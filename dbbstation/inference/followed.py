@@ -39,8 +39,9 @@ INTERCHANGEABLE = 0.9
 than a third of the effect. How much depends on it was not measured."""
 
 WAYS = {
-    **dict.fromkeys((Family.HYSTERESIS, Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION), "direction"),
-    **dict.fromkeys((Family.SPEED, Family.LAG, Family.MEMORY, Family.DEAD_TIME), "late"),
+    **dict.fromkeys((Family.HYSTERESIS, Family.FRICTION, Family.SCALED), "direction"),
+    **dict.fromkeys((Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION), "direction"),
+    **dict.fromkeys((Family.SPEED, Family.LAG, Family.MEMORY, Family.DEAD_TIME, Family.INTEGRAL), "late"),
     **dict.fromkeys((Family.DRIFT, *IN_TIME), "in_time"),
 }
 VALUE = "value"
@@ -194,9 +195,7 @@ def interchangeable(
     settled: Settled, members: Collection[str], follow: Callable[[str], frozenset[str]]
 ) -> tuple[str, ...]:
     """Return variables over which one immediate cause can replace members."""
-    comparison, best, bank = settled.comparison, settled.best, settled.bank
-    columns, values = _columns_and_values(settled, members)
-    others = [m for m in best.members if m.cause.name not in members]
+    best, bank = settled.best, settled.bank
     own = frozenset[str]().union(*(follow(name) for name in members))
     found: set[str] = set()
     for cause in settled.causes:
@@ -205,26 +204,37 @@ def interchangeable(
         picked = pattern is not None and pattern.family in LOOKED_FOR
         if cause.name in best.names or len(over) != 1 or over & own or picked or way_of(bank, cause.name) != VALUE:
             continue
-        variant = max(cause.variants, key=lambda one: len(one.columns))
-        products = comparison.beside(others, np.concatenate([columns, variant.columns]))
-        if _share_made(products, values) >= INTERCHANGEABLE:
+        if share_of(settled, members, cause) >= INTERCHANGEABLE:
             found |= over
     return tuple(sorted(found))
 
 
-def _columns_and_values(settled: Settled, members: Collection[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    every, first = settled.comparison.estimates(settled.best.members).values, 0
-    columns, values = [], []
-    for member in settled.best.members:
-        if member.cause.name in members:
-            columns.append(member.columns)
-            values.append(every[first : first + len(member.columns)])
-        first += len(member.columns)
-    return np.concatenate(columns), np.concatenate(values)
+def share_of(settled: Settled, members: Collection[str], cause: Cause) -> float:
+    """Share of the squares of what members do that a cause can make, beside base and the other members: its best form."""
+    columns, values, _ = estimated(settled, members)
+    others = [m for m in settled.best.members if m.cause.name not in members]
+    most = max(len(one.columns) for one in cause.variants)
+    made = (
+        share_made(settled.comparison.beside(others, np.concatenate([columns, one.columns])), values)
+        for one in cause.variants
+        if len(one.columns) == most
+    )
+    return max(made)
 
 
-def _share_made(products: NDArray[np.float64], values: NDArray[np.float64]) -> float:
-    """Return the reproducible share of an effect's squares."""
+def estimated(
+    settled: Settled, names: Collection[str]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Columns of some members, with their values, shape (p,), and the covariance of these."""
+    members = settled.best.members
+    every = settled.comparison.estimates(members)
+    inside = np.concatenate([np.full(len(m.columns), m.cause.name in names) for m in members])
+    columns = np.concatenate([m.columns for m in members])[inside]
+    return columns, every.values[inside], every.covariance[np.ix_(inside, inside)]
+
+
+def share_made(products: NDArray[np.float64], values: NDArray[np.float64]) -> float:
+    """Share of the squares of an effect, of the first columns with these values, that the other columns make."""
     p = len(values)
     whole = float(values @ products[:p, :p] @ values)
     axes_of = np.linalg.pinv(products[p:, p:], rcond=1e-9, hermitian=True)

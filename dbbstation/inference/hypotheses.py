@@ -38,10 +38,6 @@ than all that the best one leads to. With 1, 3 and 8 ten groups of tests of the 
 MOST_EXPANDED = 40
 """Hypotheses whose neighbours are looked at, at the most."""
 
-MOST_REPLACED = 28
-"""Pairs of members in the place of which one cause is tried, at the most: all pairs of eight members, which is as many as sessions have
-that the list explains. Of more members those pairs are taken that are worth least: what is worth much, another cause seldom does as well."""
-
 SWEEPS = 2
 """Times that every member is given the variant and size that suit it best beside the others."""
 
@@ -54,6 +50,31 @@ MOST_SCORES = 20_000
 
 MANY = 6
 """Members from which on their sizes are settled all at once where each has one form only: one inversion for all of them."""
+
+
+MOST_REPLACED = 28
+"""Pairs of members in the place of which one cause is tried, at the most: all pairs of eight members, which is as many as sessions have
+that the list explains. Of more members those pairs are taken that are worth least: what is worth much, another cause seldom does as well."""
+
+
+@dataclass(eq=False)
+class SearchWork:
+    """What a search may still do: sets that are looked at, each counted by its causes times their columns.
+
+    Attributes:
+        left: so many of these products.
+    """
+
+    left: float = np.inf
+
+    def spend(self, members: Sequence[Member]) -> None:
+        """Count one set."""
+        self.left -= len(members) * sum(len(member.columns) for member in members)
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether no set is looked at any more."""
+        return self.left <= 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +154,7 @@ def search(
     likely: float = LIKELY,
     *,
     thorough: bool = True,
+    work: SearchWork | None = None,
 ) -> Posterior:
     """Posterior over sets of causes.
 
@@ -142,8 +164,10 @@ def search(
         most_members: None: unlimited.
         likely: log odds of examined sets below the best; `CLOSE` for the best alone.
         thorough: also replace two members by one, and one by two.
+        work: limit of counted work; at the limit the best so far is returned. None: unlimited.
     """
-    return _Search(comparison, causes, most_expanded, most_members, likely, thorough=thorough).run(seeds)
+    limit = work or SearchWork()
+    return _Search(comparison, causes, most_expanded, most_members, likely, limit, thorough=thorough).run(seeds)
 
 
 class _Search:
@@ -154,6 +178,7 @@ class _Search:
         most_expanded: int,
         most_members: int | None,
         likely: float,
+        work: SearchWork,
         *,
         thorough: bool,
     ) -> None:
@@ -161,7 +186,7 @@ class _Search:
         self._causes = {cause.name: cause for cause in causes}
         self._seen: dict[frozenset[str], Hypothesis] = {}
         self._scored: dict[frozenset[str], float] = {}
-        self._most, self._likely = most_expanded, likely
+        self._most, self._likely, self._work = most_expanded, likely, work
         self._most_members = np.inf if most_members is None else most_members
         self._beyond = -np.inf  # log posterior of the most probable set that is too large
         self._room = MOST_SCORES
@@ -183,7 +208,7 @@ class _Search:
         self._pairs((), self._comparison.scan((), self._causes.values()))
         expanded: set[frozenset[str]] = set()
         challenged: set[frozenset[str]] = set()
-        while len(expanded) < self._most:
+        while len(expanded) < self._most and not self._work.is_spent:
             waiting = [
                 h
                 for key, h in self._seen.items()
@@ -301,8 +326,9 @@ class _Search:
     def _look_at(self, members: Sequence[Member]) -> None:
         """Settle and keep a set; examine it without unworthy members."""
         key = frozenset(member.cause.name for member in members)
-        if key in self._seen or len(key) > self._most_members:
+        if key in self._seen or len(key) > self._most_members or (self._seen and self._work.is_spent):
             return
+        self._work.spend(members)
         found = self._settled(list(members))
         self._seen[key] = found
         self._top = max(self._top, found.log_posterior)

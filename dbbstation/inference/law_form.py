@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,11 +11,11 @@ import numpy as np
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bank import LOOKED_FOR
 from dbbstation.inference.followed import followed_by
-from dbbstation.inference.levels import LawForm, ScoredLaw
+from dbbstation.inference.levels import JOINED, LawForm, ScoredLaw
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
@@ -27,48 +29,96 @@ MOST_CANDIDATES = 12
 SURELY = float(np.log(SURE / ABSENT))
 
 
-def law_form(settled: Settled, one: VariableClass, parts: Sequence[NDArray[np.bool_]]) -> LawForm:
-    """Score single causes over a class's variables, and the best set's sum, in its place.
+def law_form(settled: Settled, one: VariableClass, parts: Sequence[NDArray[np.bool_]] | None) -> LawForm:
+    """Score single causes over the variables of a class, and the best set's own sum, in the place of what follows it.
 
-    A part's score is the log evidence of all rows less that without it. A law is named if it beats each rival surely,
-    without its best part.
+    The score of a part is the log evidence of all rows less that of the rows without the part, in the noise of all rows. A law is named
+    where it beats each other candidate, and nothing, by the odds at which something is sure, without its best part. Where a sum of several
+    is best, each of these is asked in its own place, beside the others.
+
+    A candidate that contains the law, as a curve contains a straight line, predicts parts about as well, and is no rival of the simpler
+    one. Unless the evidence of all rows refutes it, which counts what more amplitudes cost, it is listed beside the name.
+
+    Args:
+        settled: what the comparison came to.
+        one: the class.
+        parts: rows of each part, shape (n,); None: nothing was held back, and the evidence of all rows decides.
     """
-    others = [m for m in settled.best.members if m.cause.name not in one.members]
-    taken = {m.cause.name for m in others}
-    rivals = [c for c in settled.causes if followed_by(settled.bank, c.name) & one.wanted and c.name not in taken]
-    scan = settled.comparison.scan(others, rivals)
-    worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
-    candidates: dict[str, tuple[Member, ...]] = {}
-    for k in np.argsort(-worth)[:MOST_CANDIDATES]:
-        candidates[scan.causes[k].name] = (scan.best[k],)
-    for member in settled.best.members:
-        if member.cause.name in one.members and (len(one.members) == 1 or member.cause.name in candidates):
-            candidates[member.cause.name] = (member,)
-    if len(one.members) > 1:
-        candidates[" + ".join(sorted(one.members))] = settled.best.without(*taken)
-    scores = _scores(settled, candidates, others, parts)
+    whole = _place(settled, one.members, one.wanted, parts)
+    if whole.name is not None or len(one.members) == 1:
+        return whole
+    each = {name: _place(settled, {name}, one.wanted, parts) for name in sorted(one.members)}
+    return replace(whole, together=tuple(name for name, form in each.items() if form.name == name))
+
+
+def _place(
+    settled: Settled, names: Collection[str], wanted: Collection[str], parts: Sequence[NDArray[np.bool_]] | None
+) -> LawForm:
+    """Law in the place of some members, the others kept."""
+    others = _sure(settled, names)
+    candidates, worth = _candidates(settled, names, wanted, others)
+    scores = (
+        _scores(settled, candidates, others, parts) if parts else {name: np.array([w]) for name, w in worth.items()}
+    )
     totals = {name: float(np.sum(score)) for name, score in scores.items()}
-    best = max(totals, key=lambda name: totals[name])
     order = sorted(totals, key=lambda name: -totals[name])
-    not_worse = [name for name in order if name != best and not _is_worse(scores[best], scores[name])]
-    same = [
-        n
-        for n in not_worse
-        if " + " not in n and _cosine(settled, candidates[best], candidates[n], others) > EQUIVALENT
-    ]
+    alive = [name for name in order if not _is_worse(scores[order[0]], scores[name], parts)]
+    best = max(alive, key=lambda name: worth[name])
+    not_worse, same = [], []
+    for name in order:
+        if name == best or _is_worse(scores[best], scores[name], parts):
+            continue
+        if not _contains(settled, candidates[name], candidates[best], others):
+            not_worse.append(name)
+        elif worth[best] - worth[name] < SURELY or _contains(settled, candidates[best], candidates[name], others):
+            same.append(name)
     pattern = settled.bank.patterns.get(best)
     picked = pattern is not None and pattern.family in LOOKED_FOR
-    named = len(candidates[best]) == 1 and not picked and totals[best] > 0.0 and set(same) == set(not_worse)
+    single = len(candidates[best]) == 1 and not picked
+    named = single and not not_worse and _is_worse(scores[best], np.zeros(len(scores[best])), parts)
     return LawForm(
         best if named else None,
-        tuple(not_worse if named else [best, *not_worse]),
+        tuple(same if named else [best, *(n for n in order if n in same or n in not_worse)]),
         tuple(ScoredLaw(n, totals[n]) for n in order),
     )
 
 
-def _is_worse(best: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+def _sure(settled: Settled, names: Collection[str]) -> tuple[Member, ...]:
+    """Members but for some that are sure: another is as good as absent, and must not stand for what is asked about."""
+    best = settled.best
+    return tuple(m for m in best.without(*names) if best.log_factor(m.cause.name) + m.cause.log_prior_odds >= SURELY)
+
+
+def _candidates(
+    settled: Settled, names: Collection[str], wanted: Collection[str], others: Sequence[Member]
+) -> tuple[dict[str, tuple[Member, ...]], dict[str, float]]:
+    """What may stand in the place of some members, by name, and what each is worth: log evidence of all rows with its prior odds."""
+    comparison, taken = settled.comparison, {m.cause.name for m in others}
+    rivals = [c for c in settled.causes if followed_by(settled.bank, c.name) & set(wanted) and c.name not in taken]
+    scan = comparison.scan(others, rivals)
+    worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
+    best = {scan.causes[k].name: k for k in np.argsort(-worth)[:MOST_CANDIDATES].tolist()}
+    best |= {scan.causes[k].name: k for k in range(len(worth)) if len(names) == 1 and scan.causes[k].name in names}
+    found: dict[str, tuple[Member, ...]] = {name: (scan.best[k],) for name, k in best.items()}
+    # A set that was compared has what its formulas may be off by in it.
+    weights, beside = settled.posterior.weights, frozenset(taken)
+    values = {name: weights.get(beside | {name}, np.inf) - weights.get(beside, -np.inf) for name in best}
+    values = {name: value if np.isfinite(value) else float(worth[best[name]]) for name, value in values.items()}
+    own = tuple(m for m in settled.best.members if m.cause.name in names)
+    if len(own) == 1:
+        found[own[0].cause.name] = own
+    else:
+        name = JOINED.join(sorted(names))
+        found[name] = own
+        odds = sum(m.cause.log_prior_odds + m.variant.log_weight for m in own)
+        values[name] = comparison.log_evidence((*own, *others)) - comparison.log_evidence(others) + odds
+    return found, values
+
+
+def _is_worse(best: NDArray[np.float64], other: NDArray[np.float64], parts: Sequence[NDArray[np.bool_]] | None) -> bool:
+    """Whether parts but the one that speaks most for the best, or all rows where none were held back, prefer it for sure."""
     apart = best - other
-    return float(apart.sum() - max(apart.max(), 0.0)) >= SURELY
+    return float(apart.sum() - (max(apart.max(), 0.0) if parts else 0.0)) >= SURELY
 
 
 def _scores(
@@ -93,13 +143,24 @@ def _scores(
     return {name: np.array(score) for name, score in found.items()}
 
 
-def _cosine(settled: Settled, one: Sequence[Member], other: Sequence[Member], others: Sequence[Member]) -> float:
-    """Return the least cosine between two causes' spans; zero for unequal sizes."""
-    a, b = one[0].variant.columns, other[0].variant.columns
-    if len(one) > 1 or len(other) > 1 or len(a) != len(b):
-        return 0.0
-    products = settled.comparison.beside(others, np.concatenate([a, b]))
-    size = len(a)
-    own, across, theirs = products[:size, :size], products[:size, size:], products[size:, size:]
-    squares = np.linalg.pinv(own, hermitian=True) @ across @ np.linalg.pinv(theirs, hermitian=True) @ across.T
-    return float(np.sqrt(np.clip(np.linalg.eigvals(squares).real.min(), 0.0, 1.0)))
+def _contains(settled: Settled, one: Sequence[Member], other: Sequence[Member], others: Sequence[Member]) -> bool:
+    """Whether some members, a single law also at the ends of its grids, make what other members do in the same place."""
+    bank = settled.bank
+    own = np.concatenate([m.columns for m in other])
+    effect = bank.fitted(own) @ settled.comparison.estimates([*other, *others]).values[: len(own)]
+    beside = np.hstack([bank.base, *(bank.fitted(m.columns) for m in others)])
+    forms = [np.hstack([bank.fitted(m.columns) for m in one])]
+    law = bank.laws.get(one[0].cause.name) if len(one) == 1 else None
+    if law is not None and law.grids:
+        forms += [bank.whitened(law.columns(point)) for point in product(*((grid[0], grid[-1]) for grid in law.grids))]
+    left = float(np.sum(np.square(_left(effect, beside))))
+    return any(
+        float(np.sum(np.square(_left(effect, np.hstack([beside, form]))))) <= (1.0 - EQUIVALENT**2) * left
+        for form in forms
+    )
+
+
+def _left(effect: NDArray[np.float64], by: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What columns, shape (m, p), leave of an effect, shape (m,)."""
+    scaled = by / np.maximum(np.linalg.norm(by, axis=0), 1e-300)
+    return np.asarray(effect - scaled @ np.linalg.lstsq(scaled, effect, rcond=None)[0])

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from dbbstation.facts.value import Value  # noqa: TC001 - types of fields are read when results are written
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
 TIME, RUN = "time", "run"
 """What is followed by what acts in single rows or over the clock, and by offsets of runs."""
+
+JOINED = " + "
+"""Between the names of a sum of laws."""
 
 
 class Differs(StrEnum):
@@ -94,11 +98,18 @@ class LawForm:
         name: None if open.
         not_worse: causes as good as it or the best, with equivalents.
         scored: best first.
+        together: laws each named in its own place, if a sum is best.
     """
 
     name: str | None
     not_worse: tuple[str, ...]
     scored: tuple[ScoredLaw, ...]
+    together: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all laws that are named."""
+        return self.together if self.name is None else (self.name,)
 
 
 @dataclass(frozen=True)
@@ -114,7 +125,10 @@ class Followed:
         before: held-out error without them; None if not tested.
         gain: held-out log density with less without; None if not tested.
         consequence: the variable results from the simulation, as stated, and is no cause.
+        may_result: the variable carries the difference itself: cause or consequence.
         form: None if not followed, or time.
+        slope: of the straight line through the members' sum over the first variable; None for times and angles.
+        straight: share of the squares that this line makes.
     """
 
     variables: tuple[tuple[str, ...], ...]
@@ -130,7 +144,15 @@ class Followed:
     gain_without_best: float | None = None
     parts_with_gain: float | None = None
     consequence: bool = False
+    may_result: bool = False
     form: LawForm | None = None
+    slope: Value | None = None
+    straight: float = 0.0
+
+    @property
+    def in_time(self) -> bool:
+        """Whether it is the time, or the run, alone: other rows cannot show it again."""
+        return set[str]().union(*self.variables) <= {TIME, RUN}
 
     @property
     def name(self) -> str:
@@ -143,8 +165,9 @@ class Levels:
     """The answer.
 
     Attributes:
-        follows: with level 3, most probable first.
-        correction: whether the fitted sum predicts better than as simulated; None if nothing was found or tested.
+        follows: with level 3, most probable first; consequences last.
+        correction: whether the fitted sum predicts better than as simulated; False if untested and worse on all rows; None if nothing was
+            found, or nothing was tested.
     """
 
     differs: DifferenceFound

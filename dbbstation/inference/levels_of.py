@@ -7,16 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from dbbstation.facts.value import Value
 from dbbstation.inference.coloured import FEWEST_INDEPENDENT
+from dbbstation.inference.consequence import may_result
 from dbbstation.inference.detectable import detectable
 from dbbstation.inference.followed import (
     VariableProbabilities,
     classes_of,
+    estimated,
     probability_of_any,
     way_probability,
 )
 from dbbstation.inference.law_form import law_form
-from dbbstation.inference.levels import TIME, Followed, FollowsAnswer, Levels, difference_of
+from dbbstation.inference.levels import RUN, TIME, Followed, FollowsAnswer, Levels, difference_of
+from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
@@ -42,6 +46,8 @@ def levels_of(
     parts: PartGains | None,
     held_out: HeldOutError | None,
     matters: float | None = None,
+    *,
+    worse: bool = False,
 ) -> Levels:
     """Return the three levels.
 
@@ -49,9 +55,11 @@ def levels_of(
         left: residual tests.
         parts: None if not tested.
         matters: size of interest, in the residual's unit; None: the refitted residual.
+        worse: without held-out parts: the fitted sum leaves more of all rows than the reference.
     """
     probabilities = VariableProbabilities(settled)
-    classes = tuple(_followed(settled, one, probabilities, parts) for one in classes_of(settled, probabilities))
+    found = [_followed(settled, one, probabilities, parts) for one in classes_of(settled, probabilities)]
+    classes = tuple(sorted(found, key=lambda one: (one.consequence, one.may_result)))
     sizes = detectable(settled)
     size = settled.channel.size if matters is None else matters
     samples = settled.noise.independent_samples(settled.channel.stretches)
@@ -62,7 +70,7 @@ def levels_of(
         _doubts(settled, left, sizes, size),
         (size, matters is not None, samples, sizes),
     )
-    correction = None
+    correction = False if worse and held_out is None and settled.best.members else None
     if held_out is not None and settled.best.members:
         correction = held_out.after < held_out.as_simulated
     return Levels(differs, classes, correction)
@@ -70,13 +78,15 @@ def levels_of(
 
 def _doubts(settled: Settled, left: LeftOver, sizes: tuple[Detectable, ...], matters: float) -> tuple[str, ...]:
     """Return why an effect of interest may be hidden."""
-    channel, unit, found = settled.channel, settled.channel.unit, []
+    channel, unit, found = settled.channel, settled.channel.unit, list[str]()
+    if settled.stopped:
+        found.append("the search ended at its limit of work")
     if len(channel.target) <= FEWEST_INDEPENDENT:
         found.append(f"{len(channel.target)} rows are too few to know the noise")
     if channel.time is None:
         found.append("the order of the rows is unknown, so that noise cannot be told from an effect")
     if not left.is_noise:
-        found.append("what is left is not noise")
+        found.append(f"what is left is not noise: {left.worst.rms:.2g} {unit} in {left.worst.name}".replace("  ", " "))
     if slow_chance(settled) < BY_CHANCE:
         found.append("slow noise could hide it")
     for one in sizes:
@@ -109,12 +119,14 @@ def _followed(
 ) -> Followed:
     probability = min(probabilities.of(each) for each in one.each)
     gain = None if parts is None else parts.of(one.wanted)
-    answer = _answer(probability, gain, in_time=one.wanted <= {TIME})
+    answer = _answer(probability, gain, in_time=set[str]().union(*one.each) <= {TIME, RUN})
     effect = settled.effect(sorted(one.members))[settled.channel.kept]
-    driven = {variable.name for variable in settled.channel.variables if variable.driven}
-    form = None
-    if answer is FollowsAnswer.FOLLOWS and parts is not None:
-        form = law_form(settled, one, parts.rows)
+    variables = settled.channel.variables
+    driven = {v.name for v in variables if v.driven}.union(*(law.driven for law in settled.channel.laws))
+    carries = {v.name for v in variables if v.name in set[str]().union(*one.each) and may_result(v, settled.channel)}
+    form, (slope, straight) = None, _straight(settled, one)
+    if answer in (FollowsAnswer.FOLLOWS, FollowsAnswer.NOT_TESTED):
+        form = law_form(settled, one, None if parts is None else parts.rows)
     return Followed(
         variables=one.each,
         or_variables=one.others,
@@ -129,8 +141,28 @@ def _followed(
         gain_without_best=None if gain is None else gain.gains.without_best,
         parts_with_gain=None if gain is None else gain.gains.share_with_gain,
         consequence=any(driven.issuperset(each) for each in one.each),
+        may_result=any(carries.issuperset(each) for each in one.each),
         form=form,
+        slope=slope,
+        straight=straight,
     )
+
+
+def _straight(settled: Settled, one: VariableClass) -> tuple[Value | None, float]:
+    """Slope of the straight line through what the members of a class do, over its first variable, and its share of the squares."""
+    channel = settled.channel
+    variable = next((v for v in channel.variables if v.name == one.each[0][0]), None)
+    if variable is None or variable.kind is Kind.TIME or variable.period is not None:
+        return None, 0.0
+    along = variable.values[channel.kept] - variable.values[channel.kept].mean()
+    columns, values, covariance = estimated(settled, one.members)
+    samples = settled.bank.samples(columns)[channel.kept]
+    weights = along @ samples / (along @ along)
+    slope, effect = float(weights @ values), samples @ values
+    u = float(np.sqrt(max(float(weights @ covariance @ weights), 0.0)))
+    whole = float(np.sum(np.square(effect - effect.mean())))
+    unit = f"{channel.unit}/{variable.unit}" if variable.unit else channel.unit
+    return Value(slope, u, unit), slope**2 * float(along @ along) / max(whole, 1e-300)
 
 
 def _answer(probability: float, gain: ClassGain | None, *, in_time: bool) -> FollowsAnswer:

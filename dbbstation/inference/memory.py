@@ -74,7 +74,7 @@ def memory_laws(
     for family, parameter, columns, grid in kinds:
         for variable in usable if grid else ():
             gain = size / variable.half_range
-            starts = _starts(blocks) if family is Family.MEMORY else 0
+            starts = starts_of(blocks) if family is Family.MEMORY else 0
             found.append(
                 Law(
                     name=f"{family} of {variable.name}",
@@ -114,7 +114,7 @@ def _lag(
     variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], point: tuple[float, ...]
 ) -> NDArray[np.float64]:
     """Return late, late less present, and initial transients by block, shape (n, 2 + starts)."""
-    starts = _starts(blocks)
+    starts = starts_of(blocks)
     found = np.zeros((len(time), 2 + starts))
     for k, rows in enumerate(blocks):
         values, at = variable.travel(rows), time[rows]
@@ -124,7 +124,8 @@ def _lag(
     return found
 
 
-def _starts(blocks: Sequence[slice]) -> int:
+def starts_of(blocks: Sequence[slice]) -> int:
+    """Starts that a law has: one of each run, or one of all where there are many."""
     return len(blocks) if len(blocks) <= MOST_STARTS else 1
 
 

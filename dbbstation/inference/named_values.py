@@ -82,6 +82,7 @@ _NAMES = {
     "hysteresis": ("half width",),
     "speed": ("per speed",),
     "lag": ("delay",),
+    "product": ("coefficient",),
     "bump": ("height",),
     "step": ("height",),
 }

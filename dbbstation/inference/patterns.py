@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from itertools import combinations
+from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,6 +49,11 @@ class Family(StrEnum):
     LAG = "lag"
     MEMORY = "memory"
     DEAD_TIME = "dead time"
+    INTEGRAL = "integral"
+    SATURATION = "saturation"
+    DEAD_ZONE = "dead zone"
+    FRICTION = "friction"
+    SCALED = "scaled hysteresis"
     DRIFT = "drift"
     PRODUCT = "product"
     CURVE = "curve"
@@ -265,27 +270,34 @@ def _speed(
 
 
 def _product(one: Variable, other: Variable) -> Pattern:
-    """Return two variables' product, for angles products of waves.
+    """Product of two variables, each about a zero at an end or in the middle of its range: where the zero is nobody knows.
 
-    Since zeros are unknown, a form with both variables is added.
+    Of angles, products of their cosines and sines: waves of their sum and difference.
     """
-    a, b = (
-        turn(v, 1).columns(v.values) if covers_turns(v) else Power(v.low, v.high).columns(v.values)
-        for v in (one, other)
+    if covers_turns(one) or covers_turns(other):
+        a, b = (
+            turn(v, 1).columns(v.values) if covers_turns(v) else Power(v.low, v.high).columns(v.values)
+            for v in (one, other)
+        )
+        return Pattern(Family.PRODUCT, (one, other), (a[:, :, None] * b[:, None, :]).reshape(len(a), -1))
+    columns, labels = [], []
+    for zeros in product(ZEROS, ZEROS):
+        columns.append((one.scaled - zeros[0]) * (other.scaled - zeros[1]))
+        at = [0.5 * (v.low + v.high) + zero * v.half_range for v, zero in zip((one, other), zeros, strict=True)]
+        named = (f"{v.name} {place:.4g} {v.unit}".strip() for v, place in zip((one, other), at, strict=True))
+        labels.append(f"about {' and '.join(named)}")
+    width, weight = len(labels), -float(np.log(len(labels)))
+    units = " ".join(f"({v.unit})" if "/" in v.unit or " " in v.unit else v.unit or v.name for v in (one, other))
+    choices = tuple(((k,), weight, label) for k, label in enumerate(labels))
+    per = (one.half_range * other.half_range,) * width
+    return Pattern(
+        Family.PRODUCT, (one, other), np.column_stack(columns), None, (f"/({units})",) * width, per, choices=choices
     )
-    samples = (a[:, :, None] * b[:, None, :]).reshape(len(a), -1)
-    both = samples.shape[1]
-    every = np.hstack([samples, a, b])
-    choices = (
-        (tuple(range(both)), float(np.log(1.0 - WITH_BOTH)), ""),
-        (tuple(range(every.shape[1])), float(np.log(WITH_BOTH)), "with both of them"),
-    )
-    return Pattern(Family.PRODUCT, (one, other), every, choices=choices)
 
 
-WITH_BOTH = 0.1
-"""Probability that a product comes with both of its variables: with little of the product it is their own forms over again, which
-must not be counted twice."""
+ZEROS = (-1.0, 0.0, 1.0)
+"""Where a factor may be zero: at the ends and in the middle of its range. Beyond them the product is less than a straight line in the other
+factor, which is a cause of its own and comes first."""
 
 
 def _of_blocks(blocks: Sequence[slice], rows: int) -> Pattern:

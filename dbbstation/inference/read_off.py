@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
+from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.impossible import impossible
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.named_values import named_values, with_jackknife
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.pushes import too_many, within_a_step
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.variables import Kind
@@ -25,21 +23,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.facts.value import Value
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.folds import HeldOutError
+    from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Cause, Member
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
 
-LATE = (Family.MEMORY, Family.DEAD_TIME)
-"""Families of what follows a variable late."""
-
 HALF = 0.5
 """Share of its largest value from which on an effect counts as being there, for the spans over which it is."""
-
-
-MAKES_UP = "Held-out parts are predicted worse than as simulated, and some of what acts always beside it predicts none: this may make up for that."
-"""Why something that happened once is not sure: its probability is that beside effects which other rows refute."""
 
 
 @dataclass(frozen=True)
@@ -125,20 +118,21 @@ class Trial:
         return self.is_worse_here if self.held_out is None else self.held_out.is_worse
 
 
-def read_off(settled: Settled, trial: Trial | None = None) -> tuple[CauseFinding, ...]:
+def read_off(settled: Settled, trial: Trial | None = None, levels: Levels | None = None) -> tuple[CauseFinding, ...]:
     """Return a finding per law and pattern, present ones first, by size.
 
     Args:
         trial: None: the client judges [`claim`]; sure ones are identified here.
+        levels: verdicts are read off these; None: each cause is judged by itself.
     """
-    judge = _Judge(settled, trial)
+    judge = _Judge(settled, trial, levels)
     found = [judge.finding(cause) for cause in settled.causes]
     found += [judge.refused(name, why) for name, why in settled.refused.items()]
     return tuple(sorted(found, key=lambda one: (one.verdict.rank, -one.log_factor)))
 
 
 class _Judge:
-    def __init__(self, settled: Settled, trial: Trial | None) -> None:
+    def __init__(self, settled: Settled, trial: Trial | None, levels: Levels | None) -> None:
         self._trial = trial
         self._settled, self._best, laws = settled, settled.best, settled.bank.laws
         self._members = {member.cause.name: member for member in self._best.members}
@@ -161,6 +155,8 @@ class _Judge:
             first = own.stop
             if estimates is not None:
                 self._values[name] = (estimates.values[own], estimates.covariance[own, own])
+        worse = trial is not None and trial.is_worse
+        self._levels = None if levels is None else VerdictsByLevel(settled, levels, self._values, worse=worse)
         absent = [cause for cause in settled.causes if cause.name not in self._members]
         scan = settled.comparison.scan(self._best.members, absent)
         self._beside = {c.name: (float(g), m) for c, g, m in zip(scan.causes, scan.log_factor, scan.best, strict=True)}
@@ -176,14 +172,13 @@ class _Judge:
         """What is said of one cause."""
         pattern = self._settled.bank.patterns.get(cause.name)
         member = self._members.get(cause.name)
-        equal = self._classes.get(cause.name, (cause.name,))
-        pooled = self._pooled(cause.name)
-        probability = self._settled.averaged(self._alternatives.probability(pooled), pooled)
+        equal = self._equal(cause.name)
+        probability = self._settled.averaged(self._alternatives.probability(equal), equal)
         gain, shown = self._beside[cause.name] if member is None else (self._best.log_factor(cause.name), member)
         if member is None:
             # The prior must not say how much could hide.
             shown = replace(shown, scale=float(SCALES[-1]))
-            found = self._settled.comparison.estimates([shown, *self._best.members])
+            found = self._settled.comparison.estimates([shown, *self._best.without(*self._instead_of(cause.name))])
             own = len(shown.columns)
             values, covariance = found.values[:own], found.covariance[:own, :own]
         else:
@@ -195,7 +190,7 @@ class _Judge:
         gains = self._gains(cause.name) if member is not None else None
         law = self._settled.bank.laws.get(cause.name)
         variables = pattern.variables if pattern else law.variables if law else ()
-        there = verdict.rank <= Verdict.AMBIGUOUS.rank and member is not None
+        there = verdict.rank <= Verdict.AMBIGUOUS.rank and (member is not None or verdict is Verdict.IDENTIFIED)
         rows = _stretches(effect) if there and pattern is not None and pattern.family == "pulses" else ()
         happened = verdict is Verdict.HAPPENED and gains is not None and gains.predicts
         lasts = pattern is None or pattern.family is Family.STEP or self._is_a_step(rows)
@@ -231,7 +226,7 @@ class _Judge:
         """Return held-out gains of a member and its class."""
         if self._trial is None or self._trial.held_out is None:
             return None
-        return self._trial.held_out.gains_of({self._settled.bank.kind_of(one) for one in self._pooled(name)})
+        return self._trial.held_out.gains_of({self._settled.bank.kind_of(one) for one in self._equal(name)})
 
     def _acts(self, name: str) -> Acts:
         """Return whether other rows can show it: not time, offsets or curves of single runs."""
@@ -260,104 +255,54 @@ class _Judge:
         parts = [(one.x[inside], one.covariance[inside, inside]) for one in self._trial.refits]
         return with_jackknife(found, [named_values(self._settled, member, *part) for part in parts])
 
-    def _pooled(self, name: str) -> tuple[str, ...]:
-        """Return a cause, its class and what is equal to its user.
-
-        Other choices of stretches or undetectably short delays count as equal.
-        """
-        equal = self._classes.get(name, (name,))
-        kind = self._kinds.get(name)
-        if name not in self._members or kind is None:
-            return equal
-        if kind[0] in IN_TIME:
-            same = [n for n, other in self._kinds.items() if other[0] is kind[0]]
-        elif kind[0] is Family.LINEAR:
-            same = [n for n, other in self._kinds.items() if other[0] in LATE and other[1] == kind[1]]
-        else:
-            return equal
-        return (*equal, *(n for n in same if n not in equal and n not in self._members))
-
-    @cached_property
-    def _kinds(self) -> dict[str, tuple[Family, tuple[str, ...]]]:
-        bank = self._settled.bank
-        of_patterns = {name: (one.family, one.variables) for name, one in bank.patterns.items()}
-        of_laws = {n: (one.family, one.variables) for n, one in bank.laws.items() if one.family is not None}
-        there = {cause.name for cause in self._settled.causes}
-        return {
-            name: (family, tuple(v.name for v in variables))
-            for name, (family, variables) in (of_patterns | of_laws).items()
-            if name in there
-        }
-
     def _verdict(
         self, cause: Cause, member: Member | None, probability: float, sigmas: float
     ) -> tuple[Verdict, tuple[str, ...], str]:
-        if member is not None and self._alternatives.probability(self._pooled(cause.name)) >= SURE:
-            verdict, others, text = self._certain(cause.name, probability, sigmas)
-            return verdict, others, text or self._unless_late(cause.name)
+        if self._levels is not None and (member is not None or self._instead_of(cause.name)):
+            return self._levels.of_member(cause.name, sigmas, self._acts(cause.name))
+        if member is not None and self._alternatives.probability(self._equal(cause.name)) >= SURE:
+            return self._claimed(cause.name, probability, sigmas)
         if member is None and (why := self._impossible_in_place(cause)):
             return Verdict.RULED_OUT, (), why
-        if alike := [name for name, equal in self._classes.items() if cause.name in equal and name != cause.name]:
-            return Verdict.AMBIGUOUS, (alike[0],), f"Nothing measured here tells it from {alike[0]}."
-        if probability >= EVEN or member is not None:
-            others = self._alternatives.ambiguity(cause.name)
-            text = f"These rows cannot tell it from {', '.join(others)}." if others else "These rows do not decide it."
-            return Verdict.AMBIGUOUS, others, text
-        if unsure := [name for name, others in self._alternatives.ambiguities.items() if cause.name in others]:
-            return Verdict.AMBIGUOUS, (unsure[0],), f"These rows cannot tell it from {unsure[0]}."
-        return self._absent(cause, probability)
+        if member is None and (alike := self._alike(cause.name)):
+            return Verdict.AMBIGUOUS, (alike,), f"Nothing measured here tells it from {alike}."
+        if member is None and probability < EVEN:
+            return self._absent(cause, probability)
+        others = self._alternatives.ambiguity(cause.name)
+        text = f"These rows cannot tell it from {', '.join(others)}." if others else "These rows do not decide it."
+        return Verdict.AMBIGUOUS, others, text
 
-    def _unless_late(self, name: str) -> str:
-        """Return that lateness of a linear effect is undecided, if so."""
-        late = [
-            n for n in self._pooled(name) if n not in self._classes.get(name, (name,)) and self._kinds[n][0] in LATE
-        ]
-        if not late or self._alternatives.probability(late) < 1.0 - SURE:
-            return ""
-        return "These rows do not tell whether it comes late."
+    def _instead_of(self, name: str) -> frozenset[str]:
+        """Members in whose place a law is named that is none of them; none where it is not."""
+        return frozenset() if self._levels is None or name in self._members else self._levels.instead_of(name)
 
-    def _certain(self, name: str, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
-        """Return the verdict of a sure cause."""
+    def _alike(self, name: str) -> str:
+        """Member that rows cannot tell a cause from, alone or among others; empty where there is none."""
+        if self._levels is not None and (found := self._levels.alike(name)):
+            return found
+        unsure = self._alternatives.ambiguities
+        return next((one for of in (self._classes, unsure) for one, names in of.items() if name in names), "")
+
+    def _claimed(self, name: str, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
+        """Verdict of what is there for sure beside the most probable noise, where a client has no levels."""
         if probability < SURE:
             return Verdict.AMBIGUOUS, (), "Noise whose neighbours resemble each other explains it as well."
         if sigmas < OUT:
             return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
         if self._trial is None:
             return claim(probability, sigmas, Acts.ALWAYS, None), (), ""
-        gains, worse = self._gains(name), self._trial.is_worse
-        verdict = claim(probability, sigmas, self._acts(name), gains, worse=worse)
+        gains = self._gains(name)
+        verdict = claim(probability, sigmas, self._acts(name), gains, worse=self._trial.is_worse)
         text = ""
-        if name in self._in_time:
-            every = [size for own in self._pushes.values() for size in own]
-            if why := within_a_step(self._pushes[name], self._settled.channel.step) or too_many(every):
-                return Verdict.AMBIGUOUS, (), why
-        if verdict is Verdict.HAPPENED and worse and self._refuted:
-            return Verdict.AMBIGUOUS, (), MAKES_UP
         if verdict is Verdict.DOES_NOT_PREDICT and gains is not None:
             text = f"It was found in these rows; held-out parts gain by it in {gains.with_gain} of {len(gains.parts)}."
             if gains.predicts:
                 text += " Everything together predicts them worse than without."
         return verdict, (), text
 
-    @cached_property
-    def _refuted(self) -> bool:
-        """Return whether a permanent member fails to predict held-out parts."""
-        every = [self._gains(name) for name in self._members if self._acts(name) is Acts.ALWAYS]
-        return any(gains is not None and not gains.predicts for gains in every)
-
-    @cached_property
-    def _in_time(self) -> list[str]:
-        return [name for name in self._members if name in self._kinds and self._kinds[name][0] in IN_TIME]
-
-    @cached_property
-    def _pushes(self) -> dict[str, list[Value]]:
-        """Return sizes of stretches by member."""
-        unit, found = self._settled.channel.unit, {}
-        for name in self._in_time:
-            values, covariance = self._values[name]
-            sigmas = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-            found[name] = [Value(float(v), float(s), unit) for v, s in zip(values, sigmas, strict=True)]
-        return found
+    def _equal(self, name: str) -> tuple[str, ...]:
+        """A cause and what nothing measured here tells from it."""
+        return (self._levels is not None and self._levels.equivalent(name)) or self._classes.get(name, (name,))
 
     def _impossible_in_place(self, cause: Cause) -> str:
         """Return why a law cannot replace its equivalent; may be empty."""

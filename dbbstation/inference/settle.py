@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
-from dbbstation.inference.hypotheses import Hypothesis, search
+from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
 from dbbstation.inference.impossible import impossible
 from dbbstation.inference.model_comparison import amplitude_size
 from dbbstation.inference.patterns import patterns
@@ -17,7 +17,7 @@ from dbbstation.inference.seen import MOVED, places_anew, seen
 from dbbstation.inference.settled import MOST_EXPANDED, Beginning, Settled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -56,6 +56,7 @@ def settle(
     thorough: bool = True,
     beginnings: Sequence[Beginning] = tuple(Beginning),
     rivals: bool = True,
+    most_work: float = np.inf,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
     """Compare sets of laws and patterns.
@@ -71,6 +72,7 @@ def settle(
         in_time: search steps and pulses in time; False if blocks have own curves.
         thorough: several starts and a final look; False: one fast search.
         rivals: noise of any colour competes; False: first order beside everything.
+        most_work: limit of all searches together [`SearchWork`].
     """
     options = _Options(
         look=look,
@@ -79,6 +81,7 @@ def settle(
         most_looks=most_looks,
         in_time=in_time,
         thorough=thorough,
+        most_work=most_work / (len(beginnings) + 1),
     )
     if not rivals:
         return _settled(_begun(channel, options), options, progress)
@@ -155,6 +158,7 @@ class _Options:
     most_looks: int
     in_time: bool
     thorough: bool
+    most_work: float
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
@@ -191,7 +195,7 @@ def _settled(
     refused: dict[str, str] = dict(impossible or {})
     looked: set[frozenset[str]] = set()
     compared: Settled | None = None  # after the last look
-    most_probable, times_placed = -np.inf, 0
+    most_probable, times_placed, work = -np.inf, 0, SearchWork(options.most_work)
     # Members to begin with come from a comparison that had been looked about for.
     blank = not best
     # Laws come first, at their best values: what they leave is looked at, and not what they do.
@@ -208,12 +212,12 @@ def _settled(
         comparison = beside.comparison(bank.target)
         causes = bank.but_for(refused)
         starts = [grown(comparison, causes, members) for members in (*starts, best)]
-        posterior = search(comparison, causes, [*starts, *seeds.values()], options.most_expanded)
+        posterior = search(comparison, causes, [*starts, *seeds.values()], options.most_expanded, work=work)
         seeds |= {h.names: h.members for h in posterior.hypotheses[:SEEDS]}
         settled = met = Settled(channel, bank, bank.noise, tuple(causes), comparison, posterior, dict(refused))
         best = posterior.best.members
         compared = settled if looking else None
-        if rough := [m for m in _laws_of(settled) if m.cause.name not in laid_out]:
+        if rough := _rough(settled, laid_out, work):
             laid_out |= {member.cause.name for member in rough}
             _lay_out(bank, beside, posterior.best, rough)
             continue
@@ -225,7 +229,8 @@ def _settled(
             best = moved
             continue
         met = _known_as(settled, known)
-        if not look or met is not settled or (looking and (not options.thorough or posterior.best.names in looked)):
+        seen_before = looking and (not options.thorough or posterior.best.names in looked)
+        if not look or met is not settled or work.is_spent or seen_before:
             break
         if looking:
             looked.add(posterior.best.names)
@@ -234,7 +239,12 @@ def _settled(
             if most_probable < before + BETTER:
                 break
         looking = look
-    return met
+    return replace(met, stopped=True) if work.is_spent else met
+
+
+def _rough(settled: Settled, laid_out: Collection[str], work: SearchWork) -> list[Member]:
+    """Laws that are wanted and not laid out yet; none where no work is left to compare them anew."""
+    return [] if work.is_spent else [m for m in _laws_of(settled) if m.cause.name not in laid_out]
 
 
 def _placed(bank: Bank, members: tuple[Member, ...]) -> tuple[Member, ...]:

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.hypotheses import Hypothesis, search
-
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
@@ -18,7 +16,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.bank import Bank
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.coloured import Coloured
-    from dbbstation.inference.hypotheses import Posterior
+    from dbbstation.inference.hypotheses import Hypothesis, Posterior
     from dbbstation.inference.model_comparison import Cause, ModelComparison
 
 MOST_EXPANDED = 8
@@ -47,6 +45,7 @@ class Settled:
         refused: impossible laws with reasons.
         log_probability: of noise and best hypothesis, up to a constant.
         others: most probable first.
+        stopped: the search ended at its limit of work, with the best so far.
     """
 
     channel: Channel
@@ -59,6 +58,7 @@ class Settled:
     beginning: Beginning = Beginning.EVERYTHING
     log_probability: float = 0.0
     others: tuple[Settled, ...] = ()
+    stopped: bool = False
 
     @property
     def best(self) -> Hypothesis:
@@ -100,7 +100,3 @@ class Settled:
         weights = np.array([self.log_probability, *(other.log_probability for other in self.others)])
         weights = np.exp(weights - weights.max())
         return float(weights @ np.array(every) / weights.sum())
-
-    def second_start(self) -> Hypothesis:
-        """Return the best hypothesis of a search from nothing."""
-        return search(self.comparison, self.causes, (), MOST_EXPANDED).best

@@ -48,6 +48,10 @@ class Framed:
         """Return the main table, a dictionary per row, units in names."""
         raise NotImplementedError
 
+    def sentences(self) -> list[str]:
+        """The answer in words, which a notebook shows above the table; none where the table is the answer."""
+        return []
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain objects as the command's `--json` prints."""
         return plain(self)
@@ -100,7 +104,8 @@ class Framed:
             for row in rows[:MOST_SHOWN]
         )
         more = f"<p>and {len(rows) - MOST_SHOWN} more rows</p>" if len(rows) > MOST_SHOWN else ""
-        return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
+        said = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in self.sentences())
+        return f"{said}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
 
 
 def _shown(value: object) -> str:

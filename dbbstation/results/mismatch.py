@@ -16,6 +16,7 @@ from dbbstation.inference.levels import Levels
 from dbbstation.inference.read_off import Span
 from dbbstation.inference.verdict import Gains
 from dbbstation.results.frame import Framed
+from dbbstation.results.levels_text import level_sentences
 
 
 @dataclass(frozen=True)
@@ -226,6 +227,7 @@ class MismatchResult(Framed):
         left: whether anything exceeds noise.
         second_start_agrees: whether a search from nothing agrees.
         not_asked: own physics not tested, with reasons by name.
+        stopped: why the search ended early; may be empty.
         out: absent if none was written.
         figure: absent if none was written.
         table: columns by name, with corrected simulation and residual.
@@ -251,9 +253,14 @@ class MismatchResult(Framed):
     second_start_log_odds: float
     next: tuple[NextMeasurement, ...]
     not_asked: Mapping[str, str]
+    stopped: str
     out: Annotated[str | None, Absent] = None
     figure: Annotated[str | None, Absent] = None
     table: Annotated[Mapping[str, tuple[str | float, ...]], AsItIs, Kept]
+
+    def sentences(self) -> list[str]:
+        """The answer in three levels, in words; a notebook shows it above the table."""
+        return level_sentences(self.levels, self.unit, {one.name: one.values for one in self.findings})
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per effect."""

@@ -66,6 +66,7 @@ def mismatch_result(
         second_start_log_odds=found.second_start,
         next=tuple(NextMeasurement(step.text, tuple(step.variables)) for step in next_measurements(found)),
         not_asked=found.lacking,
+        stopped=found.stopped,
         table={} if table is None else table,
         drawing=drawing,
         notes=notes,

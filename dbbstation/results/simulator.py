@@ -12,6 +12,7 @@ from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.verdict import Gains
 from dbbstation.results.frame import Framed
+from dbbstation.results.levels_text import level_sentences
 
 
 @dataclass(frozen=True)
@@ -213,6 +214,10 @@ class SimulatorResult(Framed):
     out: Annotated[str | None, Absent] = None
     corrected: Annotated[str | None, Absent] = None
     figure: Annotated[str | None, Absent] = None
+
+    def sentences(self) -> list[str]:
+        """The answer in three levels, in words; a notebook shows it above the table."""
+        return level_sentences(self.levels, self.unit, {one.name: one.values for one in self.findings})
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per term."""

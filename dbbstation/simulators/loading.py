@@ -105,7 +105,7 @@ def load_simulator(
     model = Model(
         file.name,
         tuple(parameters),
-        tuple(SimulatorPort(name, one.unit, dict(one.signals), one.about) for name, one in file.ports.items()),
+        tuple(SimulatorPort(name, one.unit, one.units, one.about, one.results) for name, one in file.ports.items()),
         tuple(Output(name, one.unit, one.filter_s or 0.0) for name, one in file.outputs.items()),
         tuple(_recorded(file, table) for table in tables),
     )

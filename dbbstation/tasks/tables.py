@@ -258,6 +258,7 @@ class _Reader:
         variables = [self._variable(name, kept[name]) for name in chosen]
         varying = [v for v in variables if v is not None and not self._is_the_difference(v, kept)]
         at = self._variable(clock, kept[clock], quiet=True) if clock else None
+        self._note_order(clock, at, blocks)
         others = self._once([v for v in varying if clock is None or v.name != clock])
         cells = {name: [cell for file in self._files for cell in file.cells[name]] for name in self._names}
         table = Table(
@@ -279,6 +280,19 @@ class _Reader:
         self._refuse_unknown(table)
         texts = {name: tuple(column[k] for k in rows.tolist()) for name, column in cells.items()}
         return Tabulated(table, tuple(self._names), texts, tuple(self._notes))
+
+    def _note_order(self, clock: str | None, at: Variable | None, blocks: Sequence[slice]) -> None:
+        """Note what rows cannot say: a clock that stands, one run only."""
+        if clock is not None and at is None:
+            self._notes.append(
+                f"`{clock}` is the same in all rows: their order is unknown; give --time rows if they are in order"
+            )
+        elif at is not None and (still := sum(int(np.sum(np.diff(at.values[own]) == 0.0)) for own in blocks)):
+            self._notes.append(
+                f"`{clock}` stands still in {still} rows: delays, memories and integrals are not compared"
+            )
+        if self._asked.run is not None and len(blocks) == 1:
+            self._notes.append(f"`{self._asked.run}` has one run only: no other run tests what is found")
 
     def _refuse_unknown(self, table: Table) -> None:
         there = ", ".join(table.derivatives) or "none"
@@ -401,11 +415,12 @@ class _Reader:
     def _once(self, variables: Sequence[Variable]) -> list[Variable]:
         kept: list[Variable] = []
         for variable in variables:
-            same = next((one.name for one in kept if np.array_equal(one.values, variable.values)), None)
+            same = next((one for one in kept if _is_a_line(one.values, variable.values)), None)
             if same is None:
                 kept.append(variable)
-            else:
-                self._notes.append(f"`{variable.name}` has the values of `{same}` in all rows and is left out")
+                continue
+            scaled = "" if np.array_equal(same.values, variable.values) else ", but for scale and origin,"
+            self._notes.append(f"`{variable.name}` has the values of `{same.name}` in all rows{scaled} and is left out")
         return kept
 
     def _is_the_difference(self, variable: Variable, kept: Mapping[str, NDArray[np.float64]]) -> bool:
@@ -418,6 +433,19 @@ class _Reader:
             return False
         self._notes.append(f"`{variable.name}` is measured and simulated value over again, and is left out")
         return True
+
+
+def _is_a_line(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether columns are one but for scale and origin: no effect tells them apart."""
+    if np.array_equal(one, other):
+        return True
+    a, b = (column - column.mean() for column in (one, other))
+    left = b - a * float(a @ b) / float(a @ a)
+    return float(np.abs(left).max()) <= ROUNDED * float(np.abs(b).max())
+
+
+ROUNDED = 1e-9
+"""Share of a column's size by which it may depart from a line in another that it is."""
 
 
 def _by_clock(rows: NDArray[np.int64], clock: NDArray[np.float64]) -> list[NDArray[np.int64]]:

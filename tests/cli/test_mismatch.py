@@ -81,6 +81,30 @@ def test_a_column_that_is_there_twice_is_taken_once(run, warm, tmp_path):
     assert "again_mm" not in {variable["name"] for variable in outcome.data["variables"]}
 
 
+def test_what_rows_cannot_say_is_noted(run, tmp_path):
+    """A column that is another but for its unit, one run only, and a clock that stands in every other row, or throughout."""
+    place, noise = np.sin(np.arange(200) / 9.0), np.random.default_rng(3).standard_normal(200)
+    head = "t_s,day,measured_mm,simulated_mm,place_mm,place_um,still_s"
+    rows = [
+        f"{k // 2},mon,{e:.5f},0.0,{x:.6f},{1e3 * x + 5.0:.3f},7"
+        for k, (x, e) in enumerate(zip(place, noise, strict=True))
+    ]
+    path = tmp_path / "poor.csv"
+    path.write_text("\n".join([head, *rows]) + "\n")
+    outcome = run("mismatch", path, *QUICK, "--run", "day")
+    assert (
+        "`place_um` has the values of `place_mm` in all rows, but for scale and origin, and is left out" in outcome.err
+    )
+    assert "`t_s` stands still in 100 rows: delays, memories and integrals are not compared" in outcome.err
+    assert "`day` has one run only: no other run tests what is found" in outcome.err
+    outcome = run("mismatch", path, *QUICK, "--time", "still_s")
+    assert (
+        "`still_s` is the same in all rows: their order is unknown; give --time rows if they are in order"
+        in outcome.err
+    )
+    assert "cannot be told: the order of the rows is unknown" in outcome.out
+
+
 def test_a_program_reads_the_same_and_the_files_hold_it(run, warm, tmp_path):
     out, figure = tmp_path / "out.csv", tmp_path / "figure.svg"
     outcome = run("mismatch", warm, *QUICK, "--json", "--out", out, "--figure", figure)
@@ -116,11 +140,17 @@ def bent(tmp_path_factory):
     return path
 
 
-def test_what_predicts_worse_than_the_simulation_is_said_first_and_nothing_is_identified(run, bent):
-    outcome = run("mismatch", bent, *COLUMNS)
+def test_what_predicts_worse_than_the_simulation_is_said_first_and_no_correction_is_offered(run, bent, tmp_path):
+    outcome = run("mismatch", bent, *COLUMNS, "--out", tmp_path / "corrected.csv")
     first, *others = outcome.out.splitlines()
+    assert outcome.code == FAILED
+    assert (
+        "corrected.csv: not written. No correction is offered: the corrected values predict held-out rows"
+        in outcome.err
+    )
+    assert not (tmp_path / "corrected.csv").exists()
     assert first.startswith("Held-out rows are predicted worse than as simulated: 0.0")
-    assert first.endswith("mm rms as simulated. Nothing is identified.")
+    assert first.endswith("mm rms as simulated.")
     assert not any(" identified " in line for line in others)
     assert "does-not-predict" in outcome.out
     data = run("mismatch", bent, *COLUMNS, "--json").data

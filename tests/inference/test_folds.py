@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.folds import Fold, HeldOutError, held_out_error, part_numbers, parts_of
+from dbbstation.inference.left_over import left_over
+from dbbstation.inference.levels import FollowsAnswer
+from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
@@ -176,19 +179,22 @@ def test_what_came_once_has_happened_and_a_step_that_gains_persists(last, persis
 
 
 def test_what_came_once_beside_what_does_not_predict_is_not_sure():
-    """The play was refuted by other rows, so that the pulse may make up for it."""
+    """Other rows refute the play, and the correction is worse: the pulse may make up for the play."""
     data = table(2, EFFECTS["hysteresis of q"], rows=600)
     whole = channel(data, blocks=1)
     inside = (np.arange(600) >= 200) & (np.arange(600) < 280)
     settled = settle(replace(whole, residual=whole.residual + 0.4 * inside))
-    assert "hysteresis of q" in settled.best.names
     (pulse,) = settled.best.names - {"hysteresis of q"}
+    found = levels_of(settled, left_over(settled), None, None)
 
-    def told(kinds, after):
-        return {one.name: one for one in read_off(settled, trial(kinds, after))}[pulse]
+    def told(answer, *, correction):
+        classes = [replace(one, answer=answer) if "hysteresis of q" in one.members else one for one in found.follows]
+        levels = replace(found, follows=tuple(classes), correction=correction)
+        return {one.name: one for one in read_off(settled, Trial(), levels)}
 
-    assert told([], 0.5).verdict is Verdict.HAPPENED
-    assert told([("hysteresis of q",)], 1.1).verdict is Verdict.HAPPENED
-    refuted = told([], 1.1)
-    assert refuted.verdict is Verdict.AMBIGUOUS
-    assert "may make up for that" in refuted.text
+    for answer, correction in ((FollowsAnswer.DOES_NOT_PREDICT, True), (FollowsAnswer.FOLLOWS, False)):
+        assert told(answer, correction=correction)[pulse].verdict is Verdict.HAPPENED
+    refuted = told(FollowsAnswer.DOES_NOT_PREDICT, correction=False)
+    assert refuted["hysteresis of q"].verdict is Verdict.DOES_NOT_PREDICT
+    assert refuted[pulse].verdict is Verdict.AMBIGUOUS
+    assert "may make up for that" in refuted[pulse].text

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
+from dbbstation.inference.channel import Base, Channel
+from dbbstation.inference.consequence import may_result
 from dbbstation.inference.detectable import MARGIN, POWER, detectable, least_seen
 from dbbstation.inference.folds import parts_of
 from dbbstation.inference.followed import (
@@ -20,13 +22,16 @@ from dbbstation.inference.followed import (
     log_density,
     probability_of_any,
 )
+from dbbstation.inference.law_form import law_form
 from dbbstation.inference.left_over import left_over
-from dbbstation.inference.levels import TIME, Detectable, Differs, Followed, FollowsAnswer, difference_of
+from dbbstation.inference.levels import TIME, Detectable, Differs, Followed, FollowsAnswer, LawForm, difference_of
 from dbbstation.inference.levels_of import levels_of, slow_chance
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
+from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
-from dbbstation.inference.verdict import DensityGains
+from dbbstation.inference.variables import Kind, Variable
+from dbbstation.inference.verdict import DensityGains, Verdict
 from tests.inference.tables import direction, table
 from tests.inference.test_channel import EFFECTS, channel
 
@@ -217,3 +222,101 @@ def test_time_and_single_rows_are_the_time():
     (one,) = levels_of(settled, left_over(settled), None, None).follows
     assert one.name == TIME
     assert one.answer is FollowsAnswer.HAPPENED
+
+
+def test_a_sum_has_each_of_its_laws_named_beside_the_others():
+    """A play and a parabola of one variable: no single law makes both."""
+    data = table(6, lambda d: EFFECTS["hysteresis of q"](d) + 0.2 * (d.q / 50.0) ** 2, rows=600)
+    whole = channel(data, blocks=1)
+    settled = settle(whole, thorough=False)
+    (one,) = classes_of(settled, VariableProbabilities(settled))
+    assert len(one.members) == 2
+    form = law_form(settled, one, [rows for _, rows in parts_of(whole)])
+    assert form.name is None
+    assert set(form.together) == {"hysteresis of q", "curve over q"}
+    assert set(law_form(settled, one, None).names) == set(form.together)
+    levels = levels_of(settled, left_over(settled), None, None)
+    assert {f.name for f in read_off(settled, Trial(), levels) if f.verdict is Verdict.IDENTIFIED} == set(form.together)
+
+
+def test_the_straight_line_through_an_effect_is_that_of_least_squares(both):
+    data, settled, _ = both
+    follows = {one.name: one for one in levels_of(settled, left_over(settled), None, None).follows}
+    effect = settled.effect(["hysteresis of q"])
+    slope, _ = np.polyfit(data.q, effect, 1)
+    assert follows["q"].slope.value == pytest.approx(slope, rel=1e-6)
+    assert follows["q"].slope.unit == "mm/mm"
+    assert follows["q"].straight == pytest.approx(np.corrcoef(data.q, effect)[0, 1] ** 2, rel=1e-6)
+    assert follows["angle"].slope is None
+
+
+@pytest.mark.parametrize(
+    ("answer", "form", "verdict"),
+    [
+        (FollowsAnswer.FOLLOWS, "hysteresis of q", Verdict.IDENTIFIED),
+        (FollowsAnswer.FOLLOWS, None, Verdict.AMBIGUOUS),
+        (FollowsAnswer.DOES_NOT_PREDICT, None, Verdict.DOES_NOT_PREDICT),
+        (FollowsAnswer.UNDECIDED, None, Verdict.AMBIGUOUS),
+        (FollowsAnswer.NOT_TESTED, "hysteresis of q", Verdict.IDENTIFIED),
+    ],
+)
+def test_a_verdict_is_read_off_the_level_of_the_class(both, answer, form, verdict):
+    _, settled, _ = both
+    levels = levels_of(settled, left_over(settled), None, None)
+    law = (
+        None
+        if answer is FollowsAnswer.UNDECIDED
+        else LawForm(form, () if form else ("hysteresis of q", "curve by direction over q"), ())
+    )
+    classes = [replace(one, answer=answer, form=law) if one.name == "q" else one for one in levels.follows]
+    found = {one.name: one for one in read_off(settled, Trial(), replace(levels, follows=tuple(classes)))}
+    assert found["hysteresis of q"].verdict is verdict
+    if answer is FollowsAnswer.FOLLOWS and form is None:
+        assert found["hysteresis of q"].ambiguous_with == ("curve by direction over q",)
+
+
+def test_what_leaves_more_than_as_simulated_is_not_identified(both):
+    _, settled, _ = both
+    levels = levels_of(settled, left_over(settled), None, None, worse=True)
+    assert levels.correction is False
+    found = read_off(settled, Trial(is_worse_here=True), levels)
+    assert {one.verdict for one in found if one.name in settled.best.names} == {Verdict.DOES_NOT_PREDICT}
+
+
+def test_a_search_ends_at_its_limit_with_the_best_so_far(both):
+    data, settled, _ = both
+    whole = channel(data, blocks=1)
+    short = settle(whole, most_work=1.0)
+    assert short.stopped
+    assert not settled.stopped
+    assert short.best.members
+    silent = settle(replace(whole, residual=table(3, rows=600).residual), most_work=1.0)
+    assert silent.stopped
+    assert levels_of(silent, left_over(silent), None, None).differs.why == "the search ended at its limit of work"
+
+
+def test_a_torque_carries_the_difference_and_a_temperature_does_not(rng):
+    """A pendulum that is simulated without its friction: its torque follows the true motion."""
+    t = np.arange(800) * 0.02
+    simulated = np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1.0)
+    true = simulated + 0.05 * np.sin(0.7 * t) + 0.03 * np.cos(3.1 * t)
+    torque = 2.0 * np.gradient(np.gradient(true, t), t) + 0.7 * true + 0.01 * rng.standard_normal(800)
+    columns = {
+        "torque": torque,
+        "speed": np.gradient(simulated, t),
+        "warm": 20.0 + t + 0.02 * rng.standard_normal(800),
+        "other": np.sin(0.7 * t),
+    }
+    variables = {name: Variable(name, "", Kind.ANY, values) for name, values in columns.items()}
+    whole = Channel(
+        true - simulated,
+        "rad",
+        (slice(0, 800),),
+        ("run",),
+        tuple(variables.values()),
+        Base.flat(("offset",), np.ones((800, 1))),
+        time=t,
+        simulated=Variable("simulated", "rad", Kind.ANY, simulated),
+    )
+    assert {name for name, one in variables.items() if may_result(one, whole)} == {"torque"}
+    assert not may_result(variables["torque"], replace(whole, time=None))

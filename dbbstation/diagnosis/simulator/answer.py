@@ -197,7 +197,9 @@ def _said(
     except BudgetSpentError:
         not_asked = {}
     open_to = {name: one for one in found.withstood if one.log_odds > 0.0 for name in one.names}
-    findings = tuple(_judged(one, found, nonlinear, open_to) for one in read_off(settled, Trial(held_out, refits)))
+    levels = levels_of(settled, left, gains, held_out, matters)
+    read = read_off(settled, Trial(held_out, refits), levels)
+    findings = tuple(_judged(one, found, nonlinear, open_to) for one in read)
     findings = tuple(sorted(findings, key=lambda one: (one.verdict.rank, -one.log_factor)))
     return SimulatorComparison(
         model=nodes.work.model,
@@ -206,7 +208,7 @@ def _said(
         findings=findings,
         parameters=_parameters(base, found),
         left=left,
-        levels=levels_of(settled, left, gains, held_out, matters),
+        levels=levels,
         held_out=held_out,
         as_simulated=as_simulated,
         nonlinear=nonlinear,

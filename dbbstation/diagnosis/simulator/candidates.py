@@ -12,10 +12,10 @@ from scipy.interpolate import BSpline
 from dbbstation.diagnosis.simulator.terms import DEGREE, IN_PLACE, Term, TermForm, bends
 from dbbstation.diagnosis.simulator.work import sizes
 from dbbstation.inference.channel import NAMED_ODDS
-from dbbstation.inference.patterns import log_odds
+from dbbstation.inference.patterns import DRIVEN_ODDS, log_odds
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -52,6 +52,7 @@ class Candidate:
         grids: of its shape.
         positive: amplitudes that cannot be negative.
         tried: sizes for forms that replace a signal; else empty.
+        driven: signals that result from the simulation.
     """
 
     term: Term
@@ -61,6 +62,7 @@ class Candidate:
     log_odds: float
     positive: tuple[bool, ...]
     tried: tuple[float, ...] = ()
+    driven: frozenset[str] = frozenset()
 
     @property
     def name(self) -> str:
@@ -103,7 +105,14 @@ def candidates(
             )
         )
     count = {form: sum(one.term.form is form for one in found) for form in TermForm}
-    return tuple(one if one.term.own else replace(one, log_odds=log_odds(count[one.term.form])) for one in found)
+    results = {(port.name, signal) for port in ports for signal in port.results}
+    return tuple(one if one.term.own else _weighed(one, count[one.term.form], results) for one in found)
+
+
+def _weighed(one: Candidate, members: int, results: Collection[tuple[str, str]]) -> Candidate:
+    """A candidate with its prior odds among so many of its form; what results from what is simulated comes after others."""
+    driven = frozenset(signal for signal in one.term.signals if (one.term.port, signal) in results)
+    return replace(one, log_odds=log_odds(members) + (DRIVEN_ODDS if driven else 0.0), driven=driven)
 
 
 def _span(times: NDArray[np.float64]) -> tuple[float, float]:

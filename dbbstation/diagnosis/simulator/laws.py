@@ -166,6 +166,7 @@ def _law(one: Candidate, columns: NDArray[np.float64], size: float, off: Departu
         form_uncertainty=form_uncertainty(one),
         discrepancy=discrepancy(one, off),
         followed=followed(one),
+        driven=frozenset(f"{signal} at {one.term.port}" for signal in one.driven),
         way=way(one),
     )
 
@@ -191,6 +192,7 @@ def _in_place(work: SimulationRuns, state: FittedState, one: Candidate, size: fl
         log_odds=one.log_odds,
         form_uncertainty=form_uncertainty(one),
         followed=followed(one),
+        driven=frozenset(f"{signal} at {one.term.port}" for signal in one.driven),
         way=way(one),
     )
 

@@ -48,12 +48,14 @@ class SimulatorPort:
     Attributes:
         name: in `simulate`.
         signals: unit by name.
+        results: signals that result from the simulation.
     """
 
     name: str
     unit: str
     signals: Mapping[str, str]
     about: str = ""
+    results: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

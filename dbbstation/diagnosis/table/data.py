@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.bent import bent_laws
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.memory import memory_laws
 from dbbstation.inference.variables import Kind, Variable
@@ -98,8 +99,10 @@ class Table:
             self.clock.unit if self.clock is not None and self.clock.unit else "row",
         )
         laws = [self._law(source) for source in sources]
-        if time is not None and (size := float(np.std(residual))) > 0.0:
-            laws += memory_laws(follows, time, time_unit, self.blocks, size, self.unit)
+        if (size := float(np.std(residual))) > 0.0:
+            laws += bent_laws(follows, time, time_unit, self.blocks, size, self.unit)
+            if time is not None:
+                laws += memory_laws(follows, time, time_unit, self.blocks, size, self.unit)
         return Channel(
             residual=residual,
             unit=self.unit,

@@ -14,12 +14,12 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.blocks import compress, with_random
 from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.folds import held_out_error, parts_of
-from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart
+from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, followed_by, share_of
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.noise import noise_of
-from dbbstation.inference.patterns import Family, covers_turns, turn
+from dbbstation.inference.patterns import Family
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
-    from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
@@ -49,6 +48,14 @@ FAR_STATED = 3.0
 
 FOLD_ROWS = 3000
 """Rows that a selection for a held-out part is made from, at the most, evenly spaced: fewer rows can only make its error larger."""
+
+
+MOST_WORK = 2e6
+"""Work of all searches over all rows [`SearchWork`]: half a minute of one processor. Tables of a thousand rows with five effects take a
+fiftieth of it."""
+
+MOST_WORK_WITHOUT = 2e5
+"""The same without one held-out part, so that ten of these cost as much."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +106,7 @@ class Mismatch:
 
     Attributes:
         shares: largest first.
-        resembles: named forms of smooth curves, R² by finding.
+        resembles: share of a smooth curve that other causes over its variable make, by finding.
         levels: existence, variables and law of a difference.
         is_worse_here: than simulated, on the rows.
         held_out: None if not tested.
@@ -143,6 +150,11 @@ class Mismatch:
     def is_there(self) -> bool:
         """Return whether a difference exceeds noise and base parameters."""
         return bool(self.settled.best.members) or not self.left.is_noise
+
+    @property
+    def stopped(self) -> str:
+        """Why the search ended early; empty where it did not."""
+        return "the search reached its limit of work" if self.settled.stopped else ""
 
     @property
     def offset(self) -> Value | None:
@@ -220,14 +232,16 @@ def _found(
 ) -> Mismatch:
     channel = table.channel(sources)
     channel = replace(channel, static=static_patterns(channel))
-    settled = settle(channel, progress=progress)
+    settled = settle(channel, most_work=MOST_WORK, progress=progress)
     chosen: list[WithoutPart] = []
     held_out = _held_out(settled, table, chosen, progress) if hold_out else None
     refits = refits_without(settled, [rows for _, rows in parts_of(channel)])
     kept = channel.residual - (float(np.mean(channel.residual)) if table.has_offset else 0.0)
     is_worse_here = is_worse(_rms(channel.residual - settled.predicted()), _rms(kept))
-    findings = read_off(settled, Trial(held_out, refits, is_worse_here=is_worse_here))
     left = left_over(settled)
+    parts = ChosenWithoutParts(chosen) if hold_out else None
+    levels = levels_of(settled, left, parts, held_out, matters, worse=is_worse_here)
+    findings = read_off(settled, Trial(held_out, refits, is_worse_here=is_worse_here), levels)
     return Mismatch(
         table=table,
         settled=settled,
@@ -237,11 +251,11 @@ def _found(
         fitted=_fitted(settled, table, refits),
         left=left,
         is_worse_here=is_worse_here,
-        levels=levels_of(settled, left, ChosenWithoutParts(chosen) if hold_out else None, held_out, matters),
+        levels=levels,
         held_out=held_out,
         lacking=lacking,
         texts={source.name: source.texts for source in sources},
-        second_start=_second_start(settled, findings),
+        second_start=_second_start(settled),
         cancelling=_cancelling(settled, table.unit),
     )
 
@@ -270,15 +284,13 @@ def choose_without(
 ) -> Settled:
     """Repeat the selection without rows, shape (n,), less widely, which can only raise the error."""
     kept = channel.without(rows).thinned(FOLD_ROWS)
-    return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,))
+    return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,), most_work=MOST_WORK_WITHOUT)
 
 
-def _second_start(settled: Settled, findings: Sequence[CauseFinding]) -> float:
-    """Return the log odds of another search's end; zero if equivalent."""
-    classes = {name: finding.name for finding in findings for name in finding.equivalent}
-    other = settled.second_start()
-    same = {classes.get(name, name) for name in other.names} == {classes.get(n, n) for n in settled.best.names}
-    return 0.0 if same else other.log_posterior - settled.best.log_posterior
+def _second_start(settled: Settled) -> float:
+    """Log odds of what a search that begins beside nothing ends at, over what was found; zero where it is the same."""
+    other = next((one for one in settled.others if one.beginning is Beginning.NOTHING), settled)
+    return 0.0 if other.best.names == settled.best.names else other.log_probability - settled.log_probability
 
 
 def _shares(settled: Settled) -> tuple[Share, ...]:
@@ -302,31 +314,15 @@ def _shares(settled: Settled) -> tuple[Share, ...]:
 
 
 def _resembles(settled: Settled) -> dict[str, dict[str, float]]:
-    """Return named forms' shares of curves, alone and together."""
-    found = {}
-    for member in settled.best.members:
-        pattern = settled.bank.patterns.get(member.cause.name)
-        if pattern is None or pattern.family is not Family.CURVE:
-            continue
-        effect = settled.effect([member.cause.name])
-        found[member.cause.name] = {name: _followed(effect, columns) for name, columns in _named_forms(pattern).items()}
+    """Shares of the squares of curves that other causes over the same variable make, beside base and other members."""
+    patterns, found = settled.bank.patterns, {}
+    for name in settled.best.names:
+        if name in patterns and patterns[name].family is Family.CURVE:
+            over = followed_by(settled.bank, name)
+            rest = [c for c in settled.causes if c.name != name and followed_by(settled.bank, c.name) == over]
+            simple_first = sorted(rest, key=lambda cause: max(len(one.columns) for one in cause.variants))
+            found[name] = {c.name: share_of(settled, [name], c) for c in simple_first}
     return found
-
-
-def _named_forms(pattern: Pattern) -> dict[str, NDArray[np.float64]]:
-    variable = pattern.variables[0]
-    forms = {"linear": variable.scaled[:, None], "parabola": np.column_stack([variable.scaled, variable.scaled**2])}
-    if covers_turns(variable):
-        once, twice = (turn(variable, order).columns(variable.values) for order in (1, 2))
-        forms |= {"once per turn": once, "twice per turn": twice, "once and twice per turn": np.hstack([once, twice])}
-    return forms
-
-
-def _followed(effect: NDArray[np.float64], columns: NDArray[np.float64]) -> float:
-    both = np.column_stack([np.ones(len(effect)), columns])
-    values, *_ = np.linalg.lstsq(both, effect, rcond=None)
-    whole = float(np.sum((effect - effect.mean()) ** 2))
-    return 1.0 - float(np.sum((effect - both @ values) ** 2)) / whole if whole > 0.0 else 0.0
 
 
 def _cancelling(settled: Settled, unit: str) -> Cancelling | None:

@@ -71,6 +71,15 @@ class OutputSchema(Schema):
     """Time constant of the sensor's filter, of first order, which simulated values pass [s]; absent: none."""
 
 
+class SignalSchema(Schema):
+    """One quantity that is known at a port."""
+
+    unit: str = ""
+    """Its unit; angles in rad, deg or turn."""
+    result: bool = False
+    """Whether it results from what is simulated, so that it shows a difference and is no cause of it."""
+
+
 class PortSchema(Schema):
     """One place of the simulator where something may act."""
 
@@ -78,8 +87,19 @@ class PortSchema(Schema):
     """What it is, in words."""
     unit: str = ""
     """Unit of what acts there."""
-    signals: dict[Name, str] = Field(default_factory=dict)
-    """Quantities that are known there, with their units; angles in rad, deg or turn."""
+    signals: dict[Name, str | SignalSchema] = Field(default_factory=dict)
+    """Quantities that are known there, with their units; angles in rad, deg or turn. One that results from what is simulated is given as
+    `{unit: N m, result: true}`."""
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the signals."""
+        return {name: one if isinstance(one, str) else one.unit for name, one in self.signals.items()}
+
+    @property
+    def results(self) -> frozenset[str]:
+        """Signals that result from what is simulated."""
+        return frozenset(name for name, one in self.signals.items() if not isinstance(one, str) and one.result)
 
 
 class SimulatorFile(Schema):

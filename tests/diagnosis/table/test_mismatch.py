@@ -16,6 +16,7 @@ from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel
 from dbbstation.inference.folds import parts_of
 from dbbstation.inference.jackknife import refits_without
+from dbbstation.inference.levels import FollowsAnswer
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.seen import seen
 from dbbstation.inference.settle import settle, static_patterns
@@ -214,7 +215,9 @@ def test_a_robot_measured_by_a_laser_tracker(recordings, tmp_path):
     assert not found.is_worse
     assert found.shares[0].variable == "q1"
     assert any("q1" in finding.variables for finding in found.identified)
-    assert all(finding.gains.predicts for finding in found.identified)
+    follows = [one for one in found.levels.follows if one.answer is FollowsAnswer.FOLLOWS]
+    assert all(one.gain > np.log(19.0) and one.after < one.before for one in follows)
+    assert {name for one in follows for name in one.members} >= {one.name for one in found.identified}
 
 
 def predicted_rms(found: Mismatch, columns: list) -> float:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.inference.levels import Differs, FollowsAnswer
+from dbbstation.inference.levels import RUN, Differs, FollowsAnswer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
+    from dbbstation.facts.value import Value
     from dbbstation.inference.levels import DifferenceFound, Followed, LawForm, Levels
 
 LIKELY = 0.5
@@ -20,20 +21,26 @@ MOST_LISTED = 4
 WAYS = {"value": "by value", "direction": "by direction of travel", "late": "late", "in_time": "in time"}
 
 
-def level_sentences(levels: Levels, unit: str) -> list[str]:
+def level_sentences(levels: Levels, unit: str, values: Mapping[str, Mapping[str, Value]]) -> list[str]:
     """Return sentences on existence, variables and law of a difference, and correction.
 
     Args:
         unit: may be empty.
+        values: numbers of laws, by law and number.
     """
     found = [*_difference(levels.differs, unit)]
     for one in levels.follows:
-        found += _followed(one, unit)
+        found += _followed(one, unit, values)
     if levels.correction is False:
-        found.append(
-            "No correction is offered: the corrected values predict held-out rows no better than as simulated. The refit may be at fault."
-        )
+        found.append(no_correction(levels))
     return found
+
+
+def no_correction(levels: Levels) -> str:
+    """Why no correction is offered, as a sentence."""
+    if levels.differs.gain is None:
+        return "No correction is offered: the corrected values leave more of these rows than the values as simulated."
+    return "No correction is offered: the corrected values predict held-out rows no better than as simulated. The refit may be at fault."
 
 
 def _difference(one: DifferenceFound, unit: str) -> Iterator[str]:
@@ -55,14 +62,14 @@ def _difference(one: DifferenceFound, unit: str) -> Iterator[str]:
         yield f"Fitted parameters take up {100.0 * d.concealed:.0f} % of the squares of an effect over {d.follows}."
 
 
-def _followed(one: Followed, unit: str) -> Iterator[str]:
+def _followed(one: Followed, unit: str, values: Mapping[str, Mapping[str, Value]]) -> Iterator[str]:
     ways = [WAYS[way] for way, probability in one.ways.items() if probability >= LIKELY]
     how = f"probability {one.probability:.3f}{''.join(f', {way}' for way in ways)}, {_size(one.rms, unit)} rms"
     also = f" These rows cannot tell it from {_listed(one.or_variables)}." if one.or_variables else ""
     what = {
         FollowsAnswer.FOLLOWS: f"The difference follows {one.name}",
         FollowsAnswer.GOES_ON: "The difference goes on in time; no listed variable says it",
-        FollowsAnswer.HAPPENED: "Something happened in time",
+        FollowsAnswer.HAPPENED: "Runs differ by an offset" if one.name == RUN else "Something happened in time",
         FollowsAnswer.DOES_NOT_PREDICT: f"In these rows the difference follows {one.name}; other rows gain nothing by it",
         FollowsAnswer.NOT_TESTED: f"The difference follows {one.name}; this was not tested on held-out rows",
         FollowsAnswer.UNDECIDED: f"The difference may follow {one.name}; these rows do not decide it",
@@ -76,17 +83,28 @@ def _followed(one: Followed, unit: str) -> Iterator[str]:
         yield f"  Correcting it leaves {one.after:.3g} of {_size(one.before, unit)} rms in rows that took no part."
     if one.consequence:
         yield f"  {one.name} results from what is simulated: it shows the difference, and is no cause of it."
+    elif one.may_result:
+        yield f"  {one.name} carries the difference itself: it may be its cause, or result from it. These rows cannot tell."
     if one.form is not None:
-        yield f"  {_law(one.form)}"
+        yield f"  {_law(one.form, values)}"
+        sloped = any("slope" in values.get(name, {}) for name in one.form.names)
+        if one.slope is not None and one.straight >= LIKELY and not sloped:
+            yield f"  The straight line through it over {one.variables[0][0]} has {one.slope.in_words}: {100.0 * one.straight:.0f} % of its squares."
 
 
-def _law(form: LawForm) -> str:
-    if form.name is not None:
-        same = f" These rows cannot tell it from {_listed(form.not_worse)}." if form.not_worse else ""
-        return f"Law: {form.name}.{same}"
-    if len(form.not_worse) == 1:
-        return f"Law: no single one; {form.not_worse[0]} predicts best."
+def _law(form: LawForm, values: Mapping[str, Mapping[str, Value]]) -> str:
+    if form.names:
+        same = f" These rows cannot tell it from {_listed(form.not_worse)}." if form.name and form.not_worse else ""
+        laws = "; and ".join(f"{name}{_numbers(values.get(name, {}))}" for name in form.names)
+        return f"{'Law' if len(form.names) == 1 else 'Laws, together'}: {laws}.{same}"
     return f"Law: open. These rows cannot tell {_listed(form.not_worse)} apart."
+
+
+def _numbers(values: Mapping[str, Value]) -> str:
+    """Numbers of a law, with unit and u; those of a curve say little by themselves."""
+    if not values or len(values) > MOST_LISTED:
+        return ""
+    return f", {', '.join(f'{name} {value.in_words}' for name, value in values.items())}"
 
 
 def _listed(names: tuple[str, ...]) -> str:

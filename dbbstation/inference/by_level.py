@@ -1,0 +1,127 @@
+"""Verdicts on single causes, read off the levels of the classes that they are in."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.facts.value import Value
+from dbbstation.inference.levels import JOINED, FollowsAnswer
+from dbbstation.inference.pushes import too_many, within_a_step
+from dbbstation.inference.seen import IN_TIME
+from dbbstation.inference.verdict import OUT, Acts, Verdict
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.levels import Followed, Levels
+    from dbbstation.inference.settled import Settled
+
+Said = tuple[Verdict, tuple[str, ...], str]
+"""A verdict, causes of which one may be there instead, and why."""
+
+MAKES_UP = "Held-out parts are predicted worse than as simulated, and something beside it predicts none: this may make up for that."
+"""Why something that happened once is not sure: its probability is that beside effects which other rows refute."""
+
+
+class VerdictsByLevel:
+    """Verdicts on members of the best set, and on what rows cannot tell from them.
+
+    A law that level 3 names is identified, what follows the time alone happened, and a class that gains nothing in held-out parts does not
+    predict. Everything else is ambiguous.
+
+    Args:
+        settled: what the comparison came to.
+        levels: read off that.
+        values: amplitudes of each member with their covariance, by name, shapes (p,) and (p, p).
+        worse: whether everything together leaves more than the reference; asked where no parts were held back.
+    """
+
+    def __init__(
+        self,
+        settled: Settled,
+        levels: Levels,
+        values: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]],
+        *,
+        worse: bool,
+    ) -> None:
+        self._settled, self._levels, self._values, self._worse = settled, levels, values, worse
+
+    def of_member(self, name: str, sigmas: float, acts: Acts) -> Said:
+        """What is said of a member whose effect is so many standard deviations out."""
+        classes = [one for one in self._levels.follows if name in one.members]
+        answers = {one.answer for one in classes}
+        if FollowsAnswer.UNDECIDED in answers:
+            return Verdict.AMBIGUOUS, (), "These rows do not decide it."
+        if sigmas < OUT:
+            return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
+        if acts is Acts.ONCE or any(one.in_time for one in classes):
+            return self._happened(name)
+        if FollowsAnswer.DOES_NOT_PREDICT in answers:
+            return Verdict.DOES_NOT_PREDICT, (), "It was found in these rows, and held-out parts gain nothing by it."
+        if FollowsAnswer.NOT_TESTED in answers and self._worse:
+            return (
+                Verdict.DOES_NOT_PREDICT,
+                (),
+                "With everything that was found these rows are left worse than as simulated.",
+            )
+        return _of_laws(classes, name)
+
+    def instead_of(self, name: str) -> frozenset[str]:
+        """Members in whose place a law is named that is none of them; none where it is not."""
+        return frozenset[str]().union(*(one.members for one in self._levels.follows if _named(one, name)))
+
+    def alike(self, name: str) -> str:
+        """What rows cannot tell a cause from that is no member; empty where there is nothing."""
+        for one in self._levels.follows:
+            if one.form is not None and name in one.form.not_worse:
+                return next(iter(one.form.names or sorted(one.members)))
+        return ""
+
+    def equivalent(self, name: str) -> tuple[str, ...]:
+        """A named law, and laws that are the same to these rows; none where there are none."""
+        forms = [one.form for one in self._levels.follows if one.form is not None and one.form.name == name]
+        same = dict.fromkeys(other for form in forms for other in form.not_worse)
+        return (name, *same) if same else ()
+
+    def _happened(self, name: str) -> Said:
+        every = [size for own in self._pushes.values() for size in own]
+        if name in self._pushes and (
+            why := within_a_step(self._pushes[name], self._settled.channel.step) or too_many(every)
+        ):
+            return Verdict.AMBIGUOUS, (), why
+        refuted = any(one.answer is FollowsAnswer.DOES_NOT_PREDICT for one in self._levels.follows)
+        if refuted and self._levels.correction is False:
+            return Verdict.AMBIGUOUS, (), MAKES_UP
+        return Verdict.HAPPENED, (), ""
+
+    @cached_property
+    def _pushes(self) -> dict[str, list[Value]]:
+        """Sizes of all stretches of time, by member."""
+        unit, patterns, found = self._settled.channel.unit, self._settled.bank.patterns, {}
+        for name in (n for n in self._values if n in patterns and patterns[n].family in IN_TIME):
+            values, covariance = self._values[name]
+            sigmas = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+            found[name] = [Value(float(v), float(s), unit) for v, s in zip(values, sigmas, strict=True)]
+        return found
+
+
+def _named(one: Followed, name: str) -> bool:
+    """Whether a law is named for a class."""
+    return one.form is not None and name in one.form.names
+
+
+def _of_laws(classes: Sequence[Followed], name: str) -> Said:
+    """What is said of a member of classes that are followed: each must name it."""
+    if all(_named(one, name) for one in classes):
+        return Verdict.IDENTIFIED, (), ""
+    open_to = [
+        (*one.form.names, *one.form.not_worse) for one in classes if one.form is not None and not _named(one, name)
+    ]
+    others = tuple(dict.fromkeys(n for names in open_to for n in names if n != name and JOINED not in n))
+    text = f"These rows cannot tell it from {', '.join(others)}." if others else "No single law was named here."
+    return Verdict.AMBIGUOUS, others, text

@@ -1,0 +1,72 @@
+"""Whether a column may result from what is simulated: it follows that, and what it departs by is the difference itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.channel import Channel
+    from dbbstation.inference.variables import Variable
+
+DETERMINED = 0.9
+"""Share of the squares of a column that the simulated value makes with its first two derivatives, from which on it is a column of the motion
+itself, as a torque is: of a column that only goes along with it, such as a temperature, they make less."""
+
+CARRIES = 0.5
+"""Share of what is left of it that the difference, with its derivatives, makes: more than all else together."""
+
+BY_CHANCE = 1e-3
+"""Probability of that by chance, as that of `left_over`."""
+
+STILL = 1e-9
+"""Share of the squares of a column below which nothing is left of it: it is the simulated value over again, which carries no difference."""
+
+
+def may_result(variable: Variable, channel: Channel) -> bool:
+    """Whether a column may be a consequence of what is simulated as well as a cause of the difference.
+
+    A torque that is measured beside a motion follows the motion as it was, not as it was simulated: it carries the difference. A cause of the
+    difference carries it, too, so that these rows alone cannot tell.
+    """
+    if channel.simulated is None or channel.time is None:
+        return False
+    kept, values = channel.kept, variable.values[channel.kept]
+    simulated, carried = (
+        _with_derivatives(values, channel.time, channel.blocks)[kept]
+        for values in (channel.simulated.values, channel.residual)
+    )
+    whole = float(np.sum(np.square(values - values.mean())))
+    left = _left(values, simulated)
+    both = _left(values, np.hstack([simulated, carried]))
+    if not STILL * whole < left <= (1.0 - DETERMINED) * whole or both > (1.0 - CARRIES) * left:
+        return False
+    free = len(values) - simulated.shape[1] - carried.shape[1]
+    more = carried.shape[1]
+    return (
+        free > 0 and float(f_distribution.sf((left - both) / more / max(both / free, 1e-300), more, free)) < BY_CHANCE
+    )
+
+
+def _with_derivatives(
+    values: NDArray[np.float64], time: NDArray[np.float64], blocks: Sequence[slice]
+) -> NDArray[np.float64]:
+    """A constant, values, and their first two derivatives by central differences, shape (n, 4)."""
+    found = np.column_stack([np.ones(len(values)), values, np.zeros((len(values), 2))])
+    for rows in blocks:
+        if rows.stop - rows.start > 2 and np.all(np.diff(time[rows]) > 0.0):  # noqa: PLR2004 - a second difference
+            found[rows, 2] = np.gradient(values[rows], time[rows])
+            found[rows, 3] = np.gradient(found[rows, 2], time[rows])
+    return found
+
+
+def _left(values: NDArray[np.float64], by: NDArray[np.float64]) -> float:
+    """Sum of squares that columns leave of values."""
+    scaled = by / np.maximum(np.linalg.norm(by, axis=0), 1e-300)
+    return float(np.sum(np.square(values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0])))

@@ -1,0 +1,98 @@
+"""Laws that a signal bends, against closed forms and a differential equation; and tables that lack one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dbbstation.inference.bent import bent_laws, integral_of
+from dbbstation.inference.left_over import left_over
+from dbbstation.inference.levels_of import levels_of
+from dbbstation.inference.memory import memory_laws
+from dbbstation.inference.named_values import named_values
+from dbbstation.inference.patterns import Family
+from dbbstation.inference.settle import settle
+from dbbstation.inference.settled import Beginning
+from dbbstation.inference.variables import Kind, Variable
+from tests.inference.tables import direction, table
+from tests.inference.test_channel import channel
+
+ONE = (Beginning.EVERYTHING,)
+
+
+def laws_of(data):
+    """New laws of a table, beside lags and dead times, by name."""
+    whole = channel(data, blocks=1)
+    variables, blocks = whole.variables, whole.blocks
+    found = bent_laws(variables, data.t, "s", blocks, 0.2, "mm") + memory_laws(
+        variables, data.t, "s", blocks, 0.2, "mm"
+    )
+    return {law.name: law for law in found}
+
+
+def test_columns_are_their_formulas():
+    data = table(1, rows=400)
+    laws = laws_of(data)
+    rate = np.gradient(data.q, data.t)
+    expected = {
+        ("saturation of q", 7.0): np.tanh(data.q / 7.0),
+        ("dead zone of q", 7.0): np.where(np.abs(data.q) > 7.0, data.q - 7.0 * np.sign(data.q), 0.0),
+        ("friction of q", 2.5): np.tanh(rate / 2.5),
+        ("saturation of temperature", 0.5): np.tanh(
+            (data.temperature - 0.5 * (data.temperature.min() + data.temperature.max())) / 0.5
+        ),
+    }
+    for (name, width), values in expected.items():
+        assert laws[name].columns((width,))[:, 0] == pytest.approx(values, abs=1e-12)
+    scaled = laws["scaled hysteresis of q by load"].columns(())
+    assert scaled[2:-2, 0] == pytest.approx((np.sign(rate) * data.load)[2:-2], abs=1e-12)
+    assert not any("by t" in name.split() or name.endswith(" of t") for name in laws)
+
+
+def test_the_integral_of_a_sine_is_a_cosine():
+    time = np.linspace(0.0, 6.0 * np.pi, 2001)
+    wave = Variable("x", "A", Kind.ANY, np.sin(time))
+    found = integral_of(wave, time, (slice(0, 2001),))
+    assert found == pytest.approx(1.0 - np.cos(time), abs=2e-5)
+    # Each run begins at zero again.
+    both = integral_of(wave, time, (slice(0, 1000), slice(1000, 2001)))
+    assert both[1000] == 0.0
+    assert both[1000:] == pytest.approx(found[1000:] - found[1000], abs=1e-12)
+
+
+def test_rows_without_order_have_no_direction_and_no_past():
+    data = table(1, rows=200)
+    variables = channel(data, blocks=1).variables
+    found = bent_laws(variables, None, "s", (slice(0, 200),), 0.2, "mm")
+    assert {law.family for law in found} == {Family.SATURATION, Family.DEAD_ZONE}
+
+
+MISSING = {
+    "saturation of q": (lambda d: 0.3 * np.tanh(d.q / 12.0), {"turns over within": 12.0, "limit": 0.3}),
+    "friction of q": (lambda d: 0.3 * np.tanh(np.gradient(d.q, d.t) / 6.0), {"turns over within": 6.0, "size": 0.3}),
+    "scaled hysteresis of q by load": (lambda d: 0.08 * direction(d.q) * d.load, {"size per unit": 0.08}),
+    "integral of q": (
+        lambda d: 0.005 * np.concatenate([[0.0], np.cumsum(0.5 * (d.q[1:] + d.q[:-1]) * np.diff(d.t))]),
+        {"rate": 0.005},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MISSING)
+def test_a_table_that_lacks_one_names_it_with_its_numbers(name):
+    effect, numbers = MISSING[name]
+    data = table(5, effect, rows=700)
+    settled = settle(
+        replace(channel(data, blocks=1), laws=tuple(laws_of(data).values())), beginnings=ONE, thorough=False
+    )
+    levels = levels_of(settled, left_over(settled), None, None)
+    named = {law for one in levels.follows for law in (one.form.names if one.form else ())}
+    assert name in named
+    member = next(m for m in settled.best.members if m.cause.name == name)
+    estimates = settled.comparison.estimates([member, *settled.best.without(name)])
+    width = len(member.columns)
+    values = named_values(settled, member, estimates.values[:width], estimates.covariance[:width, :width])
+    for number, true in numbers.items():
+        assert abs(values[number].value - true) < 4.0 * values[number].uncertainty + 0.02 * abs(true)

@@ -16,7 +16,7 @@ from dbbstation.computing.processes import processes
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.atomic import write_text
 from dbbstation.system.memory import forget_largest_memory, largest_memory_mb
-from dbbstation.system.signals import deaf
+from dbbstation.system.signals import starting
 from dbbstation.tasks.diagnose import diagnose_sessions
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def judge_sessions(
             progress(done, len(sessions))
     else:
         with processes(jobs) as pool:
-            with deaf():
+            with starting():
                 handed = [pool.submit(work, path) for path in waiting]
             for one in as_completed(handed):
                 one.result()

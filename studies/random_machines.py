@@ -6,7 +6,7 @@ import os
 from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.computing.processes import processes
-from dbbstation.system.signals import deaf
+from dbbstation.system.signals import starting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -28,6 +28,6 @@ def over_machines(experiment: Callable[[int], Result], seeds: Sequence[int]) -> 
         yield from map(experiment, seeds)
         return
     with processes(cores) as pool:
-        with deaf():
+        with starting():
             results = pool.map(experiment, seeds, chunksize=TOGETHER)
         yield from results

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.system.signals import deaf
+from dbbstation.system.signals import started, starting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
@@ -37,7 +37,7 @@ def each(work: Callable[[Item], Result], items: Sequence[Item], count: int) -> G
     if count > 1:
         try:
             with processes(count) as pool:
-                with deaf():
+                with starting():
                     futures = {pool.submit(work, item): place for place, item in left.items()}
                 for future in as_completed(futures):
                     result = future.result()
@@ -51,10 +51,12 @@ def each(work: Callable[[Item], Result], items: Sequence[Item], count: int) -> G
 
 @contextmanager
 def processes(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield processes that end when this one is interrupted; give them work while `deaf`."""
+    """Yield processes that end when this one is interrupted; give them work within `starting`."""
     # Started anew rather than forked: a fork would copy the locks of the threads that kernels run on.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(count, mp_context=context, initializer=_end_with_parent) as pool:
+    with starting():
+        made = ProcessPoolExecutor(count, mp_context=context, initializer=_end_with_parent)
+    with made as pool:
         try:
             yield pool
         except BaseException:
@@ -67,6 +69,7 @@ def processes(count: int) -> Iterator[ProcessPoolExecutor]:
 
 def _end_with_parent() -> None:
     """End a process with its parent, which cannot tell it when killed."""
+    started()
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_after, args=(parent.sentinel,), name="end-with-parent", daemon=True).start()

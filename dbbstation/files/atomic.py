@@ -22,6 +22,7 @@ from dbbstation.system.replacing import remove, remove_tree, rename, replace, sy
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
+    from pathlib import PurePath
 
 _LOG = logging.getLogger(__name__)
 
@@ -188,10 +189,17 @@ def _refuse_overwriting(path: Path, *, force: bool) -> None:
         raise OutputError("the file exists already", where=str(path), remedy="give --force to replace it")
 
 
+def is_leftover(path: PurePath) -> bool:
+    """Return whether a path is, or lies in, a temporary one that a power cut left."""
+    return any(part.startswith(".") and part.endswith(_MARK) for part in path.parts)
+
+
 def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files that a power cut left, with no other writer there."""
-    for left in folder.glob(f".*{_MARK}"):
-        if left.is_file() and not left.is_symlink():
+    """Remove what a power cut left in a folder and its folders, with no other writer there."""
+    for left in sorted(folder.rglob(f".*{_MARK}")):
+        if left.is_dir() and not left.is_symlink():
+            remove_tree(left)
+        elif left.is_file() and not left.is_symlink():
             remove(left)
 
 

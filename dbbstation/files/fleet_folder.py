@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Self
 
 from dbbstation.errors import OutputError
-from dbbstation.files.atomic import remove_leftovers, write_bytes, write_text
+from dbbstation.files.atomic import is_leftover, remove_leftovers, write_bytes, write_text
 from dbbstation.files.gateway import content_of
+from dbbstation.files.recordings.lock import LOCK_FILE, SessionLock
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,7 +33,7 @@ _LONGEST = 60
 
 
 class FleetFolder:
-    """Results of one task in a folder.
+    """Results of one task in a folder. A context.
 
     Raises:
         OutputError: something else lies in the folder, or it cannot be written.
@@ -39,7 +41,7 @@ class FleetFolder:
 
     def __init__(self, folder: Path, task: str) -> None:
         mark = folder / _MARK
-        if folder.exists() and not mark.is_file() and (not folder.is_dir() or any(folder.iterdir())):
+        if folder.exists() and not mark.is_file() and (not folder.is_dir() or not all(map(_begun, folder.iterdir()))):
             what = "this is no folder of fleet results, and something lies in it"
             raise OutputError(what, where=str(folder), remedy="name another with --out, or an empty one")
         self.folder = folder
@@ -47,12 +49,26 @@ class FleetFolder:
         self.page = folder / f"{task}.html"
         self._results = folder / task
         try:
-            self._results.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True)
+            if not mark.is_file():
+                write_text(mark, json.dumps({"format": "dbb-fleet/1"}) + "\n")
+            self._results.mkdir(exist_ok=True)
         except OSError as error:
             raise OutputError(f"cannot be made: {error.strerror}", where=str(self._results)) from error
-        remove_leftovers(folder)
-        if not mark.is_file():
-            write_text(mark, json.dumps({"format": "dbb-fleet/1"}) + "\n")
+        # Another process that works in the folder has temporary files there: only who is alone removes any.
+        self._lock: SessionLock | None = None
+        with suppress(OutputError):
+            self._lock = SessionLock(folder)
+            remove_leftovers(folder)
+
+    def __enter__(self) -> Self:
+        """Return the folder."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let another process clean up."""
+        if self._lock is not None:
+            self._lock.close()
 
     def known(self, name: str, key: str) -> dict[str, object] | None:
         """Return a result kept under a key, or None."""
@@ -89,3 +105,8 @@ class FleetFolder:
     def _file(self, name: str, key: str) -> Path:
         plain = re.sub(r"[^A-Za-z0-9_-]+", "-", name)[-_LONGEST:].strip("-") or "session"
         return self._results / f"{plain}-{key[:_SHOWN]}.json"
+
+
+def _begun(path: Path) -> bool:
+    """Return whether a path is what a fleet leaves that was ended before it put its mark there."""
+    return path.name == LOCK_FILE or is_leftover(path)

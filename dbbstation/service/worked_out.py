@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,7 +13,9 @@ from dbbstation.errors import InputError, OutputError
 from dbbstation.files.atomic import write_text
 from dbbstation.files.gateway import content_of
 from dbbstation.files.keys import digests_of, files_of_session, key_of
+from dbbstation.files.places import real_path
 from dbbstation.files.recordings.session import read_session
+from dbbstation.service.job import SessionTask
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -71,7 +74,9 @@ def steps_before(session: Path) -> StepsBefore | None:
     Steps with missing files are left out.
     """
     session = session.absolute()
-    kept = sorted(session.parent.glob(f"{session.name}-results*/{FILE}"), key=lambda file: -file.stat().st_mtime)
+    kept = sorted(
+        session.parent.glob(f"{glob.escape(session.name)}-results*/{FILE}"), key=lambda file: -file.stat().st_mtime
+    )
     try:
         now = counted(session) if kept else ""
     except (InputError, OSError):  # what is wrong with it is said where it is opened
@@ -83,9 +88,15 @@ def steps_before(session: Path) -> StepsBefore | None:
             continue
         if found.key == now:
             folder = file.parent
-            steps = {name: step for name, step in found.steps.items() if (folder / step.path).exists()}
+            steps = {name: step for name, step in found.steps.items() if _is_result(folder, name, step)}
             return StepsBefore(folder, now, steps)
     return None
+
+
+def _is_result(folder: Path, name: str, step: DoneStep) -> bool:
+    """Return whether a step is one that is known, and its file is in the folder of results."""
+    path = folder / step.path
+    return name in set(SessionTask) and path.exists() and real_path(path).is_relative_to(real_path(folder))
 
 
 def counted(session: Path) -> str:

@@ -18,7 +18,7 @@ from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
 from dbbstation.errors import CalibrationError
 from dbbstation.simulators.kept import KeptSimulations
 from dbbstation.simulators.loading import know, simulator_of
-from dbbstation.system.signals import deaf
+from dbbstation.system.signals import starting
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -145,7 +145,7 @@ class Runs:
         parts = [asks[k : k + together] for k in range(0, len(asks), together)]
         loaded = self._loaded
         try:
-            with deaf():
+            with starting():
                 futures = [
                     self._pool.submit(_several, loaded.source, loaded.own_files, self._model, pickle.dumps(part))
                     for part in parts

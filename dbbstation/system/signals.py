@@ -62,16 +62,31 @@ def politely_ended() -> Iterator[None]:
 
 
 @contextmanager
-def deaf() -> Iterator[None]:
-    """Ignore Ctrl-C: processes that start now ignore it as long as they live, and this one alone answers it."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(CTRL_C, signal.SIG_IGN)
+def starting() -> Iterator[None]:
+    """Processes that start now ignore Ctrl-C as long as they live, and load no module of the working folder.
+
+    This process alone answers Ctrl-C. A folder that somebody handed over may hold a `random.py`; PYTHONSAFEPATH keeps
+    it out of the first imports of a process (Python, "Command line and environment").
+    """
+    safe = os.environ.setdefault(_SAFE, _OURS) == _OURS
+    ignored = threading.current_thread() is threading.main_thread()
+    before = signal.signal(CTRL_C, signal.SIG_IGN) if ignored else None
     try:
         yield
     finally:
-        signal.signal(CTRL_C, before)
+        if ignored:
+            signal.signal(CTRL_C, before)
+        if safe:
+            os.environ.pop(_SAFE, None)
+
+
+def started() -> None:
+    """Let programs that a process of ours starts find modules as users expect; to be called first in such a process."""
+    if os.environ.get(_SAFE) == _OURS:
+        del os.environ[_SAFE]
+
+
+_SAFE, _OURS = "PYTHONSAFEPATH", "dbbstation"
 
 
 def end_as_hung_up() -> None:

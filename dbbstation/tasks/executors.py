@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from concurrent.futures import BrokenExecutor, CancelledError, as_completed
 from contextlib import contextmanager
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from dbbstation.computing.processes import processes
 from dbbstation.errors import StationError
 from dbbstation.files.program_identity import differences_of, program_identity
-from dbbstation.system.signals import deaf
+from dbbstation.system.signals import starting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
@@ -92,7 +93,7 @@ class WorkPool(Generic[Item, Result]):
         self, work: Callable[[Item], Result], items: Sequence[Item], left: deque[int], count: int
     ) -> Generator[tuple[int, Result | Ended], None, bool]:
         with self.executor(count) as pool:
-            with deaf():
+            with starting():
                 futures = {pool.submit(work, items[place]): place for place in left}
             for future in as_completed(futures):
                 place = futures.pop(future)
@@ -126,7 +127,7 @@ def _of_dask(address: str) -> Iterator[Executor]:
         remedy = "install it with `pip install 'dbbstation[dask]'`"
         raise SchedulerError("distributed, Dask's scheduler, is not installed", remedy=remedy) from error
     try:
-        client = Client(address, timeout=REACHED_S, set_as_default=False)
+        client = _within(REACHED_S, lambda: Client(address, timeout=REACHED_S, set_as_default=False))
     except (OSError, TimeoutError, ValueError) as error:
         what = f"no scheduler answers: {str(error) or type(error).__name__}"
         raise SchedulerError(
@@ -144,6 +145,31 @@ def _of_dask(address: str) -> Iterator[Executor]:
         client.close()
 
 
+def _within(limit_s: float, act: Callable[[], Any]) -> Any:  # noqa: ANN401 - what it returns
+    """Return what a function returns; Dask's own limit does not hold for a server that takes a connection and is mute.
+
+    Raises:
+        TimeoutError: it takes longer; it goes on in a thread that does not hold up the end of the program.
+    """
+    ended: list[tuple[Any, BaseException | None]] = []
+
+    def run() -> None:
+        try:
+            ended.append((act(), None))
+        except BaseException as error:  # noqa: BLE001 - raised below, in the thread that waits
+            ended.append((None, error))
+
+    thread = threading.Thread(target=run, name="scheduler", daemon=True)
+    thread.start()
+    thread.join(limit_s)
+    if not ended:
+        raise TimeoutError(f"nothing within {limit_s:g} s")
+    result, error = ended[0]
+    if error is not None:
+        raise error
+    return result
+
+
 def _check_workers(client: Any, address: str) -> None:  # noqa: ANN401 - distributed ships no types
     try:
         client.wait_for_workers(1, timeout=REACHED_S)
@@ -154,7 +180,7 @@ def _check_workers(client: Any, address: str) -> None:  # noqa: ANN401 - distrib
             what = f"the worker {worker} has {about['nthreads']} threads, which wait for one another"
             raise SchedulerError(what, where=address, remedy="start workers with --nthreads 1, one for each core")
     try:
-        found = client.run(program_identity)
+        found = _within(REACHED_S, lambda: client.run(program_identity))
     except Exception as error:
         what = f"a worker has no dbbstation, or another one: {type(error).__name__}: {error}"
         raise SchedulerError(what, where=address, remedy="install the same version there") from error

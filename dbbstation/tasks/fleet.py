@@ -124,50 +124,50 @@ def fleet(
     if task not in TASKS:
         raise StationError(f"there is no task {task!r} for a fleet", remedy=f"it is one of {', '.join(TASKS)}")
     telling = Telling(progress, stop, say)
-    kept = FleetFolder(Path(out), task)
-    with input_book():
-        named = [replace(one, apart=apart) for one in _once(_sessions(paths_of(folders), telling), telling)]
-        extra = {str(path): digest_of(path) for path in options.source_files}
-    program = program_identity()
-    about = {"task": task, "options": _plain(options), "sources": list(extra.values())}
-    keys = {
-        place: key_of({**about, "name": one.folder.name}, [(Path(p).name, d) for p, d in one.inputs.items()])
-        for place, one in enumerate(named)
-        if one.inputs is not None
-    }
-    outcomes: dict[int, _Outcome] = {}
-    todo = []
-    for place, one in enumerate(named):
-        if one.problem:
-            outcomes[place] = _failed(one, one.problem)
-            say(f"failed: {one.name}: {one.problem}")
-        elif not anew and (data := kept.known(one.name, keys[place])) is not None:
-            outcomes[place] = _known(one, kept, data, fresh=False)
-        else:
-            todo.append(place)
-    pieces = [
-        FleetPiece(task, real_path(named[place].folder), options, {**(named[place].inputs or {}), **extra}, program)
-        for place in todo
-    ]
-    workplace: WorkPool[FleetPiece, Worked] = WorkPool(min(processes, len(pieces)), scheduler)
-    telling.stage(WORKING, 0, len(pieces))
-    with closing(workplace.each(worked, pieces)) as results:
-        for done, (at, outcome) in enumerate(results, start=1):
-            place = todo[at]
-            outcomes[place] = _taken(named[place], kept, keys[place], outcome)
-            if outcomes[place].found is None:
-                say(f"failed: {named[place].name}: {outcomes[place].session.problem}")
-            telling.stage(WORKING, done, len(pieces))
-    notes = _without_number(named)
-    for note in notes:
-        say(note)
-    result = _result(task, kept, named, [outcomes[place] for place in range(len(named))], false_alarms, notes)
-    for one in named:
-        if one.session is not None:
-            note_known(one.folder / SESSION_FILE, one.session.sha256)
-    write_fleet_table(kept.table, result, provenance(), force=True)
-    write_bytes(kept.page, fleet_html(result, provenance()), force=True)
-    return result
+    with FleetFolder(Path(out), task) as kept:
+        with input_book():
+            named = [replace(one, apart=apart) for one in _once(_sessions(paths_of(folders), telling), telling)]
+            extra = {str(path): digest_of(path) for path in options.source_files}
+        program = program_identity()
+        about = {"task": task, "options": _plain(options), "sources": list(extra.values())}
+        keys = {
+            place: key_of({**about, "name": one.folder.name}, [(Path(p).name, d) for p, d in one.inputs.items()])
+            for place, one in enumerate(named)
+            if one.inputs is not None
+        }
+        outcomes: dict[int, _Outcome] = {}
+        todo = []
+        for place, one in enumerate(named):
+            if one.problem:
+                outcomes[place] = _failed(one, one.problem)
+                say(f"failed: {one.name}: {one.problem}")
+            elif not anew and (data := kept.known(one.name, keys[place])) is not None:
+                outcomes[place] = _known(one, kept, data, fresh=False)
+            else:
+                todo.append(place)
+        pieces = [
+            FleetPiece(task, real_path(named[place].folder), options, {**(named[place].inputs or {}), **extra}, program)
+            for place in todo
+        ]
+        workplace: WorkPool[FleetPiece, Worked] = WorkPool(min(processes, len(pieces)), scheduler)
+        telling.stage(WORKING, 0, len(pieces))
+        with closing(workplace.each(worked, pieces)) as results:
+            for done, (at, outcome) in enumerate(results, start=1):
+                place = todo[at]
+                outcomes[place] = _taken(named[place], kept, keys[place], outcome)
+                if outcomes[place].found is None:
+                    say(f"failed: {named[place].name}: {outcomes[place].session.problem}")
+                telling.stage(WORKING, done, len(pieces))
+        notes = _without_number(named)
+        for note in notes:
+            say(note)
+        result = _result(task, kept, named, [outcomes[place] for place in range(len(named))], false_alarms, notes)
+        for one in named:
+            if one.session is not None:
+                note_known(one.folder / SESSION_FILE, one.session.sha256)
+        write_fleet_table(kept.table, result, provenance(), force=True)
+        write_bytes(kept.page, fleet_html(result, provenance()), force=True)
+        return result
 
 
 def _sessions(folders: Sequence[Path], telling: Telling) -> Iterator[_Named]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -135,6 +136,16 @@ def test_a_scheduler_that_is_not_there_is_said(monkeypatch):
     monkeypatch.setattr(executors, "REACHED_S", 1.0)
     with pytest.raises(SchedulerError, match="no scheduler answers"):
         list(WorkPool(1, "tcp://127.0.0.1:9").each(squared, [(1, "")]))
+
+
+def test_a_server_that_takes_a_connection_and_is_mute_is_given_up(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(executors, "REACHED_S", 1.0)
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        begun_s = time.monotonic()
+        with pytest.raises(SchedulerError, match="no scheduler answers"):
+            list(WorkPool(1, f"tcp://127.0.0.1:{mute.getsockname()[1]}").each(squared, [(1, "")]))
+        assert time.monotonic() - begun_s < 10.0
 
 
 def test_workers_are_looked_at_before_they_work(tmp_path, monkeypatch):

@@ -11,7 +11,9 @@ from dataclasses import replace
 import pytest
 
 from dbbstation.cli import DONE, FAILED, USAGE
+from dbbstation.errors import OutputError
 from dbbstation.files import keys
+from dbbstation.files.fleet_folder import FleetFolder
 from dbbstation.results.fleet import TABLE
 from dbbstation.tasks import fleet as fleet_module
 from dbbstation.tasks.fleet import fleet
@@ -224,3 +226,25 @@ def test_words_that_fit_nothing_are_refused(sessions, tmp_path):
     done = call("fleet", sessions, "--do", "circles", "--out", tmp_path / "mine")
     assert done.code == FAILED
     assert "something lies in it" in done.err
+
+
+def test_a_second_fleet_leaves_the_temporary_files_of_the_first(tmp_path):
+    half = tmp_path / "out" / "calibrate" / ".m01.json.k3f.new"
+    with FleetFolder(tmp_path / "out", "calibrate"):
+        half.write_text("half", encoding="utf-8")
+        with FleetFolder(tmp_path / "out", "calibrate"):
+            assert half.exists()
+    with FleetFolder(tmp_path / "out", "calibrate"):
+        assert not half.exists()
+
+
+def test_a_fleet_that_was_ended_before_its_mark_goes_on(tmp_path):
+    (tmp_path / "out").mkdir()
+    for name in (".lock", ".fleet.json.k3f.new"):
+        (tmp_path / "out" / name).write_text("", encoding="utf-8")
+    with FleetFolder(tmp_path / "out", "calibrate") as kept:
+        assert (kept.folder / "fleet.json").is_file()
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "holiday.txt").write_text("", encoding="utf-8")
+    with pytest.raises(OutputError, match="something lies in it"):
+        FleetFolder(tmp_path / "other", "calibrate")

@@ -10,10 +10,11 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
-from dbbstation.files.atomic import write_folder
+from dbbstation.files.atomic import is_leftover, write_folder
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.changes import changes
 from dbbstation.files.yaml.text import load_yaml
@@ -160,6 +161,7 @@ def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> It
     known = {copy_name(name, digest): digest for name, digest in seal.files.items()}
     known |= {one.former: one.former_sha256 for one in amendments if is_copy(one.former) and one.what != RUNS}
     there = {path.relative_to(folder).as_posix() for path in (folder / SEALED).rglob("*") if path.is_file()}
+    there = {name for name in there if not is_leftover(PurePosixPath(name))}
     now = hashes(folder, sorted(there))
     originals = {digest for name, digest in hashes(folder, tuple(seal.files)).items()}
     for name in sorted(there | known.keys()):

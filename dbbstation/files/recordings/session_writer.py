@@ -117,8 +117,7 @@ class SessionWriter:
     def _take_over(self) -> None:
         """Repair what a dead process left."""
         folder = self._session.folder
-        for inner in (folder, folder / RUNS, folder / PROGRAMS):
-            remove_leftovers(inner)
+        remove_leftovers(folder)
         # A run that was sealed when the station died only lacks its hash.
         for run in self.runs:
             if run.state is RunState.RECORDING and run.path.suffix == ".csv" and run.path.is_file():

@@ -129,7 +129,6 @@ class Browser:
             self.do("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key], **text)
 
     def picture(self, out: Path) -> None:
-        """Write what the page looks like, whole, as PNG."""
         shot = self.do("Page.captureScreenshot", captureBeyondViewport=True)
         out.write_bytes(base64.b64decode(shot["data"]))
 

@@ -39,7 +39,6 @@ def test_the_whole_job(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("tests", [QUICK, pytest.param(EIGHT, marks=pytest.mark.nightly)], ids=["quick", "eight"])
 def test_the_whole_job_on_some_of_its_circles(tmp_path, monkeypatch, tests):
-    """Machine and station are processes on a line; what computes from files runs in this one."""
     told = []
 
     def answer(job, arguments):

@@ -17,6 +17,5 @@ from dbbstation.errors import CalibrationError, InputError, Problem
     ],
 )
 def test_an_error_comes_whole_from_another_process(error):
-    """A pool of processes broke instead, without a word of the cause."""
     again = pickle.loads(pickle.dumps(error))  # noqa: S301 - made here
     assert (type(again), str(again), vars(again)) == (type(error), str(error), vars(error))

@@ -42,7 +42,6 @@ for words in COMMANDS:
 
 
 def test_commands_call_loops_as_preparing_called_them(tmp_path):
-    """In a process of its own, on loops that were compiled before: each has the types of arguments that it had after preparing."""
     (tmp_path / "poses.csv").write_text(POSES)
     words = [[str(word) for word in command] for command in COMMANDS]
     script = SIGNATURES.replace("COMMANDS", repr(words))

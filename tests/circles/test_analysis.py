@@ -92,7 +92,6 @@ def test_least_squares_figures_are_those_of_the_other_commands():
 
 @pytest.mark.parametrize("tilt_deg", [(0, 0, 0), (10, -10, 0)])
 def test_a_raised_bar_measures_the_circle_in_its_plane(tilt_deg):
-    """With elevation e the path has the radius R cos e; an ellipse of it is seen along the bar by cos e of its size."""
     circle = replace(CCW, elevation_deg=30, tilt_deg=tilt_deg)
     raw = measured(lambda theta: 5.0 + 10.0 * np.cos(2 * theta), circle, (-0.05, -0.02))
     one = analyse(raw)

@@ -11,7 +11,6 @@ THETA = np.radians(np.arange(0.0, 360.0, 0.5))
 
 
 def test_an_empty_line_is_no_form_and_no_warning(rng):
-    """A mean of zero to the last bit: its power was divided by, and the shell showed an overflow."""
     deviation_um = np.round(rng.standard_normal(360) * 1024.0) / 1024.0
     deviation_um[-1] = -deviation_um[:-1].sum()
     deviation_um[-1] = np.clip(deviation_um[-1], -3.0, 3.0)
@@ -23,7 +22,6 @@ def test_an_empty_line_is_no_form_and_no_warning(rng):
 
 @pytest.mark.parametrize("size_um", [0.0, 2.0, 500.0])
 def test_a_path_without_any_noise_is_all_form(size_um, rng):
-    """Two turns that are the same leave nothing of their difference, not even rounding."""
     path = size_um * np.cos(2.0 * THETA)
     found = form_and_noise(path)
     assert found.form_um == pytest.approx(path, abs=1e-9)

@@ -22,7 +22,6 @@ def at(phi_deg):
 
 @pytest.mark.parametrize("phi_deg", [0.0, 3.0, 6.0, FAR_DEG - 0.5, 360.0 - FAR_DEG + 0.5, 354.0, 357.0])
 def test_where_the_turn_begins_and_ends_there_is_no_step(phi_deg):
-    """Samples lie on both sides there, too: a line through those of half a stretch would be taken for one."""
     assert at(phi_deg) is None
 
 

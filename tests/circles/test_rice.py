@@ -13,7 +13,6 @@ DRAWS = 2_000
 
 @pytest.mark.parametrize("true", [0.0, 1.0, 2.0, 3.0, 10.0])
 def test_the_interval_holds_the_true_length(rng, true):
-    """At and near zero too, where the measured length is never below one."""
     lengths = 0.5 * np.hypot(true + rng.standard_normal(DRAWS), rng.standard_normal(DRAWS))
     found = np.array([without_noise(length, 0.5) for length in lengths])
     inside = np.sum(np.abs(found[:, 0] - 0.5 * true) <= 2.0 * found[:, 1])

@@ -14,7 +14,6 @@ COUNT = 720
 
 
 def alone(number):
-    """One distribution of all that are weighed: normal, Student's t, exp(-|x|^b)."""
     weights = np.zeros(len(NO_TAILS.weights))
     weights[number] = 1.0
     return Pushes(weights)
@@ -38,7 +37,6 @@ def test_tails_of_an_exponent_have_its_kurtosis(exponent, excess):
 
 
 def test_weights_are_those_of_the_likelihoods(rng):
-    """Odds of two exponents, and of two numbers of degrees of freedom, with the most probable scale of each by SciPy's own fit."""
     values = rng.laplace(size=COUNT)
     weights = np.log(weights_of(values))
     first = 1 + len(TAILS)
@@ -55,7 +53,6 @@ def test_weights_are_those_of_the_likelihoods(rng):
 
 
 def test_noise_is_told_by_its_tails(rng):
-    """One of a hundred normal series looks like another: the mean of forty counts."""
     assert np.mean([weights_of(rng.standard_normal(COUNT))[0] for _ in range(40)]) > 0.9
     assert weights_of(rng.standard_t(3.0, COUNT))[1 : 1 + len(TAILS)].sum() > 0.9
     assert pushes_of(np.fft.rfft(rng.uniform(-1.0, 1.0, COUNT)), COUNT).excess < -0.8

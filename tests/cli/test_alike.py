@@ -70,7 +70,6 @@ def test_every_command_has_it_or_a_reason(what):
 
 @pytest.mark.parametrize("option", ["tests", "exclude", "force", "as_json", "source_files", "sessions"])
 def test_what_has_one_name_is_one_option(option):
-    """The same names on the command line and the same type wherever a parameter of this name is."""
     forms = set()
     for line in LINES:
         for parameter in found(line.split())[0].params:

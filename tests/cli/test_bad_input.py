@@ -184,7 +184,6 @@ def test_sessions_of_two_machines(run, spoilt, tmp_path):
 
 
 def test_a_session_and_its_copy(run, spoilt, tmp_path):
-    """Counted twice, the same circles would be believed too much."""
     copy = shutil.copytree(spoilt.folder, tmp_path / "copy")
     for twice in (spoilt.folder, copy):
         outcome = run("calibrate", spoilt.folder, twice, "--out", tmp_path / "model.yaml")

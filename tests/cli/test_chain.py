@@ -201,7 +201,6 @@ def test_lists_are_json_too(run, arguments):
 
 
 def test_recordings_made_elsewhere(run, recordings, tmp_path):
-    """The main job on a session that this project did not write, and on the same machine at other places."""
     sessions = recordings / "sessions"
     fitted = run("calibrate", sessions / "first-light", "--out", tmp_path / "model.yaml", "--json")
     assert fitted.code == DONE, fitted.err

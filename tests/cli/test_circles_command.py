@@ -62,7 +62,6 @@ def test_json_has_every_figure_with_its_budget(session):
 
 
 def test_a_filter_makes_noise_smaller(session):
-    """Of the readings; without their noise G keeps what the form has, and U gets smaller."""
     found = [
         call("circles", session, "--filter", f, "--json").data["runs"][0]["uncertainty"]["G"]
         for f in ("none", "150", "50", "15")
@@ -199,7 +198,6 @@ def digest_of(line):
 
 
 def test_a_quick_look_is_printed_as_symptoms():
-    """On the machine of the fixtures: both directions together where both are there, u and the words that it is no cause."""
     outcome = call("circles", SMALL, "--quick-look")
     assert outcome.code == DONE
     assert "On a hexapod these are symptoms, no causes" in outcome.out

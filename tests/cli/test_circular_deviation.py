@@ -41,7 +41,6 @@ def numbers(run, elsewhere, model):
 
 
 def test_both_tables_of_evaluate_have_one_measured_circular_deviation(printed):
-    """Plain circles were commanded: what the nominal machine leaves of them is what was measured."""
     first, second = (rows_after(printed, title) for title in ("mean radial error", "G up to 30 undulations"))
     assert len(first) == len(second) == 6
     assert [row[7] for row in first] == [row[3] for row in second]

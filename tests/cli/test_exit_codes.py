@@ -148,7 +148,6 @@ def test_an_interrupt_leaves_no_half_result(run, monkeypatch, tmp_path, fifteen)
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_ctrl_c_a_polite_kill_and_a_closed_terminal(tmp_path, fifteen, name):
-    """Sent as soon as the log says that the session was read: the fit still lies ahead."""
     command = [*PROGRAM, "calibrate", str(fifteen), "--out", str(tmp_path / "model.yaml"), "--verbose"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None

@@ -64,7 +64,6 @@ def test_a_session_that_went_out_and_came_in_again_has_the_same_samples(run, tmp
 
 
 def test_awkward_numbers_come_back_too(run, tmp_path, spoilt):
-    """Digits to the last bit, a temperature column, a status."""
     session = read_session(spoilt.folder)
     file = session.runs[0].path.relative_to(spoilt.folder).as_posix()
     rng = np.random.default_rng(4)
@@ -99,7 +98,6 @@ def _unsealed(folder):
 
 
 def test_rows_say_angle_and_deviation_as_the_circle_has_them(run, tmp_path):
-    """Against the cut that every command uses, and against the plan's radius."""
     table = tmp_path / "t.csv"
     assert run("export", SEALED, "--out", table, "--test", "a", "--state", "accepted").code == DONE
     session = read_session(SEALED)
@@ -144,7 +142,6 @@ def test_without_pyarrow_it_says_what_to_install(run, tmp_path, monkeypatch):
 
 
 def test_memory_is_that_of_one_run(run, tmp_path):
-    """Three times the runs need no more memory at any time than a third more."""
     peaks = []
     for repeats in (1, 3):
         folder = tmp_path / f"s{repeats}"

@@ -57,7 +57,6 @@ def test_every_command_prints_what_its_schema_says(printed, run):
     ],
 )
 def test_what_the_station_and_the_demonstration_show_is_printed(printed, command, part):
-    """They read parts of results; a key that they lack, or another type, is an error of theirs."""
     read = read_plain(part, printed[command].data)
     assert set(vars(read)) <= set(printed[command].data)
 

@@ -84,7 +84,6 @@ def test_results_have_a_json_form(command):
 
 @pytest.mark.parametrize("arguments", [["--help"], ["calibrate", "--help"], ["--version"], ["evaluate"]])
 def test_help_waits_for_no_library(arguments):
-    """SciPy and the compiler take a second and more to import: nobody should wait for them to read a help text."""
     script = (
         "import sys\n"
         "from dbbstation.cli import main\n"

@@ -154,7 +154,6 @@ def test_what_was_read_before_an_interrupt_is_not_read_again(few, monkeypatch):
 
 
 def test_several_processes_give_the_same(few, monkeypatch):
-    """A damaged session and a copy among them; nothing is worked out in this process."""
     shutil.copytree(few / "w002", few / "w002 copy")
     run = few / "w003" / "runs" / "a-cw-2.csv"
     run.write_bytes(run.read_bytes()[:-40])

@@ -156,7 +156,6 @@ def settings(tmp_path, decimal, separator):
 
 @pytest.mark.parametrize("mapped", [True, False])
 def test_how_numbers_are_written_says_the_mapping_first_then_the_shop(run, tmp_path, mapped):
-    """Tables with decimal commas, which would be found by looking, in a shop that writes dots."""
     mapping = tmp_path / "m.yaml"
     text = MAPPING.read_text("utf-8")
     mapping.write_text(text if mapped else re.sub(r"(?m)^(separator|decimal):.*\n", "", text), "utf-8")

@@ -142,7 +142,6 @@ def test_east_asian_text_is_read_where_it_is_said(run, tmp_path, encoding):
 
 
 def test_runs_with_a_head_of_their_own_are_parted_and_raw_data_need_no_edit(run, tmp_path):
-    """Above each run a title, a date and the names of the columns; the second turns the other way, and its ball stands the same."""
     back = "".join(f"{point(a)},{point(d)}\n" for a, d in reversed(PAIRS))
     second = "Run 2 CW\nDate: 20.11.2026 08:10\nAngle (deg),Deviation (um)\n" + back
     file = tmp_path / "old.csv"
@@ -164,7 +163,6 @@ def test_a_table_parted_by_spaces_is_read_with_its_mapping_again(run, tmp_path):
 
 
 def test_gaps_between_digits_are_not_made_up(run, tmp_path):
-    """Rows of unlike width are no table, parted by spaces or not."""
     file = tmp_path / "old.csv"
     lines = [f"{a:.1f} {d:.3f}" for a, d in PAIRS]
     lines[200] = "200.0 1.0 2.0"

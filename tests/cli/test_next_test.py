@@ -38,7 +38,6 @@ def test_nothing_is_proposed_where_nothing_is_gained(diagnosed):
 
 
 def test_what_is_proposed_halves_an_uncertainty(diagnosed):
-    """Circles at the middle of the plate cannot tell the leads of six screws; tilted ones can."""
     printed, data = diagnosed("afghk", "screw-lead")
     tests = [data["next_test"], *data["further_tests"]]
     assert tests[0] is not None

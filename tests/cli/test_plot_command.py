@@ -124,7 +124,6 @@ def test_one_direction_is_drawn_and_said(small, tmp_path):
 
 @pytest.mark.parametrize("kept", [1, 8])
 def test_a_run_of_few_samples_is_refused_with_its_reason(small, tmp_path, kept):
-    """All runs of a test with hardly a reading: an answer and no figure."""
     for name in ("g-ccw-1", "g-cw-1"):
         path = small / "runs" / f"{name}.csv"
         lines = path.read_text("utf-8").splitlines()

@@ -90,7 +90,6 @@ def test_the_searches_find_ways_round():
 
 
 def test_many_of_one_control_are_counted():
-    """As a disk leaves them in a file that was being written."""
     assert on_one_line(f"t_s{chr(0) * 4000}µ") == r"t_s\x00 (4000 times)µ"
     assert (
         printable(f"{chr(0) * 8}{chr(27) * 9}{chr(10) * 20}{'-' * 40}")

@@ -217,7 +217,6 @@ def test_what_is_left(share, passed_s, text):
 
 
 def test_poses_are_predicted_alike_in_pieces_and_at_once(monkeypatch, reference):
-    """Every pose by itself: how many are taken together changes nothing; and a pose that fails has its own number."""
     rng = np.random.default_rng(4)
     poses = np.column_stack(
         [rng.uniform(-80, 80, (23, 2)), rng.uniform(-1050, -950, 23), rng.uniform(-5, 5, (23, 2)), np.zeros(23)]
@@ -261,7 +260,6 @@ INTERRUPTED = {
 @pytest.mark.parametrize("name", INTERRUPTED)
 @pytest.mark.parametrize("after_s", [1.5, 4.0])
 def test_ctrl_c_ends_with_one_line_and_leaves_whole_files(tmp_path, name, after_s):
-    """As a terminal does it: the signal goes to the whole group of processes."""
     shutil.copytree(SESSION, tmp_path / "session")
     rows = "0,0,-1008,0,0,0\n" * 200_000
     (tmp_path / "poses.csv").write_text(f"x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n{rows}")

@@ -105,7 +105,6 @@ def test_a_long_command_is_cut_into_comments_that_controls_take():
 
 
 def test_a_table_stays_plain_csv_with_a_file_beside_it(run, tmp_path, poses):
-    """Whatever reads CSV finds the header in the first line."""
     out = tmp_path / "out.csv"
     assert run("predict", "--model", MODEL, "--poses", poses, "--out", out).code == DONE
     with out.open(newline="") as file:
@@ -172,7 +171,6 @@ def test_a_figure_keeps_it_in_its_metadata(run, tmp_path, ending, read):
 
 
 def test_the_same_files_elsewhere_give_the_same_bytes(run, tmp_path, poses):
-    """Neither folders, nor names of outputs, nor the time have a part in them."""
     for name in ("here", "there"):
         folder = tmp_path / name
         folder.mkdir()

@@ -110,7 +110,6 @@ def test_it_has_the_figures_of_circles(session, written):
 
 
 def test_a_report_has_one_g(written):
-    """The figure that a tolerance is held against is the one of the tables, with one filter on all pages."""
     _, data = written
     assert data["circles"]["filter"] == "30 UPR, cut off sharply"
     for row, run in zip(data["measured"], data["circles"]["runs"], strict=True):
@@ -197,7 +196,6 @@ def settings(tmp_path, *limits):
 
 
 def test_the_first_page_holds_circles_against_the_tolerances(session, written, tmp_path):
-    """The limit is the figure itself: within U of it nothing can be told, further off it can."""
     rows = written[1]["measured"]
     worst = max(rows, key=lambda row: row["now"]["centre-deviation"]["um"])
     size = worst["now"]["centre-deviation"]
@@ -320,7 +318,6 @@ def test_a_pdf_needs_a_browser_and_says_which(session, tmp_path, monkeypatch):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the browser of this test is a script")
 def test_a_browser_prints(session, tmp_path, monkeypatch):
-    """A stand-in that does what is asked of a browser: writes the file that the option names."""
     browser = tmp_path / "browser"
     browser.write_text(
         '#!/bin/sh\nfor a in "$@"; do case $a in --print-to-pdf=*) printf %%PDF > "${a#*=}";; esac; done\n'

@@ -110,7 +110,6 @@ def test_sealing_puts_back_every_hash_and_nothing_else(capsys, folder):
 
 
 def test_a_file_written_by_hand_keeps_its_comments(folder):
-    """Runs in several lines, a comment behind the file, one run that is still being recorded."""
     names = sorted(path.name for path in (folder / "runs").iterdir())[:2]
     text = f"""# made with the old program
 format: dbb-session/1

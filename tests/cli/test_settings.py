@@ -122,7 +122,6 @@ def test_a_file_that_is_named_is_read_alone_wherever_the_option_stands(run, shop
 
 
 def test_two_files_make_no_bar_of_their_parts(run, shop):
-    """The near file has a bar without serial number: that of the other bar must not stand beside its length."""
     beside(shop, "bar: {calibrated_length_mm: 100.0, calibrator_uncertainty_mm: 0.001}\n")
     of_user(shop, "bar: {serial_number: DBB-1, calibrated_length_mm: 150.0, calibrator_uncertainty_mm: 0.0005}\n")
     values = run("settings", "--json").data["values"]
@@ -156,7 +155,6 @@ def test_an_option_wins(run, shop):
 
 
 def test_an_option_about_the_bar_sets_the_whole_bar_aside(run, shop):
-    """The serial number of one bar with the length of another would be a wrong record."""
     beside(
         shop,
         "instrument: heidenhain-nd281b\nport: no-port\n"
@@ -305,7 +303,6 @@ def test_the_worst_run_of_a_tolerance():
 
 
 def test_evaluate_holds_circles_against_tolerances(run, shop, fifteen, model):
-    """Limits between the figures that the same command prints decide as those figures do."""
     shutil.copytree(fifteen, shop / "session")
     runs = run("evaluate", "session", "--model", model, "--json").data["runs"]
     largest = max(runs, key=lambda one: one["circularity_30_upr_um"]["before"])

@@ -49,7 +49,6 @@ def test_a_fault_is_raised_here_and_ends_them():
 
 
 def test_what_a_dead_process_leaves_is_worked_out_here():
-    """As where the system has no memory left for it."""
     assert dict(each(eval, [f"__import__('os')._exit(9) if {IN_CHILD} else 7", "8"], 2)) == {0: 7, 1: 8}
 
 

@@ -59,12 +59,10 @@ def gravity_backlash_and_screw_cyclic(folder: FilePath) -> Truth:
 
 
 def warm_up_of_unknown_time_constant(folder: FilePath) -> Truth:
-    """Struts that warm with one time constant, and nothing else."""
     return _recorded(folder, 1503, ThermalStruts(ONE_STAGE))
 
 
 def warm_up_in_two_stages(folder: FilePath) -> Truth:
-    """Struts that warm through another body, and nothing else."""
     return _recorded(folder, 1504, ThermalStruts(TWO_STAGES))
 
 
@@ -101,7 +99,6 @@ def jig_bumped_once(folder: FilePath, from_run: int = 14) -> Truth:
 
 
 def strut_that_rings(folder: FilePath) -> Truth:
-    """One strut oscillates after each of its reversals."""
     return _recorded(folder, 1511, RingingStrut())
 
 
@@ -136,7 +133,6 @@ def answer(truth: Truth) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Write all sessions and their answers."""
     parser = argparse.ArgumentParser(prog="python -m tests.diagnosis.engine_sessions", description=__doc__)
     parser.add_argument(
         "out", type=FilePath, help="folder for the sessions and answers.json; must not exist or be empty"

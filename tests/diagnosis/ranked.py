@@ -102,7 +102,6 @@ class Scored:
 
 
 def lengths_of(folder, seed, plan, mechanisms):
-    """Readings of a session without noise, by run, and its runs."""
     record(
         folder,
         seed=seed,

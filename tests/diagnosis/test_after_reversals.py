@@ -28,7 +28,6 @@ REMEMBERING = Noise(white_um=0.3, correlated_um=0.24, correlation=0.6)
 
 
 def looked_at(folder):
-    """What a kinematic calibration leaves after reversals."""
     recorded = load_sessions([folder])
     runs = [thinned(one) for one in recorded.observations]
     fit = calibrate(recorded.machine, runs)
@@ -83,7 +82,6 @@ def test_nothing_is_left_is_not_said_of_a_strut_that_rings(tmp_path):
     ids=["rings", "rings, read twice as often", "winds up"],
 )
 def test_what_comes_after_reversals_is_no_spike(tmp_path, law, name, rate_hz):
-    """Without laws of their own a strut that rings, and one that winds up over its travel, passed for struts that stick."""
     record(tmp_path / "s", seed=34, mechanisms=[KINEMATICS, law], rate_hz=rate_hz)
     summary = diagnose_sessions([tmp_path / "s"], ["backlash", "play", "reversal-spike"], (), lambda _: None).summary()
     named = {s["name"] for s in summary["sources"] if s["verdict"] in {"identified", "ambiguous", "does-not-predict"}}
@@ -97,7 +95,6 @@ def test_what_comes_after_reversals_is_no_spike(tmp_path, law, name, rate_hz):
 
 @pytest.mark.slow
 def test_a_bump_between_tests_that_balls_hide_is_not_ruled_out(tmp_path):
-    """Balls that scatter by a micrometre hide a shift of all later tests; one between the directions of a test shows."""
     record(tmp_path / "s", seed=1510, mechanisms=[KINEMATICS, BumpedJig(from_run=14)], rate_hz=10.0)
     summary = diagnose_sessions([tmp_path / "s"], ["jig-bump"], (), lambda _: None).summary()
     (bump,) = summary["sources"]

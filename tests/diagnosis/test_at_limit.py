@@ -35,7 +35,6 @@ OVER_TIME = ("thermal-struts", "thermal-frame", "spindle-growth", "bar-drift", "
     "candidates", [OVER_TIME, pytest.param(None, marks=pytest.mark.nightly)], ids=["over time", "all"]
 )
 def test_a_bar_that_wanders_is_a_wander_and_no_cause(tmp_path, candidates):
-    """A random walk over the whole session: one effect without a name, whose curve follows the walk that was put in."""
     walk = np.cumsum(np.random.default_rng(3).normal(0.0, 0.1 * np.sqrt(WALK_STEP_S), 14_000))
     record(tmp_path / "s", seed=1508, mechanisms=[KINEMATICS, WanderingBar(walk_um=tuple(walk))], rate_hz=5.0)
     found = diagnose_sessions([tmp_path / "s"], candidates, (), lambda _: None).diagnosis
@@ -97,7 +96,6 @@ def test_what_is_certain_is_said_whatever_ends_at_a_limit(recordings, monkeypatc
 
 @pytest.mark.slow
 def test_a_wind_up_in_place_of_play_settles_within_its_range(tmp_path):
-    """The joint fit settles with the length in its range, and the widths of the play that was put in."""
     record(tmp_path / "s", seed=3, mechanisms=[KINEMATICS, Backlash((4.0,) * 6)], rate_hz=5.0)
     recorded = load_sessions([tmp_path / "s"])
     law = next(other for other in sources_named(["backlash"])[0].other_laws() if other.law == "wind-up")
@@ -121,7 +119,6 @@ def test_the_range_of_a_parameter_goes_one_step_beyond_its_grid():
 
 
 def test_an_effect_of_any_strut_is_one_cause(tmp_path):
-    """Six struts and all alike: seven forms of one cause, and one in which each strut has its own."""
     record(tmp_path / "s", seed=1, mechanisms=[], rate_hz=4.0)
     recorded = load_sessions([tmp_path / "s"])
     unmodelled = Unmodelled(CircleChannel(calibrate(recorded.machine, recorded.observations), ()))
@@ -135,7 +132,6 @@ def test_an_effect_of_any_strut_is_one_cause(tmp_path):
 
 
 def test_a_curve_that_all_struts_follow_has_the_points_of_one_variable(tmp_path):
-    """Struts of different lengths and loads follow one curve: its points are values of the variable and not of each strut's range."""
     record(tmp_path / "s", seed=1, mechanisms=[], rate_hz=4.0)
     recorded = load_sessions([tmp_path / "s"])
     channel = CircleChannel(calibrate(recorded.machine, recorded.observations), ())
@@ -162,7 +158,6 @@ def backlash(tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.parametrize("at", [2, 3])
 def test_who_interrupts_the_comparison_gets_what_it_had_found(backlash, monkeypatch, at):
-    """Ctrl-C in a joint fit, or in the round behind it: the cause with its values, and that somebody stopped it."""
     count = 0
 
     def interrupted(comparison, causes, seeds=(), **options):
@@ -195,7 +190,6 @@ def test_who_interrupts_before_anything_is_found_gets_nothing(backlash, monkeypa
 
 @pytest.mark.slow
 def test_a_search_at_its_limit_says_what_its_sets_leave(backlash, monkeypatch):
-    """No set may have a member: the search says so, with size and place of what is left."""
     monkeypatch.setattr(explain, "MOST_MEMBERS", 0)
     found = diagnose_sessions([backlash], None, (), lambda _: None).diagnosis
     (limit,) = found.limits
@@ -205,7 +199,6 @@ def test_a_search_at_its_limit_says_what_its_sets_leave(backlash, monkeypatch):
 
 
 def test_a_parameter_at_an_end_and_a_fit_that_moves_are_said(tmp_path):
-    """Hard play fitted by a wind-up: its length ends at the least that there is."""
     record(tmp_path / "s", seed=3, mechanisms=[KINEMATICS, Backlash((4.0,) * 6)], rate_hz=5.0)
     recorded = load_sessions([tmp_path / "s"])
     law = next(other for other in sources_named(["backlash"])[0].other_laws() if other.law == "wind-up")

@@ -81,7 +81,6 @@ def test_after_naming_left_out_tests_are_predicted_to_noise(gravity):
 
 
 def test_the_pull_on_the_earlier_calibration_is_what_it_was(gravity):
-    """Joints and lengths of the joint fit are the true ones; those of the kinematic fit were off by the shifts."""
     truth, diagnosis = gravity
     true_um = 1e3 * np.concatenate([truth.delta_length_mm, truth.delta_base_mm.ravel()])
     assert np.abs(1e3 * diagnosis.before.x[:24] - true_um).max() > 100
@@ -155,7 +154,6 @@ def test_pairs_are_both_named(tmp_path, pair, names):
 
 @pytest.mark.nightly  # three causes at once are in CI: tests/diagnosis/test_recipes.py
 def test_drifts_of_struts_and_bar_together_keep_their_concealed_shares(tmp_path):
-    """The direction that the tests cannot see is held; at the fitted geometry it would swallow another fifth."""
     _, diagnosis = diagnosed(tmp_path / "s", 3003, ThermalStruts(), BarDrift())
     assert named(diagnosis) == {"thermal-struts", "bar-drift"}
     assert finding(diagnosis, "thermal-struts").concealed == pytest.approx(0.96, abs=0.015)
@@ -164,7 +162,6 @@ def test_drifts_of_struts_and_bar_together_keep_their_concealed_shares(tmp_path)
 
 @pytest.mark.nightly  # a bar that drifts is in tests/diagnosis/test_thermometers.py
 def test_a_bar_that_warms_within_one_run_does_not_end_the_diagnosis(tmp_path):
-    """Its time constant lies below the grid's; a second drift called in beside it has no amplitude to hold on to."""
     _, diagnosis = diagnosed(tmp_path / "s", 2020, BarDrift(Warming(2.0, 120.0)))
     assert named(diagnosis) <= {"bar-drift"}
     assert finding(diagnosis, "bar-drift").verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}
@@ -172,7 +169,6 @@ def test_a_bar_that_warms_within_one_run_does_not_end_the_diagnosis(tmp_path):
 
 @pytest.mark.nightly  # the same with every source as candidate: tests/diagnosis/test_recipes.py
 def test_a_warm_up_with_a_law_of_its_own_lends_no_second_name(tmp_path):
-    """Struts heated through another body: one exponential does not fit, and a drifting bar would mend some of it."""
     _, diagnosis = diagnosed(tmp_path / "s", 2013, ThermalStruts(Warming(3.0, 2400.0, 600.0)))
     assert named(diagnosis) <= {"thermal-struts"}
     assert finding(diagnosis, "thermal-struts").verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}

@@ -29,7 +29,6 @@ def recorded_with(folder, seed, *mechanisms, rate_hz=10.0):
 
 
 def test_a_signal_period_is_one_that_is_sold(tmp_path):
-    """A fit beside an amplitude of nothing would let the period run to where its wave is the reading's own error."""
     recorded = recorded_with(tmp_path / "s", 61)
     cyclic = sources_named(["bar-cyclic"])
     start = {"bar-cyclic": np.array([0.02, 0.02, 20.0])}
@@ -44,7 +43,6 @@ def test_a_signal_period_is_one_that_is_sold(tmp_path):
 
 
 def test_amplitudes_of_a_joint_fit_are_bounded_where_nothing_else_bounds_them(tmp_path):
-    """Platform joints all shifted alike are a shift of the tool ball: circles see next to nothing of it."""
     recorded = recorded_with(tmp_path / "s", 62)
     joints = sources_named(["platform-joints"])
     plausible = np.array([p.plausible for p in joints[0].parameters(recorded.machine)])
@@ -71,7 +69,6 @@ def test_contacts_that_stiffen_under_load_call_in_no_second_cause(tmp_path):
 
 
 def test_a_pull_towards_a_place_is_what_statics_says(tmp_path):
-    """Beside the kinematics the family leaves less of a hose than the best of a strut's curves does."""
     clean = load_sessions([_still(tmp_path / "clean")])
     channel = CircleChannel(calibrate(clean.machine, clean.observations), ())
     runs = [samples_of(m, channel.machine, r) for m, r in zip(channel.motions, channel.readings, strict=True)]

@@ -50,7 +50,6 @@ FEW = ("jig-bump", "bar-scale", "bar-drift", "backlash", "gravity", "platform-jo
     ids=["few", "all"],
 )
 def test_a_bump_happened(tmp_path, candidates, tests, bumped, rate_hz):
-    """Between the two directions of a test, so that one mounting sees both sides of it."""
     told = diagnosed(tmp_path / "s", BumpedJig(from_run=bumped), candidates, 1510, tests, rate_hz)
     bump = next(f for f in told.diagnosis.sources if f.name == "jig-bump")
     assert bump.verdict is Verdict.HAPPENED

@@ -26,12 +26,10 @@ BOTH = (Direction.CCW, Direction.CW)
 
 
 def hexapod(reference):
-    """Joints as plain arrays."""
     return reference.hexapod.base_joints_mm, reference.hexapod.platform_joints_mm
 
 
 def tilt_matrix(a_deg, b_deg):
-    """Rx(A) Ry(B)."""
     a, b = np.radians([a_deg, b_deg])
     rx = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
     ry = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
@@ -87,7 +85,6 @@ class Workshop:
 
 
 def the_cause(found, verdict=Verdict.IDENTIFIED):
-    """What is said of the one cause that was found."""
     assert [finding.verdict for finding in found.there] == [verdict]
     return found.there[0]
 
@@ -201,7 +198,6 @@ def test_what_changes_its_sign_with_the_direction(reference):
 
 
 def test_a_difference_without_order_is_called_that(reference):
-    """A smooth difference of its own in every test, the same in both directions: no variable orders it, nor does any cause."""
     shop = Workshop(9)
     own = {test.ball.centre_mm: shop.rng.normal(0, 0.002, 6) for test in PLAN.tests.values()}
 

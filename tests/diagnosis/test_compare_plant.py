@@ -31,7 +31,6 @@ COMPLIANCE_MM_N = 9.68e-6
 
 
 def compared(one: Path, other: Path) -> Comparison:
-    """Both sessions with all candidates, as the command compares them."""
     a, b = (load_sessions([folder], [], lambda *_: None, ()) for folder in (one, other))
     candidates = sources_named(default_candidates(known_sources()))
     usable, lacking = usable_sources(a.machine, [*a.observations, *b.observations], candidates)
@@ -40,7 +39,6 @@ def compared(one: Path, other: Path) -> Comparison:
 
 @pytest.mark.nightly
 def test_a_machine_that_did_not_change_is_not_said_to(tmp_path):
-    """Forty pairs of sessions, noise and balls anew, every second one with noise whose neighbours resemble each other in the second."""
     rng = np.random.default_rng(3)
     geometry = Kinematics(length_mm=rng.normal(0, 0.05, 6), base_mm=rng.normal(0, 0.1, (6, 3)))
     alarms = []
@@ -56,7 +54,6 @@ def test_a_machine_that_did_not_change_is_not_said_to(tmp_path):
 
 @pytest.mark.nightly  # one change at a time is in CI: test_compare.py, and by the command docs/validation.md
 def test_new_play_and_weight_are_both_named(tmp_path):
-    """Struts that give way under the platform, and all with new play: two causes at once, each with its size."""
     rng = np.random.default_rng(3)
     geometry = Kinematics(length_mm=rng.normal(0, 0.05, 6), base_mm=rng.normal(0, 0.1, (6, 3)))
     changes = [Gravity(COMPLIANCE_MM_N), Backlash((GAP_UM,) * 6)]

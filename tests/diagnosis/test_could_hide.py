@@ -22,7 +22,6 @@ def diagnosed(folder, names, *mechanisms):
 
 
 def test_a_lead_error_that_the_joints_conceal_lies_within_its_uncertainty(tmp_path):
-    """The same on all struts: circles of one level hardly tell it from strut lengths."""
     lead_um_m = -4.7
     found = diagnosed(tmp_path / "s", ["screw-lead", "backlash"], ScrewLead((lead_um_m,) * 6))
     lead = next(f for f in found.sources if f.name == "screw-lead")
@@ -32,7 +31,6 @@ def test_a_lead_error_that_the_joints_conceal_lies_within_its_uncertainty(tmp_pa
 
 
 def test_no_candidate_is_no_fault(tmp_path):
-    """All sources that were asked for may lack what they need."""
     found = diagnosed(tmp_path / "s", [])
     assert found.sources == ()
     assert not found.mismatch

@@ -76,7 +76,6 @@ def test_a_circle_without_a_cause_is_the_circle_of_a_machine_without_it(known):
 
 
 def test_a_cause_of_one_amplitude_is_known_as_well_as_its_amplitude(known):
-    """G is proportional to a compliance, so its u is in the same proportion; likewise over the workspace."""
     model, runs, _ = known
     (rows,) = [[("gravity", "", one.name) for one in model.sources[2].source.parameters(model.machine)]]
     share = 0.03
@@ -90,7 +89,6 @@ def test_a_cause_of_one_amplitude_is_known_as_well_as_its_amplitude(known):
 
 
 def test_what_a_formula_lacks_it_lacks_on_every_strut(known):
-    """All lags off by one share: G, which is proportional to them all, is off by it as well; were struts off by themselves, by another."""
     model, runs, _ = known
     lag = model.sources[3]
     rows = [("servo-lag", "", one.name) for one in lag.source.parameters(model.machine)]

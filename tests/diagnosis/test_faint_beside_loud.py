@@ -25,7 +25,6 @@ ALL = "abcdefghijklmno"
     [(FEW, EIGHT, 0.15), *(pytest.param(NAMES, ALL, decay_s, marks=pytest.mark.nightly) for decay_s in (0.15, 0.4))],
 )
 def test_short_spikes_are_found_beside_gravity_however_uncertain_their_height_is(tmp_path, names, tests, decay_s):
-    """Ten readings a second hardly tell a high short spike from a low long one; that there is one they tell."""
     kinematics = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
     record(
         tmp_path / "s",

@@ -18,7 +18,6 @@ OFFSET_MM = 0.12
 
 @pytest.mark.parametrize("sessions", [4, pytest.param(8, marks=pytest.mark.nightly)])
 def test_a_ball_off_the_tool_tip_is_as_uncertain_where_no_circle_sees_it_as_it_is_large_elsewhere(tmp_path, sessions):
-    """Ten times the usual size of a ball off the tool tip, towards everywhere: both fits' errors against the truth."""
     source = sources_named(["tool-ball-offset"])
     towards = np.random.default_rng(3).standard_normal((sessions, 3))
     offsets = OFFSET_MM * towards / np.linalg.norm(towards, axis=1, keepdims=True)

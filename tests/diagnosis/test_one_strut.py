@@ -38,7 +38,6 @@ def identified(diagnosis):
     ("rate_hz", "tests"), [(10.0, EIGHT), pytest.param(20.0, "abcdefghijklmno", marks=pytest.mark.nightly)]
 )
 def test_one_strut_that_is_late_is_named_though_circles_see_no_common_lag(tmp_path, rate_hz, tests):
-    """The fit holds the lag that all struts share; that of one is then seen as a difference to the five others."""
     late_ms = 0.015
     found = identified(diagnosed(tmp_path / "s", 51, ServoLag((0.0, 0.0, 0.0, late_ms, 0.0, 0.0)), rate_hz, tests))
     assert set(found) == {"servo-lag"}
@@ -49,7 +48,6 @@ def test_one_strut_that_is_late_is_named_though_circles_see_no_common_lag(tmp_pa
 
 @pytest.mark.nightly  # a strut that is late is in CI
 def test_a_backlash_of_one_strut_is_no_effect_without_a_name(tmp_path):
-    """A jump by the sign of one strut's speed does the same but near reversals, and would share its probability."""
     found = identified(diagnosed(tmp_path / "s", 60, Backlash((0.0, 0.0, 0.3, 0.0, 0.0, 0.0))))
     assert set(found) == {"backlash"}
     assert found["backlash"].parameters["strut_3_um"].value == pytest.approx(0.3, abs=0.1)

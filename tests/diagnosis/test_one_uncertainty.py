@@ -67,7 +67,6 @@ def test_the_formula_of_the_kinematics_is_exact(diagnosed):
 
 
 def test_errors_over_the_workspace_are_those_that_predict_gives(diagnosed, reference):
-    """Both calibrations predicted like any poses, with the common shift and without it."""
     poses = workspace(reference)
     before, after = (identified_model(fit, {}, {}) for fit in (diagnosed.before, diagnosed.after))
     assert {source.name for source in default_sources()} > {"bar-offset"}

@@ -64,7 +64,6 @@ def test_a_bar_that_was_set_wrongly_is_no_warm_plate(tmp_path, offset_um):
 
 @pytest.mark.nightly  # a badly seated ball is in CI
 def test_a_warm_plate_is_no_ball_off_the_tool_tip(tmp_path):
-    """Places of balls grow away from the jig's origin; a ball off the tool tip does nearly the same to level circles."""
     diagnosis = diagnosed(tmp_path / "s", 43, JigThermal(rise_k=2.7))
     assert named(diagnosis) >= {"jig-thermal"}
     wrong = [f for f in diagnosis.sources if f.verdict is Verdict.IDENTIFIED and f.name != "jig-thermal"]

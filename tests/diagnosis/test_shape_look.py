@@ -109,7 +109,6 @@ def test_a_ball_that_moves_in_three_directions_is_explained_alike():
 
 @pytest.mark.parametrize(("strut", "moves"), [(None, BALL), (4, EVERY)])
 def test_waves_near_a_frequency_explain_what_their_curves_do(strut, moves):
-    """Few polynomials stand for every wave within reach: cosines and sines themselves, one by one, say the same."""
     rng = np.random.default_rng(7)
     _, _, _, look = problem(rng, lambda run: 1e-3 * run.gain[BALL][:, 1] * np.sin(2 * np.pi * run.values["time"] / 7.1))
     sums = look.sums("time", strut, moves, lambda values: np.round(values * SAMPLES).astype(np.int64))

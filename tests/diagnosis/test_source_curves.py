@@ -17,7 +17,6 @@ from tests.diagnosis.joint_fits import CONSTANT_S, DRIFT_UM, PLAY_UM, joint_fit
 
 @pytest.fixture(scope="module")
 def both(reference):
-    """Play in the struts and a warming bar, both found."""
     return joint_fit(reference, ("backlash", "bar-drift"))
 
 

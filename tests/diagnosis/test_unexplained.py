@@ -235,7 +235,6 @@ TIPS_OVER = "position of the platform of the table"
 @pytest.mark.nightly  # one that gives way a little more is in CI
 @pytest.mark.parametrize(("seed", "lean_urad_mm"), [(7, 0.012), (3, 0.008)])
 def test_a_floor_that_hardly_gives_way_is_not_called_by_the_nearest_name(tmp_path, seed, lean_urad_mm):
-    """So faint a lean may be left open; where a name is declared as likely, so is what it is."""
     found = on_a_soft_floor(tmp_path / "s", seed, lean_urad_mm)
     assert not [f.name for f in found.sources if f.verdict is Verdict.IDENTIFIED]
     doubtful = [f for f in found.sources if f.verdict is Verdict.AMBIGUOUS]

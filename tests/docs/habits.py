@@ -123,7 +123,6 @@ def shares(sentences: list[str]) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print shares, store them as limits, or list sentences."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--root", type=Path, default=HERE, help="checkout to read")
     parser.add_argument("--show", metavar="HABIT", choices=HABITS, help="list the sentences with this habit")

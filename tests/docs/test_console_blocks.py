@@ -255,7 +255,6 @@ def test_a_command_exists_with_its_options(command):
 
 
 def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys):
-    """Lines without a cause's own text, numbers aside, against what the command prints of made-up numbers."""
     source = CauseResult(
         name="gravity", verdict="identified", probability=1.0, concealed=0.9, gain=9.0, stability=1.0, text=""
     )

@@ -240,7 +240,6 @@ def test_a_source_that_takes_a_motion_without_what_it_needs_is_told(tmp_path):
 
 
 def test_the_machine_of_the_trial_is_a_hexapod_that_can_move():
-    """Struts of one length in the middle, and a platform that is held in all six directions."""
     machine = trial_machine()
     base, platform = machine.hexapod.base_joints_mm, machine.hexapod.platform_joints_mm
     struts = platform + np.array([0.0, 0.0, -1000.0]) - base

@@ -75,7 +75,6 @@ def test_files_that_reach_new_lines_are_kept_and_spoilt_further(tmp_path):
 @pytest.mark.nightly
 @pytest.mark.parametrize("seed", SEEDS, ids=lambda seed: seed.kind)
 def test_commands_take_the_sound_files(tmp_path, seed):
-    """What is refused before it is spoilt shows nothing."""
     refused = {"NC program with parameters", "session begun"}
     for line in seed.commands:
         place(seed.files, tmp_path / "here")

@@ -102,7 +102,6 @@ def _forget_peak() -> None:
 
 
 def place(files: dict[str, bytes], folder: Path) -> None:
-    """Write the files of a case into an empty folder."""
     shutil.rmtree(folder, ignore_errors=True)
     (folder / "out").mkdir(parents=True)
     for name, data in files.items():

@@ -35,7 +35,6 @@ def test_a_model_of_another_session_or_of_several_is_none_of_this_one():
 
 
 def test_what_has_to_be_said_of_a_model_comes_before_other_notes():
-    """Numbers of a model that lacks physics are shown: that has to be read before what is not shown."""
     good, bad = model("b-small.yaml", 6), replace(model("a-joint.yaml", 31), warnings=("physics is missing",))
     _, notes = historied._of_one_session([good, bad], [SESSION])
     assert notes == [

@@ -34,7 +34,6 @@ def test_one_session_out_of_order_is_named(wrong):
 
 
 def test_names_that_say_nothing_of_the_order_are_no_witness():
-    """Orders of their own: more than a fifth stand elsewhere."""
     assert date_faults(sessions(5, 1, 7, 0, 6, 3, 2, 4), NOW) == []
 
 

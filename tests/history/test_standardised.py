@@ -59,7 +59,6 @@ def test_nothing_is_held_against_nothing(count):
 
 
 def test_scatter_about_another_level_counts(rng):
-    """A new level begins: the scatter is known from before it, by as many degrees of freedom as there were."""
     values = 5.0 + 3.0 * rng.standard_normal(6)
     found = standardised(values, np.ones(6), 10, ScatterRatio(20, 20 * 9.0))
     assert not found.by_stated.any()

@@ -43,7 +43,6 @@ def test_another_circle_under_the_same_name_is_another_quantity():
 
 
 def test_the_rate_is_that_of_all_watched_quantities_of_a_machine():
-    """Two tests, G and X of each; C is not watched."""
     runs = (run(), run(test="b"))
     (machine,) = histories([session(k, *runs) for k in range(30)], {}, TrendOptions(2.0, false_alarms=0.01))
     assert average_run_length(machine.chart) == pytest.approx(4 / 0.01, rel=1e-4)

@@ -88,7 +88,6 @@ def test_a_large_step_is_seen_by_the_second_session(rng):
 
 
 def test_a_drift_is_found(rng):
-    """A twentieth of u a session: after sixty sessions three u."""
     values = rng.standard_normal((200, 160))
     values[:, 60:] += 0.05 * np.arange(100)
     delays = delays_of(values, 60)
@@ -119,7 +118,6 @@ def test_after_a_change_the_new_level_is_the_baseline(rng):
 
 
 def test_the_size_of_a_change_is_right_on_average(rng):
-    """Values that showed a change are chosen for being large; those after it are not."""
     values = rng.standard_normal((200, 90))
     values[:, 40:] += 3.0
     sizes = []
@@ -144,7 +142,6 @@ def test_after_a_change_the_next_session_begins_the_level_and_the_one_after_is_w
 
 
 def test_after_a_change_the_scatter_of_before_is_still_known(rng):
-    """Thrice the stated scatter: a second step soon after the first is held against that, not against the stated one."""
     values = 3.0 * rng.standard_normal(50)
     values[30:] += 60.0
     values[36:] += 60.0
@@ -172,7 +169,6 @@ def test_from_the_second_session_on_a_large_step_is_seen_by_stated_uncertainty(r
 
 
 def test_a_scatter_that_contradicts_by_chance_hides_no_large_step(rng):
-    """Of three sessions: two that lie apart by chance say nothing of the third, twenty times further off."""
     values = rng.standard_normal((400, 3))
     values[:, -1] += 20.0
     assert np.mean([bool(watch(row, np.ones(3), ONE, K).events) for row in values]) > 0.99
@@ -196,7 +192,6 @@ def test_a_few_sessions_give_as_many_false_alarms_as_stated(rng):
 
 
 def test_sessions_that_scatter_by_more_than_stated_are_steady_once_that_is_seen(rng):
-    """Four times the stated scatter: each of eight values is beyond its limit with a probability of a quarter."""
     values = 4.0 * rng.standard_normal((40, 50))
     early = [watch(row[:8], np.ones(8), ONE, K).verdict is not TrendVerdict.STEADY for row in values]
     late = [watch(row, np.ones(50), ONE, K).verdict is not TrendVerdict.STEADY for row in values]
@@ -205,7 +200,6 @@ def test_sessions_that_scatter_by_more_than_stated_are_steady_once_that_is_seen(
 
 
 def test_a_change_within_its_stated_uncertainty_is_none(rng):
-    """Ten times the scatter, a tenth of U."""
     values = 0.01 * rng.standard_normal(60)
     values[30:] += 0.1
     assert watch(values, np.ones(60), ONE, K).verdict is TrendVerdict.STEADY

@@ -39,6 +39,5 @@ def log_posteriors(problem, causes):
 
 
 def inclusion(log_posterior, names):
-    """Probability of each name."""
     total = logsumexp(list(log_posterior.values()))
     return np.array([np.exp(logsumexp([v for key, v in log_posterior.items() if n in key]) - total) for n in names])

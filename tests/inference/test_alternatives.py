@@ -16,7 +16,6 @@ NAMES = "abcdef"
 
 
 def posterior_of(probabilities: dict[str, float]) -> Posterior:
-    """Over sets of one-letter names, such as "ab"."""
     weights = {frozenset(names): float(np.log(p)) for names, p in probabilities.items()}
     return Posterior((Hypothesis((), 0.0),), weights)
 
@@ -89,7 +88,6 @@ def test_an_effect_that_a_named_cause_has_among_its_forms_is_that_cause(rng) -> 
 
 
 def test_a_shift_in_space_that_a_named_cause_has_among_its_forms_is_that_cause(rng):
-    """Three amplitudes: what least squares leave of all columns together beside those of the named form, as a share of the whole."""
     base, effects = rng.normal(size=(60, 3)), rng.normal(size=(60, 9))
     effects[:, 3:6] = effects[:, :3] @ rng.normal(size=(3, 3)) + 0.2 * effects[:, 3:6] + base @ rng.normal(size=(3, 3))
     dense = Dense(base, effects, np.zeros(60), 0.1)

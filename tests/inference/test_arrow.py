@@ -130,7 +130,6 @@ def test_rows_over_some_columns_are_those_over_all(rng, known):
 
 
 def test_a_group_is_one_mounting_whatever_their_number(rng, known):
-    """What is made a triangle stays as large as it is: the work is linear in the number of groups."""
     runs, noises = measured(rng)
     groups = arrow_of(blocks_of(runs, noises), known, NOISE).groups
     assert {len(group.columns) for group in groups} == {OF_EACH}

@@ -57,7 +57,6 @@ def channel(data: Table, laws: tuple[Law, ...] = (), blocks: int = 2) -> Channel
 
 
 def there(findings: tuple[CauseFinding, ...]) -> dict[str, CauseFinding]:
-    """Findings that are certain."""
     return {finding.name: finding for finding in findings if finding.verdict is Verdict.IDENTIFIED}
 
 

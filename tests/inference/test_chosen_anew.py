@@ -38,7 +38,6 @@ def rows(rng):
 
 
 def comparisons(base, columns, target, part):
-    """All rows, and all but each part."""
     every = CauseColumns(base)
     every.add(columns)
     known = Columns(np.r_[np.inf, np.full(PARTS, 0.5)], np.ones(1 + PARTS), np.arange(1 + PARTS) > 0)
@@ -79,7 +78,6 @@ def test_gain_is_the_log_density_of_the_part_with_the_effect_less_that_without(r
 
 
 def test_what_is_in_one_part_alone_does_not_predict(rows):
-    """Chosen anew without its only part it is not chosen, and brings nothing."""
     part, base, columns, target = rows
     of_all, of_others = comparisons(base, columns, target, part)
     best = search(of_all, CAUSES).best

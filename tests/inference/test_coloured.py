@@ -39,7 +39,6 @@ def test_a_resonant_process_is_found_with_its_order_and_spectrum(rng):
 
 
 def test_stretches_are_not_taken_for_neighbours(rng):
-    """Two halves that follow different constants of a walk: a row of one says nothing of the first row of the other."""
     rows = made(rng)
     order = np.concatenate([rows[2000:], rows[:2000]])
     halves = autoregressive(order, [slice(0, 2000), slice(2000, 4000)])
@@ -144,7 +143,6 @@ def test_independent_samples_are_those_of_the_autocorrelation(rows, share, decay
 
 
 def test_runs_apart_have_the_independent_samples_of_each():
-    """A process that is alike over ten runs has one sample of its square in each of them, or a little more."""
     noise = Coloured.first_order(1.0, 1.0, 0.995)
     alone = noise.independent_samples(one(40))
     assert 1.0 < alone < 3.0

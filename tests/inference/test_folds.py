@@ -31,7 +31,6 @@ def both():
 
 
 def test_gains_are_what_a_refit_without_an_effect_loses(both):
-    """Against least squares over the rows that are left; sizes of effects have priors, which matter little here."""
     data, whole, _ = both
     beginnings = (Beginning.EVERYTHING,)
     error = held_out_error(whole, lambda one, rows: settle(one.without(rows), look=False, beginnings=beginnings))
@@ -142,7 +141,6 @@ def test_the_reference_is_what_the_client_says(both):
 
 
 def trial(kinds, after, *, as_simulated=1.0):
-    """Ten parts in which effects of some kinds gain."""
     folds = [Fold(str(k), 60, as_simulated, 1.0, after, dict.fromkeys(kinds, 1.0)) for k in range(10)]
     return Trial(HeldOutError(tuple(folds)))
 
@@ -179,7 +177,6 @@ def test_what_came_once_has_happened_and_a_step_that_gains_persists(last, persis
 
 
 def test_what_came_once_beside_what_does_not_predict_is_not_sure():
-    """Other rows refute the play, and the correction is worse: the pulse may make up for the play."""
     data = table(2, EFFECTS["hysteresis of q"], rows=600)
     whole = channel(data, blocks=1)
     inside = (np.arange(600) >= 200) & (np.arange(600) < 280)

@@ -16,7 +16,6 @@ def test_a_walk_has_the_covariance_of_a_random_walk():
 
 
 def test_what_stays_behind_is_against_the_new_direction_and_ends(rng):
-    """One amplitude at each point, straight between them, nothing at the turn and behind the end; odd in the direction."""
     form, heights = BehindReversal(10.0), rng.normal(size=4)
     way = np.linspace(0.01, 15.0, 400)
     expected = np.interp(way, [0.0, 2.0, 4.0, 6.0, 8.0, 10.0], [0.0, *heights, 0.0], right=0.0)

@@ -49,7 +49,6 @@ def test_low_pass_is_least_squares(count, highest):
 
 @pytest.mark.parametrize(("share", "highest", "ill"), [(0.9, 5, False), (0.9, 12, False), (0.5, 5, True)])
 def test_low_pass_of_a_part_of_the_period_is_least_squares_too(share, highest, ill):
-    """Where the normal equations would lose too many digits the basis is made."""
     phase, values = about_even(1000, 4)
     kept = phase < 2.0 * np.pi * share
     columns = written_out(phase[kept], highest)
@@ -65,7 +64,6 @@ def test_low_pass_of_a_part_of_the_period_is_least_squares_too(share, highest, i
 @pytest.mark.parametrize("count", [50, STRETCH, 2 * STRETCH + 1])
 @pytest.mark.parametrize("share", [1.0, 0.4])
 def test_amplitudes_are_those_that_values_were_made_of(count, share):
-    """Of a whole period and, ill-conditioned, of a part; the stretches that sums are made in do not show."""
     phase = np.linspace(0.0, 2.0 * np.pi * share, count, endpoint=False)
     values = 3.0 + 2.0 * np.cos(phase) - 1.0 * np.sin(phase) + 0.5 * np.cos(3.0 * phase - np.radians(40.0))
     expected = [3.0, 2.0 + 1.0j, 0.0, 0.5 * np.exp(-1j * np.radians(40.0)), 0.0]

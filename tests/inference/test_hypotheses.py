@@ -69,7 +69,6 @@ def test_probabilities_add_up(rng):
 
 
 def test_three_loud_causes_among_many_are_found_at_once(rng):
-    """Twelve of three columns each, nearly as many columns as samples."""
     columns = rng.normal(size=(40, 60))
     causes = [cause(f"c{k}", variant(3 * k, 3 * k + 1, 3 * k + 2), odds=ODDS) for k in range(12)]
     there = np.zeros(60)
@@ -83,7 +82,6 @@ def test_three_loud_causes_among_many_are_found_at_once(rng):
 
 
 def test_two_causes_that_hide_each_other_are_found_together(rng):
-    """Their sum is a thirtieth of each: alone, each of them is worth less than its prior odds."""
     axes = np.linalg.qr(np.hstack([BASE, rng.normal(size=(40, 3))]))[0] * np.sqrt(40)
     common, own = axes[:, 2:3], axes[:, 3:]
     columns = np.hstack([common + 0.02 * own[:, :1], -common + 0.02 * own[:, 1:], rng.normal(size=(40, 4))])
@@ -112,7 +110,6 @@ def test_a_flexible_cause_that_imitates_two_gives_way_to_them(rng):
 
 
 def test_a_seed_is_looked_at_in_the_form_that_its_cause_has_now(rng):
-    """Three causes of which only all together are worth anything: neither singles nor pairs lead there."""
     own = rng.normal(size=(40, 3))
     hidden = np.column_stack([own[:, 0] - own[:, 1], own[:, 1] - own[:, 2], own[:, 2] - own[:, 0]])
     columns = np.hstack([hidden + 0.01 * rng.normal(size=(40, 3)), rng.normal(size=(40, 5))])
@@ -149,7 +146,6 @@ def test_no_cause_at_all():
 
 
 def test_a_search_ends_where_the_most_probable_set_is_as_large_as_allowed(rng):
-    """Ten loud causes: with room for six of them nothing that is found is the truth, and the answer says so."""
     columns = rng.normal(size=(40, 10))
     problem = Dense(BASE, columns, columns.sum(axis=1) + rng.normal(0, 0.01, 40), 0.01)
     causes = one_column_each(10)

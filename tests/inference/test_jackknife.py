@@ -20,7 +20,6 @@ def blocks_of(columns, target, count):
 
 
 def test_a_mean_has_the_variance_of_the_block_means(rng):
-    """Of equal blocks the delete-one jackknife of a mean is the variance of the block means over their number."""
     target = rng.normal(3.0, 2.0, 400)
     means = target.reshape(20, 20).mean(axis=1)
     covariance = jackknife_covariance(blocks_of(np.ones((400, 1)), target, 20), 1)
@@ -80,7 +79,6 @@ def test_weighted_what_one_part_alone_knows_stays_as_it_is_stated():
 
 
 def test_refits_are_those_of_the_rows_that_are_left():
-    """Against a dense least-squares fit with a row for each prior."""
     settled = settle(channel(table(2, EFFECTS["hysteresis of q"], rows=600)))
     bank, (member,) = settled.bank, settled.best.members
     parts = [np.arange(600) // 60 == k for k in range(10)]
@@ -126,7 +124,6 @@ def test_widened_covariance_covers_what_groups_share_and_the_model_lacks(rng):
 
 
 def test_widening_hardly_changes_what_the_model_states_rightly(rng):
-    """The jackknife over ten groups scatters by a quarter, so the larger of the two is a tenth above on the average."""
     _, stated, wide = line_fits(rng, 400, 0.0)
     ratio = np.sqrt(np.diagonal(wide, axis1=1, axis2=2) / np.diag(stated))
     assert np.all(ratio >= 1.0 - 1e-12)

@@ -138,7 +138,6 @@ def test_rows_without_an_order_have_no_no(nothing):
 
 
 def test_what_the_base_conceals_wholly_has_no_size(nothing):
-    """A base that bends as a curve over a variable does: no size of it would be seen, and there is no "no"."""
     cause = next(c for c in nothing.causes if c.name == "curve over load")
     samples = nothing.bank.samples(cause.variants[0].columns)
     base = nothing.channel.base

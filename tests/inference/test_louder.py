@@ -12,7 +12,6 @@ RUNS, ROWS, LENGTH = 20, 600, 12
 
 
 def noise(rng, memory):
-    """First-order autoregressions of unit size, one per run."""
     pushes = rng.standard_normal((RUNS, ROWS + 200)) * np.sqrt(1.0 - memory**2)
     return list(lfilter([1.0], [1.0, -memory], pushes, axis=1)[:, 200:])
 

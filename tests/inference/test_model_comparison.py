@@ -82,7 +82,6 @@ def test_a_flat_base_is_the_limit_of_a_very_wide_one(rng):
 
 @pytest.mark.parametrize("beside", [0, 1, 3])
 def test_a_scan_averages_over_sizes_and_variants(problem, beside):
-    """Against the sum over all of them; the slack of what is beside counts, that of the scanned causes does not."""
     members = members_of()[:beside]
     forms = (variant(8, log_weight=np.log(0.5)), variant(9, 10, plausible=0.5, log_weight=np.log(0.2)))
     wide = variant(11, plausible=4.0, log_weight=np.log(0.3))
@@ -228,7 +227,6 @@ def test_one_amplitude_of_unknown_size(rng):
 
 
 def test_one_nonlinear_parameter_on_a_grid(rng):
-    """The grid stands for a parameter that is anything between its ends, uniform in its logarithm."""
     low, high, count = 0.05, 1.0, 16
     cells = np.geomspace(low, high, count + 1)
     grid = np.sqrt(cells[1:] * cells[:-1])
@@ -285,7 +283,6 @@ def test_two_causes_with_sizes_of_their_own(rng):
 
 
 def test_information_whose_rounding_is_negative_is_that_of_the_prior_there(rng: np.random.Generator) -> None:
-    """Readings never take information away: the negative eigenvalue becomes one, the others stay."""
     turned = np.linalg.qr(rng.normal(size=(4, 4)))[0]
     lower = cholesky(turned @ np.diag([-0.15, 3.0, 79.0, 1e6]) @ turned.T)
     assert np.all(np.diag(lower) > 0.0)
@@ -295,7 +292,6 @@ def test_information_whose_rounding_is_negative_is_that_of_the_prior_there(rng: 
 
 @pytest.mark.parametrize("left_out", [(), (0,), (1,), (2,), (0, 2), (0, 1, 2)])
 def test_causes_around_a_hypothesis_are_those_beside_its_members_but_for_some(problem, left_out):
-    """All sizes of every absent cause, against integrals over the members that are left; those that are left out are absent, too."""
     members, fourth = members_of(), cause("fourth", variant(8), variant(9, 10, plausible=0.7))
     causes = [members[1].cause, fourth, members[0].cause, members[2].cause]
     left = [m for k, m in enumerate(members) if k not in left_out]

@@ -41,7 +41,6 @@ def test_smooth_figures_feel_the_noise_that_was_put_in(rng, samples, correlation
 
 @pytest.mark.parametrize("samples", [113, 1500])
 def test_form_that_a_model_lacks_is_no_correlation(rng, samples):
-    """It counts in the size, as if it were white."""
     form = 3.0 * np.cos(np.linspace(0.0, 6.0 * np.pi, samples, endpoint=False))
     found = noise_of_turns([one + form for one in turns(rng, samples, 0.0)], 0.0)
     assert found.sigma == pytest.approx(np.sqrt(LEVEL**2 + 4.5), rel=0.05)

@@ -33,7 +33,6 @@ def samples(rng):
 
 
 def held_rows(rng, count):
-    """Orthonormal directions of the five fitted columns."""
     return np.linalg.qr(rng.normal(size=(len(FITTED), count)))[0].T
 
 
@@ -98,7 +97,6 @@ def test_a_badly_conditioned_base_loses_no_digits(samples):
 
 
 def test_the_evidence_beside_random_effects_is_the_dense_integral(samples):
-    """All columns of the base are random: the covariance of the target is noise, base and cause."""
     base, causes, target = samples
     known = Columns(np.full(len(PRIOR), 0.3), SCALE, np.ones(len(PRIOR), dtype=bool))
     columns = CauseColumns(base)
@@ -155,7 +153,6 @@ def test_columns_that_come_later_count_as_those_that_were_there(samples, rng):
 
 @pytest.mark.parametrize(("alone", "only"), [(False, None), (True, None), (True, np.array([0, 2, 4]))])
 def test_rows_that_are_held_back_say_nothing(samples, rng, alone, only):
-    """As columns of the other rows alone; also where a random effect is known to the rows held back only, and for some columns."""
     base, causes, target = samples
     out = np.zeros(SAMPLES, dtype=bool)
     out[25:45] = True
@@ -175,7 +172,6 @@ def test_rows_that_are_held_back_say_nothing(samples, rng, alone, only):
 
 
 def test_parts_that_are_held_back_together_say_nothing(samples, rng):
-    """Products of two parts added up, as columns of the other rows alone."""
     base, causes, target = samples
     first, second = (np.zeros(SAMPLES, dtype=bool) for _ in range(2))
     first[5:15], second[30:40] = True, True
@@ -192,7 +188,6 @@ def test_parts_that_are_held_back_together_say_nothing(samples, rng):
 
 
 def test_columns_take_the_places_of_those_that_were_given_back(samples, rng):
-    """Products are those of the columns that are there now, whether they were asked for before or not; a copy keeps its own."""
     base, causes, target = samples
     columns = CauseColumns(base)
     columns.add(causes)

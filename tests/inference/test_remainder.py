@@ -31,7 +31,6 @@ def test_of_noise_alone_nothing_stands_out(rng):
 
 
 def test_a_fine_wave_is_found_with_its_size(rng):
-    """As large as a sixth of the noise of one sample, in all runs: too little for any single run."""
     wave = 0.1 * np.cos(23 * PHASE)
     found = of([run + wave for run in white(rng)])
     assert found.harmonic.probability < 1e-8

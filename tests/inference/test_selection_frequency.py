@@ -55,7 +55,6 @@ def test_nothing_is_found_again_where_nothing_is(rng):
 
 
 def test_frequencies_are_the_shares_of_the_parts_in_which_brute_force_finds_a_cause():
-    """Four groups, three kept: four parts, and all sets of causes and sizes in each of them."""
     rng = np.random.default_rng(7)
     targets = runs(rng, [0.9, 0.0, 0.0, 0.0], [0.0, 0.8, 0.0, 0.0], [0.9, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0])
     kept = [*combinations(range(4), int(np.ceil(SHARE * 4)))]
@@ -75,7 +74,6 @@ def test_frequencies_are_the_shares_of_the_parts_in_which_brute_force_finds_a_ca
 
 
 def test_each_group_is_kept_in_seven_of_ten_draws():
-    """Ten groups; what shows in one of them only is found where that one is kept."""
     rng = np.random.default_rng(3)
     targets = runs(rng, *[[0.0] * 4] * 10)
     nothing = np.zeros_like(WAVES)
@@ -89,7 +87,6 @@ def test_each_group_is_kept_in_seven_of_ten_draws():
 
 
 def test_draws_never_split_a_group():
-    """A random effect of each pair of runs hides a cause from either of them alone: it shows in their difference."""
     rng = np.random.default_rng(4)
     pairs = 10
     random = Columns(
@@ -135,7 +132,6 @@ def test_the_order_of_blocks_and_of_causes_does_not_matter():
 
 
 def test_of_two_groups_both_are_kept(rng):
-    """Seven tenths of two are two: one alone would say nothing of the machine without the other."""
     targets = runs(rng, [0.0] * 4, [0.0] * 4)
     nothing = np.zeros_like(WAVES)
     targets[0], targets[1] = targets[0] + 5.0 * WAVES[:, 0], targets[1] + 5.0 * WAVES[:, 1]

@@ -95,7 +95,6 @@ def test_unlikely_causes_are_said_to_be_less_likely_than_they_are_by_no_more_tha
 
 
 def test_true_amplitudes_have_every_rank_among_posterior_draws_alike():
-    """Two causes that are there, of unknown sizes: mixture over all sizes by log evidence, draws by the estimates."""
     rng = np.random.default_rng(20260716)
     causes = [cause(f"c{k}", variant(k)) for k in range(2)]
     draws, ranks = 19, []

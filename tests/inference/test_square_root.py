@@ -162,7 +162,6 @@ def test_what_is_no_number_is_refused(rng, count):
 
 
 def test_blocks_spread_over_all_columns_say_the_same(problem):
-    """Against every block's own normal equations, written into place one by one."""
     jacobians, columns, targets, known, _ = problem
     blocks = blocks_of(jacobians, columns, targets)
     blocks[2] = replace(blocks[2], noise=0.05)

@@ -29,7 +29,6 @@ def made(residual, **more):
 
 
 def forms(settled):
-    """Family and edges of the stretches of the best hypothesis."""
     found = []
     for member in settled.best.members:
         pattern = settled.bank.patterns[member.cause.name]
@@ -48,7 +47,6 @@ def test_a_stretch_is_the_difference_of_two_steps():
 
 
 def test_a_round_edge_is_found_between_two_rows(rng):
-    """Rows that blur a step over two of them show where it was to some hundredths of one, and it is one stretch."""
     clock = Clock(np.arange(ROWS, dtype=np.float64), lambda since: ndtr(since / 1.5), 60.0)
     pulse = ndtr((clock.rows - 400.3) / 1.5) - ndtr((clock.rows - 631.8) / 1.5)
     settled = settle(made(3.0 * pulse + rng.normal(0.0, 0.05, ROWS), clock=clock))
@@ -59,7 +57,6 @@ def test_a_round_edge_is_found_between_two_rows(rng):
 
 
 def test_what_turns_with_the_direction_is_one_stretch(rng):
-    """A friction that is there for a while, over six strokes to and fro."""
     direction = np.where(np.arange(ROWS) // 100 % 2 == 0, 1.0, -1.0)
     inside = (np.arange(ROWS) >= 250) & (np.arange(ROWS) < 850)
     settled = settle(made(1.0 * direction * inside + rng.normal(0.0, 0.2, ROWS), direction=direction))
@@ -117,7 +114,6 @@ def test_the_likelihood_of_uneven_noise_is_that_of_its_covariance(rng):
 
 @pytest.mark.parametrize("edges", [(37.5, np.inf), (38.5, np.inf), (-np.inf, 0.5), (12.2, 12.4), (30.0, 30.0)])
 def test_a_stretch_that_came_to_be_too_short_is_sought_among_long_enough_ones(rng, edges):
-    """Beside others a stretch may come to two rows at an end: three were looked for behind the last row there."""
     rows = 40
     left = Left(rng.normal(0.0, 1.0, rows), np.zeros((rows, 0)), 1.0, Coloured(1.0), None)
     clock = Clock.plain(rows)
@@ -151,7 +147,6 @@ def test_what_is_left_beside_columns_in_two_parts_is_ridge_regression(rng):
 
 
 def test_what_is_left_beside_all_columns_but_one_is_ridge_regression(rng):
-    """As above, for each column left out in turn, in noise that remembers; each then changes, as a stretch whose edges moved."""
     rows, noise = 60, Coloured.first_order(0.7, 0.6, 0.8)
     whitening = noise.whitening([slice(0, rows)])
     dense, level = whitening.toarray(), noise.innovation
@@ -187,7 +182,6 @@ def test_a_part_of_whitened_rows_is_that_of_the_whole_matrix(rng, here, there):
 
 
 def test_a_single_row_is_no_stretch(rng):
-    """One row of ten times the noise: a wrong value, which no stretch of three rows explains as a row of its own."""
     rows = 400
     residual = rng.normal(0.0, 1.0, rows)
     residual[200:203] += (12.0, 1.0, 0.0)

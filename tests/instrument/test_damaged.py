@@ -51,7 +51,6 @@ def terminal() -> Iterator[tuple[int, int]]:
 
 
 def test_pyserial_lets_no_port_tell_of_wrong_parity(terminal: tuple[int, int]) -> None:
-    """The fault: a driver that is not told to compare parity hands out wrong characters as right ones."""
     _, theirs = terminal
     settings = termios.tcgetattr(theirs)
     settings[0] |= termios.INPCK | termios.PARMRK
@@ -86,7 +85,6 @@ def test_a_pseudo_terminal_takes_no_parity(terminal: tuple[int, int]) -> None:
 
 
 def test_bytes_of_numbers_are_not_marked(terminal: tuple[int, int]) -> None:
-    """In binary frames every byte means something; they have checksums."""
     assert not BINARY.is_text
     link = open_link(os.ttyname(terminal[1]), BINARY.line, text=BINARY.is_text)
     assert not link.sees_damage

@@ -102,7 +102,6 @@ def test_a_bar_of_100_mm_has_two_and_three_digits_on_one_circle() -> None:
 
 
 def test_another_form_is_believed_when_it_stays() -> None:
-    """The display was set to two decimals: two readings are left out, no more."""
     frames = [b"+150.123\r"] * 3 + [b"+150.12\r"] * 5 + [b"+150.123\r"]
     said = [one.status for one in judged(SYLVAC, frames)]
     assert said == ["ok"] * 3 + ["doubtful"] * (BELIEVED_AFTER - 1) + ["ok"] * 3 + ["doubtful"]
@@ -149,7 +148,6 @@ def test_bytes_beside_a_reply_make_it_doubtful() -> None:
 
 @pytest.mark.parametrize("protocol", usable_variants(), ids=lambda one: one.label)
 def test_no_lost_character_gives_a_wrong_length(protocol: Protocol) -> None:
-    """All characters of frames at five places of a circle, the decoder and what guards it."""
     found = unnoticed(protocol, guarded=True, kinds=("lost",), pairs=0)
     assert found.cases["lost"] >= 5 * 5
     assert found.wrong["lost"] == 0
@@ -168,7 +166,6 @@ def test_what_passes_unnoticed_is_smaller_than_the_feed_allows(name: str) -> Non
 
 @pytest.mark.nightly
 def test_the_stored_table_is_what_is_measured() -> None:
-    """Every cell of what docs/validation.md is taken from; two minutes of processor time."""
     kept = Path(__file__).parents[2] / "docs" / "validation" / "undetected.json"
     stated = json.loads(kept.read_text(encoding="utf-8"))["figures"]
     assert stated == dict(rows([], guarded=True, pairs=PAIRS, seed=SEED))

@@ -121,7 +121,6 @@ def test_an_error_of_the_manual_is_told_in_words(name: str, profile: str, raw: b
 
 
 def test_the_same_request_is_answered_otherwise_by_other_firmware() -> None:
-    """STX before the value, or ACK: the profile that does not fit understands nothing, rather than something wrong."""
     stx, ack = load_instrument("heidenhain-nd287"), load_instrument("heidenhain-nd287", "ack")
     assert stx.ask.request == ack.ask.request == b"\x1bA0100\r"
     for ours, theirs in ((stx, ack), (ack, stx)):
@@ -133,7 +132,6 @@ def test_the_same_request_is_answered_otherwise_by_other_firmware() -> None:
 
 
 def test_stx_is_the_request_and_the_prefix_of_the_reply() -> None:
-    """An echo of the request before the reply must not be taken for the reply's beginning, nor for a reading."""
     protocol = load_instrument("heidenhain-nd281b", "a0200")
     asked = protocol.ask.request
     with expected((asked, b"\x02\x02+001500003\r\n"), (asked, b"\x02+001500003\r\n")) as port:

@@ -163,7 +163,6 @@ def test_frames_that_make_no_sense_are_refused(tmp_path: Path, frame: str, fault
 
 
 def test_a_number_may_stand_for_more_than_its_digits(tmp_path: Path) -> None:
-    """Nine digits without a point, of which the last is a tenth of a micrometre."""
     text = THIRD.replace("width: 8, decimals: 3", 'width: 9, pad: "0", scale: 0.0001')
     (tmp_path / "gauge.yaml").write_text(text, encoding="utf-8")
     protocol = read_protocol(tmp_path / "gauge.yaml")

@@ -158,10 +158,6 @@ def test_another_instrument_that_streams_is_named(expected, answering, named: st
 
 
 def test_a_gauge_whose_replies_only_begin_as_those_of_another_is_refused() -> None:
-    """TESA and Sylvac are asked alike; the one ends its replies with CR LF and means µm, the other with CR and means mm.
-
-    Without the line feeds that belong to no reply, every second reading would be a length that is wrong by a thousand.
-    """
     sylvac, tesa = load_instrument("sylvac-opto-rs"), with_zero(load_instrument("tesa-tt80"), 150.0)
     assert sylvac.ask.request == tesa.ask.request
     with (
@@ -235,7 +231,6 @@ def test_a_reply_cut_in_the_middle_costs_one_sample(keep: int) -> None:
 
 @pytest.mark.parametrize("protocol", [ND, STREAM, BINARY], ids=lambda one: one.label)
 def test_an_endless_line_takes_no_memory(protocol) -> None:
-    """Ten megabytes without an end, in pieces as a port brings them."""
     decoder = Decoder(protocol, joining=True)
     piece = b"7" * 4096
     for _ in range(50):
@@ -332,8 +327,6 @@ def test_an_instrument_behind_a_socket_server() -> None:
 
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # pyserial says so of itself
 def test_an_instrument_behind_a_server_of_rfc_2217() -> None:
-    """The server sets its own line as the client asks for: here a pseudo-terminal that has no bits, so only data pass."""
-
     class NoBits(serial.Serial):
         """A pseudo-terminal has no parity and no modem lines; it takes note of the one and says yes to the other."""
 
@@ -375,7 +368,6 @@ def test_an_instrument_behind_a_server_of_rfc_2217() -> None:
 
 
 def test_network_instruments_are_never_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Listing ports makes no connection, and every listed port is a device of this computer."""
     monkeypatch.setattr(socket.socket, "connect", lambda *_: pytest.fail("something was connected to"))
     assert all("://" not in name for name, *_ in connected_ports())
 

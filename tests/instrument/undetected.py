@@ -220,7 +220,6 @@ def unnoticed(
     pairs: int = PAIRS,
     seed: int = SEED,
 ) -> Unnoticed:
-    """Damage frames of an instrument and count what no one notices."""
     found, dice, wanted = Unnoticed(), random.Random(seed), set(kinds)  # noqa: S311 (no secret hangs on it)
     for place_deg in places_deg:
         passage = Passage(protocol, place_deg, guarded=guarded)

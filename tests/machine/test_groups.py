@@ -69,7 +69,6 @@ def nearly_loose(hexapod, distances):
 
 
 def test_poor_poses_are_solved_as_well_as_their_condition_allows(hexapod):
-    """Against NumPy's elimination with row exchanges, up to a condition of ten million."""
     frames = nearly_loose(hexapod, [10.0, 1.0, 0.1, 0.01, 1e-3, 1e-4])
     jacobian = strut_jacobian(inverse(hexapod, frames))
     condition = np.linalg.cond(jacobian)
@@ -82,7 +81,6 @@ def test_poor_poses_are_solved_as_well_as_their_condition_allows(hexapod):
 
 
 def test_forward_kinematics_converges_close_to_a_loose_pose(hexapod):
-    """A hundredth of a degree from where the struts hold nothing, started a hundred times closer to the answer."""
     wanted, near = nearly_loose(hexapod, [0.01]), nearly_loose(hexapod, [0.0101])
     lengths = strut_lengths(hexapod, wanted)
     found = forward(hexapod, lengths, near)
@@ -90,7 +88,6 @@ def test_forward_kinematics_converges_close_to_a_loose_pose(hexapod):
 
 
 def test_a_platform_on_parallel_struts_is_loose(hexapod, rng):
-    """Equal joints on base and platform: the platform can swing sideways."""
     joints = hexapod.platform_joints_mm * np.array([1.0, 1.0, 0.0])
     swing = Hexapod(joints, joints)
     frames = Frames.from_poses(np.array([[0.0, 0.0, -900.0, 0.0, 0.0, 0.0]]), swing.rotation)

@@ -91,7 +91,6 @@ coordinate = st.floats(-1, 1)
     convention=st.sampled_from(list(Rotation)),
 )
 def test_forward_undoes_inverse_over_the_whole_travel(reference, where, start, convention):
-    """From a start a millimetre and a quarter of a degree away, wherever the struts hold the platform."""
     travel = reference.travel
     middle = np.array([0, 0, sum(travel.z_mm) / 2, 0, 0, 0])
     half = np.array(

@@ -35,7 +35,6 @@ def test_a_mistyped_joint_is_named(reference, key, strut, axis, by_mm):
 
 
 def test_machines_of_another_kind_are_left_alone(reference, rng):
-    """Measured joints; joints in two rings; struts counted otherwise; a machine that was turned and moved."""
     check_joints(reference)
     check_joints(changed(reference, "base_joints_mm", rng.normal(0.0, 0.5, (6, 3))))
     check_joints(changed(reference, "base_joints_mm", np.array([[0.0, 0.0, 80.0], [0.0, 0.0, 0.0]] * 3)))

@@ -39,7 +39,6 @@ def test_each_limit_is_named_with_its_pose(reference, outside, named):
 
 
 def test_a_pose_where_the_platform_comes_loose_is_refused(reference):
-    """Inside all travel limits the Jacobian's determinant passes through zero at high tilt near the upper rim."""
     low, high = np.array([150, -180, -809, 5, 15, 0]), np.array([200, -140, -830, 20, 20, 3])
     poses = np.random.default_rng(3).uniform(np.minimum(low, high), np.maximum(low, high), (20000, 6))
     poses = poses[np.hypot(poses[:, 0], poses[:, 1]) < 290]

@@ -59,7 +59,6 @@ def test_actual_pose_is_the_forward_solution_of_the_definition(machine, kinemati
 
 
 def test_a_controller_that_corrects_its_strut_errors_is_right(machine):
-    """Entering the identified lengths as reference-length errors cures them."""
     errors = fitted("strut-reference-length", *machine.reference_length_error_mm)
     motion = path(10.0)
     assert np.allclose(MachineModel(machine, (errors,)).actual_poses(motion), motion.poses, atol=1e-9)

@@ -67,10 +67,6 @@ def test_currents_answer_to_weights_and_drives(machine, rng, name, step):
 
 @pytest.mark.parametrize(("name", "step"), [("gravity", 1e-3), ("cog-shift", 1e-2), ("strut-weight", 1e-2)])
 def test_struts_have_one_compliance_for_all_weights(machine, rng, name, step):
-    """The stretch under a shifted centre and under the struts' weight goes with the compliance that gravity found.
-
-    The derivative is that of weights which pull at one place, however much the machine gives way.
-    """
     motion = random_run(rng, 80)
     model = model_of(machine)
     fitted = next(f for f in model.sources if f.source.name == name)
@@ -95,7 +91,6 @@ def test_without_a_compliance_found_the_machine_files_counts(machine, rng):
 
 
 def test_strut_weights_of_a_source_replace_those_of_the_machine_file(machine, rng):
-    """They are the same struts: what the file states and a source has as well does not count twice."""
     motion = random_run(rng, 40)
     struts, drives = sources_named(["strut-weight", "drive-friction"])
     stated = machine.strut_masses
@@ -126,7 +121,6 @@ def test_loads_are_those_where_the_machine_really_is(reference):
 
 
 def test_poses_and_programs_do_without_currents(reference):
-    """A model that knows its drives predicts and compensates single poses as one that does not."""
     gravity, drives = sources_named(["gravity", "drive-friction"])
     plain = MachineModel(reference, (Fitted(gravity, np.array([9.68])),))
     knowing = MachineModel(reference, (*plain.sources, Fitted(drives, DRIVE)))

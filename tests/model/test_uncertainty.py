@@ -69,7 +69,6 @@ def test_uncertainty_is_the_scatter_of_drawn_machines(known, poses, rng, about_m
 
 
 def test_the_smaller_part_along_the_null_space_is_part_of_the_uncertainty(known, poses):
-    """A small null space widens u by its own scatter: known apart they add up in squares."""
     small = replace(known, null_space=1e-5 * ALL_ALONG_Z[None])
     both = position_uncertainty_mm(small, Motion(poses))
     alone = position_uncertainty_mm(replace(known, directions_lost=(), null_space=None), Motion(poses))
@@ -120,7 +119,6 @@ def test_whole_numbers_of_poses_are_not_predicted_in_whole_numbers(known):
 
 @pytest.mark.parametrize("axis", [1, 2])
 def test_a_range_of_deviations_scatters_as_stated_over_drawn_machines(known, rng, axis):
-    """Along X the greatest less the least deviation; the base's height is common to both."""
     line = np.tile([0.0, 0.0, -1008.0, 0.0, 0.0, 0.0], (9, 1))
     line[:, 0] = np.linspace(-190.0, 190.0, 9)
     stated = range_uncertainty_mm(known, Motion(line), axis)

@@ -75,7 +75,6 @@ def _contour(drawn: np.random.Generator, x: float, y: float, feed: float) -> Ite
 
 
 def _holes(drawn: np.random.Generator, x: float, y: float, feed: float) -> Iterator[str]:
-    """Drilled, some in pecks, some with a dwell at the bottom."""
     dwell, pecks = drawn.random() < 0.3, int(drawn.integers(1, 4))
     for hole in range(4):
         yield f"G0 X{x + 12.0 * (hole % 2):.3f} Y{y + 15.0 * (hole // 2):.3f}"

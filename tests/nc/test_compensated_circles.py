@@ -33,7 +33,6 @@ def compensated(request, linuxcnc, table2, crooked) -> dict[str, Toolpath]:
 
 
 def off_the_circle_mm(poses: np.ndarray, circle: Circle) -> tuple[np.ndarray, np.ndarray]:
-    """Radial deviation outwards, and height above the circle's plane."""
     from_centre = poses[:, :3] - circle.centre_mm
     return np.hypot(from_centre[:, 0], from_centre[:, 1]) - circle.radius_mm, from_centre[:, 2]
 

@@ -233,7 +233,6 @@ EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "sinumerik.py"
 
 
 def test_the_example_of_the_documentation_is_a_dialect(linuxcnc, crooked, table2):
-    """A part and a ball-bar run, compensated, read back in its language as in LinuxCNC's."""
     dialect = dialect_given(str(EXAMPLE))
     part = "G21 G90 G54\nG0 X0 Y0 Z-1000 A0 B0 C0\nS800 M3\nG61\nG1 X50 F500\n(MSG, turn it)\nM0\nG4 P0.5\nG1 A5 F60\nM30\n"
     path = read_program(part, "part.ngc")

@@ -95,7 +95,6 @@ def test_what_only_we_refuse_is_little_and_has_a_name(verdicts):
 
 
 def difference(path: Toolpath, they: list[Event]) -> str:
-    """Where a toolpath and LinuxCNC's events differ; empty where they agree."""
     they = [event for event in they if event.kind in MOTION]
     groups = grouped(path)
     if [kind for kind, _ in groups] != ["FEED" if event.kind == "ARC" else event.kind for event in they]:

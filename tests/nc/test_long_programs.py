@@ -52,7 +52,6 @@ def remembering(reference, name: str, values: np.ndarray) -> MachineModel:
 
 @pytest.mark.parametrize(("name", "values"), [("backlash", GAPS_UM), ("servo-lag", LAG_S), ("reversal-spike", SPIKES)])
 def test_what_a_machine_remembers_goes_from_part_to_part(linuxcnc, reference, monkeypatch, name, values):
-    """Cut between moves, where pieces end anyway: the last decimal that is written may differ."""
     model = remembering(reference, name, values)
     path = linuxcnc.read(LINES, "lines.ngc")
     whole = compensate_toolpath(path, model, started_s=10.0)

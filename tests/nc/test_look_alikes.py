@@ -138,7 +138,6 @@ def test_what_is_not_read_is_refused_with_its_line(what):
 
 
 def test_a_foreign_program_is_refused_as_a_whole(linuxcnc, crooked):
-    """Every fault is told, and nothing is written, whatever was read before it."""
     body = "".join(body for body, *_ in FOREIGN.values())
     with pytest.raises(StationError) as refused:
         compensated_program(linuxcnc.read(f"{HEAD}{body}M2\n", "all.ngc"), linuxcnc, Inverse(crooked))

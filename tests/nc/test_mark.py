@@ -75,7 +75,6 @@ def test_a_compensated_circle_is_known_without_numbers(linuxcnc, crooked, table2
 
 
 def test_nominal_programs_are_not_taken_for_compensated_ones():
-    """A thousand drawn programs, as CAM writes them and with all decimals: the chance is one in a hundred million each."""
     draw = np.random.default_rng(7)
     for count in (1, 2, 5, 6, 7, 20, 300):
         for decimals in (0, 3, 4, 6):
@@ -86,7 +85,6 @@ def test_nominal_programs_are_not_taken_for_compensated_ones():
 
 
 def test_a_pattern_that_is_run_many_times_is_one_pattern():
-    """Poses count once: one that has the mark by chance does not become evidence by being repeated."""
     draw = np.random.default_rng(3)
     while True:
         pose = np.round(draw.uniform(-50.0, 50.0, 6), 3)
@@ -114,7 +112,6 @@ def test_the_mark_moves_no_tip_where_the_angles_move(crooked, table2):
 
 
 def test_what_stands_still_goes_on_standing_still():
-    """Angles that are held (so that LinuxCNC blends), and a turn about a tip at rest, whose F counts degrees."""
     lines = "\n".join(f"X{k % 7 + 0.001 * k:.3f} Y{k % 5} Z{-1000 - k % 3}" for k in range(150))
     path = read_program(f"G21 G90\nG0 X0 Y0 Z-1000 A1 B0 C0\nG1 F500\n{lines}\nG1 A5 F60\nA7\nA9 B2\nM2\n", "x.ngc")
     with_mark = marked(path)

@@ -273,7 +273,6 @@ BOMBS = {
 
 @pytest.mark.parametrize("name", BOMBS)
 def test_what_no_machine_has_is_refused_within_bounds(name):
-    """In a process that may use two seconds of a processor for it and two gigabytes in all."""
     text, says = BOMBS[name]
     code = (
         "import sys; from dbbstation.nc.rs274.reader import read_program; from dbbstation.errors import InputError\n"
@@ -337,7 +336,6 @@ def test_a_correction_beyond_a_millimetre_is_refused_and_beyond_the_option_too(l
 
 
 def test_a_tilt_counts_as_what_it_moves_a_tenth_of_a_metre_away(linuxcnc, reference):
-    """A turned base shifts a tip under its middle by nothing."""
     turned = np.radians(1.0)
     spin = np.array([[np.cos(turned), -np.sin(turned), 0], [np.sin(turned), np.cos(turned), 0], [0, 0, 1]])
     shift = reference.hexapod.base_joints_mm @ spin.T - reference.hexapod.base_joints_mm

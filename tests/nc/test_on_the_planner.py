@@ -174,7 +174,6 @@ def test_a_small_circle_keeps_its_feed(linuxcnc, table2, crooked, prefer):
 
 
 def test_a_part_that_is_refused_reaches_the_feed_that_is_said(linuxcnc, crooked):
-    """Written at the feed of the message it keeps that; at its own, with the chord preferred, it takes the time that is said."""
     model = accelerating(crooked, 1000.0)
     with pytest.raises(StationError, match=r"arc\.ngc:\d+: F1500 cannot be kept within 0\.1 µm") as caught:
         compensated_program(linuxcnc.read(ARC.format(feed=1500), "arc.ngc"), linuxcnc, Inverse(model))
@@ -200,7 +199,6 @@ def test_a_part_that_is_refused_reaches_the_feed_that_is_said(linuxcnc, crooked)
 @pytest.mark.parametrize("feed", [1000, 3000, 6000])
 @pytest.mark.parametrize("what", ["circle", "part", "arc"])
 def test_every_program_that_is_written_keeps_its_feed(linuxcnc, table2, crooked, what, feed, mm_s2, capsys):
-    """And the feed that a refusal names is kept, and is what the planner reaches where accuracy is preferred."""
     model = accelerating(crooked, mm_s2)
 
     def written(feed: int, prefer: Prefer | None) -> tuple[str, Program]:

@@ -190,7 +190,6 @@ def profile_s(lengths: np.ndarray, corners: np.ndarray, feed: float, mm_s2: floa
 
 @pytest.mark.parametrize("seed", range(6))
 def test_speeds_at_corners_are_brought_into_line(linuxcnc, seed):
-    """Short lines with kinks of some degrees, too many for each to be reached at its own speed."""
     drawn = np.random.default_rng(seed)
     lengths, turns = drawn.uniform(0.02, 3.0, 12).round(3), drawn.uniform(0.1, 1.2, 11)
     angle = np.concatenate([[0.0], np.cumsum(turns)])
@@ -249,7 +248,6 @@ def test_rapids_go_on_as_they_did(control, linuxcnc, crooked):
 
 
 def test_rapids_in_one_direction_are_one(linuxcnc, crooked):
-    """Up, up again and over: the middle of the way up has no line. One with a word or another path control between them stays two."""
     up = "G21 G90 G94\nG64 P0.05\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X5 F600\nG0 Z-990\n{between}G0 Z-960\nG0 Z-960 X30\nM2\n"
     counts = []
     for between in ("", "M8\n", "G64\n"):
@@ -260,7 +258,6 @@ def test_rapids_in_one_direction_are_one(linuxcnc, crooked):
 
 @pytest.mark.parametrize(("control", "said"), [("G64 P0.05", False), ("G64", True)])
 def test_slower_rapids_are_said(linuxcnc, crooked, control, said):
-    """Without a bound LinuxCNC rounds the nominal corners by a quarter of the shorter rapid, and hardly the compensated ones."""
     model = replace(crooked, machine=replace(crooked.machine, acceleration_mm_s2=A))
     done = compensated_program(
         linuxcnc.read(UP_OVER_DOWN.format(control=control), "holes.ngc"), linuxcnc, Inverse(model)

@@ -104,7 +104,6 @@ def test_moves_in_machine_coordinates_stay_so(linuxcnc):
 
 
 def test_a_retract_in_machine_coordinates_stays_one_whatever_the_offsets(linuxcnc, crooked):
-    """Up in machine coordinates, over in those of the part, down: no line may name an axis in the other system."""
     text = FIRST + "G1 X5 F100\nG53 G0 Z-950\nG0 X50 Y20 A1 B1 C1\nG0 Z-1000\nG1 X60\nM2\n"
     done = compensated_program(linuxcnc.read(text, "part.ngc"), linuxcnc, Inverse(crooked)).text
     assert "o100" not in done
@@ -118,7 +117,6 @@ def test_a_retract_in_machine_coordinates_stays_one_whatever_the_offsets(linuxcn
 
 
 def test_a_feed_that_mixes_systems_is_guarded(linuxcnc, crooked):
-    """All six axes are corrected at feed, which is right in one system only."""
     text = FIRST + "G54\nG53 G1 Z-990 F100\nG1 X5\nM2\n"
     done = compensated_program(linuxcnc.read(text, "part.ngc"), linuxcnc, Inverse(crooked)).text
     assert "\n".join(guard_lines(["G54"])) in done

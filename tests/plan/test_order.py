@@ -20,7 +20,6 @@ HOLDERS = {"short": 0.0, "long": 142.0, "riser": 280.0}
 
 
 def random_plan(seed: int, tests: int) -> Plan:
-    """Tests on balls of three heights; some share a ball."""
     rng = np.random.default_rng(seed)
     one = read_plan(TABLE2).tests["a"]
     drawn = {}
@@ -90,7 +89,6 @@ def test_correlations_are_those_of_a_fit():
 
 @pytest.mark.parametrize(("limit", "holder_changes"), [(0.02, 7), (0.05, 4), (0.1, 4)])
 def test_table_ii_apart_from_drift(monkeypatch, limit, holder_changes):
-    """In the plan's own order the height rises with time."""
     monkeypatch.setattr(order, "LARGEST_LEAK", limit)
     plan = read_plan(TABLE2)
     found = against_drift(plan)

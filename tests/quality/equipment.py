@@ -183,7 +183,6 @@ def _alike(whole: Sound, tilted: dict[float, Sound], known: Seen, one: Seen, fau
 
 
 def print_equipment(counted: Row) -> None:
-    """The table of docs/validation.md: found, of how many."""
     heads = [(when, with_model) for with_model in (False, True) for when in When]
     titles = [f"{when}{', model' if with_model else ''}" for when, with_model in heads]
     sys.stdout.write(f"| fault | size | {' | '.join(titles)} |\n|{' --- |' * (len(heads) + 2)}\n")

@@ -36,7 +36,6 @@ def noisy(recording: Recording, _circle: Circle, um: float) -> Recording:
 
 
 def unclosed(recording: Recording, circle: Circle, um: float) -> Recording:
-    """Longer from shortly before the turn's end until shortly behind it."""
     phi = progress(recording, circle)
     return longer(recording, um * (np.clip((phi - 335.0) / 10.0, 0.0, 1.0) - np.clip((phi - 365.0) / 10.0, 0.0, 1.0)))
 

@@ -36,7 +36,6 @@ Spoiler = Callable[[Recording, Circle, float], Recording]
 
 
 def slipped(recording: Recording, circle: Circle, um: float) -> Recording:
-    """The bar slips in its cup half-way round, and stays there."""
     return longer(recording, np.where(progress(recording, circle) >= 180.0, um, 0.0))
 
 
@@ -108,7 +107,6 @@ def clock_set(recording: Recording, circle: Circle, seconds: float) -> Recording
 
 
 def silent(recording: Recording, circle: Circle, seconds: float) -> Recording:
-    """Nothing comes for so long half-way round."""
     since_s = (progress(recording, circle) - 180.0) / circle.turning_deg_s
     return _rows(recording, (since_s < 0.0) | (since_s > seconds))
 

@@ -34,7 +34,6 @@ def test_two_runs_of_one_circle_have_noise_of_their_own(whole):
 
 @pytest.mark.parametrize("dropped", [0, 7])
 def test_a_run_that_came_in_twice_is_found(whole, dropped):
-    """Also where its first samples were cut off, and under the name of the other direction."""
     first, second, again = run(whole, "a ccw 1"), run(whole, "a cw 1"), run(whole, "a ccw 2")
     for one, of in ((again, first), (second, first)):
         found = finding_of(
@@ -46,7 +45,6 @@ def test_a_run_that_came_in_twice_is_found(whole, dropped):
 
 
 def test_a_stretch_that_was_copied_is_found(whole):
-    """A tenth of the turn comes from another run."""
     first, again = run(whole, "a ccw 1"), run(whole, "a ccw 2")
     length = again.run.recording.length_mm.copy()
     length[1000:1270] = first.run.recording.length_mm[1000:1270]
@@ -81,7 +79,6 @@ def test_chance_makes_no_copy_of_equal_forms(whole, step_um):
 
 
 def test_a_copy_that_was_moved_is_another_matter(whole):
-    """What is compared is readings: a constant on all of them is a bar of another length, or other counts."""
     first, again = run(whole, "a ccw 1"), run(whole, "a ccw 2")
     moved = seen(replace(again.run, recording=longer(first.run.recording, np.full(len(first.run.recording), 3.0))))
     assert copied(moved, [first]).verdict is FindingVerdict.GOOD

@@ -56,7 +56,6 @@ def test_half_of_a_limit_is_kept_and_twice_is_found(machine_session, name):
 
 @pytest.mark.slow
 def test_a_bump_of_sixty_micrometres_is_found_anywhere(machine_session):
-    """Also where a strut turns round: on this machine the steps there are of one to three micrometres."""
     k = label(machine_session, "d cw 1")
     one = machine_session.runs[k].run
     for at_deg in range(15, 346, 30):
@@ -84,7 +83,6 @@ def test_a_circle_that_was_run_the_wrong_way_is_found_by_the_other_direction(mac
 
 @pytest.mark.slow
 def test_a_wrong_way_is_found_by_the_model_alone(machine_session):
-    """One run by itself: the model says on which side of the axis its centre lies."""
     k = label(machine_session, "f ccw 1")
     one = machine_session.runs[k].run
     # A model that knows this centre to a tenth of its distance from the axis.
@@ -144,7 +142,6 @@ def test_scatter_is_known_whatever_one_of_thirty_does():
 
 
 def test_lengths_pass_their_limit_as_seldom_as_stated():
-    """By draws, at a probability that can be counted: the limit of two lengths of three dimensions each."""
     rng = np.random.default_rng(9)
     passed = 0
     for _ in range(4000):
@@ -156,7 +153,6 @@ def test_lengths_pass_their_limit_as_seldom_as_stated():
 
 @pytest.mark.slow
 def test_directions_are_those_of_the_circles(machine_session):
-    """The other direction of a run is the run that shares its mounting."""
     session = SessionRuns(machine_session.runs)
     for one in machine_session.runs:
         other = session._opposite(one)

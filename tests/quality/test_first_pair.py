@@ -34,7 +34,6 @@ def test_a_ball_that_was_knocked_between_the_directions_of_the_first_test_is_fou
 
 
 def test_what_happens_once_widens_no_limit(whole):
-    """A plate that was bumped between two runs is a fault that is looked for: it is not among what a sound pair may differ by."""
     once = {name for name, source in known_sources().items() if source.happens_once}
     assert once
     for one in whole.runs:
@@ -54,7 +53,6 @@ def test_no_limit_of_the_first_pair_is_beyond_what_is_stated(whole):
 
 @pytest.mark.parametrize("start_deg", [180.0, 30.0])
 def test_a_wrong_start_is_still_wrong_after_a_repeat(whole, start_deg):
-    """The run before was rejected: what is left to hold it against is the other direction, of another number."""
     first, second = run(whole, "b ccw 1"), run(whole, "b cw 1")
     again = numbered(spoilt(second, begun_elsewhere, start_deg), 2)
     found = finding_of(judged([first], again), Name.OTHER_DIRECTION)
@@ -116,7 +114,6 @@ def modelled(tmp_path_factory):
     ],
 )
 def test_a_machine_with_a_model_finds_what_one_without_finds(modelled, spoiler, size):
-    """Both directions of a test with one fault, beside all other tests; and the second direction alone."""
     found = {True: 0, False: 0}
     for one in modelled.runs[1::5]:
         wrong = spoilt(one, spoiler, size)

@@ -74,7 +74,6 @@ def test_likelihoods_are_those_of_dense_covariances(kept) -> None:
 
 
 def test_a_run_left_out_is_where_the_conditional_mean_of_dense_covariances_has_it() -> None:
-    """With another run of its test left out, too; its own overlap counts for the drift."""
     order, kept, judged = (3, 2, 6, 0, 5, 4, 1), (3, 6, 4, 0), 2
     apart_um, covariance_um2 = forms_held(order).part([HELD[k] for k in kept], HELD[judged]).beside(HELD[judged])
     runs = [FORMS[id(HELD[k][0])] for k in (judged, *kept)]

@@ -107,7 +107,6 @@ def test_readings_that_come_twice_are_found_on_a_run(whole):
 
 
 def test_a_form_that_other_tests_do_not_expect_is_found_in_both_directions(whole):
-    """Both directions have the same ellipse, so that they agree, and centre and mean are where they should be."""
     sizes = {}
     for um in (0.0, 20.0):
         runs = [spoilt(one, oval, um) if one.run.test == "d" else one for one in whole.runs]

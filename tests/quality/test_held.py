@@ -71,7 +71,6 @@ def test_a_clipped_length_is_recognised_within_two_seconds():
 
 
 def test_what_runs_before_showed_of_the_noise_is_known_to_the_next():
-    """A gauge at its stop from the first reading on: the first run has nothing to hold that against."""
     t_s, length_mm = readings(2)
     watch = HeldLength()
     for t, length in zip(t_s.tolist(), length_mm.tolist(), strict=True):
@@ -90,7 +89,6 @@ def test_a_step_that_is_not_finer_than_the_noise_says_nothing(step_um):
 
 
 def test_readings_without_noise_that_hardly_move_are_not_stuck():
-    """A machine without errors: only the last digit of the numbers changes."""
     t_s = np.arange(0.0, TURN_S, 0.02)
     assert recognised_s(t_s, np.round(150.0 + 1e-6 * np.cos(2.0 * np.pi * t_s / TURN_S), 6)) is None
     assert recognised_s(t_s, 150.0 + 1e-14 * np.random.default_rng(1).integers(0, 2, len(t_s))) is None

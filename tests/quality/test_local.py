@@ -55,7 +55,6 @@ def test_without_another_run_nothing_can_be_told(whole):
 
 
 def test_a_short_bump_is_the_runs_own(whole):
-    """A bump of two degrees is found in the run itself, whatever the other direction shows."""
     one = whole.runs[3]
     spoilt = seen(replace(one.run, recording=bumpy(one.run.recording, one.run.circle, 20.0)))
     assert finding_of(SessionRuns([]).judge(spoilt), Name.BUMP).verdict is FindingVerdict.WRONG
@@ -72,7 +71,6 @@ def test_a_short_bump_is_the_runs_own(whole):
     ids=["play in all", "play in one", "lag"],
 )
 def test_reversals_are_no_place(tmp_path, gaps_um, lags_ms):
-    """Of machines with much play or lag: what differs between directions is no bump."""
     plan = subset(table_ii_plan(3), list("bdhn"))
     mechanisms = [RandomKinematics(), Backlash(gap_um=gaps_um), ServoLag(lags_ms)]
     record(tmp_path / "s", seed=3, plan=plan, mechanisms=mechanisms, noise=NOISE)
@@ -84,7 +82,6 @@ def test_reversals_are_no_place(tmp_path, gaps_um, lags_ms):
 
 
 def test_a_drift_of_both_is_no_place():
-    """A sawtooth in either sense, as a drift leaves it, stays below the limit whatever its size; so does no bump of its size."""
     theta = np.radians(np.arange(0.0, 360.0, 0.5))
     closure = SimpleNamespace(height_um=20.0)
     noise = SimpleNamespace(known=True, sigma_um=1e-3)

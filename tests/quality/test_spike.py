@@ -51,7 +51,6 @@ def test_a_form_of_the_machine_is_no_spike():
 
 
 def test_readings_in_coarse_steps_are_no_spikes():
-    """The step is larger than the noise: most readings are the same, and the others a whole step off."""
     for seed in range(20):
         assert spike(circle(np.round(noise(seed)), 1.0), ()).verdict is FindingVerdict.GOOD
 

@@ -104,7 +104,6 @@ def test_sound_circles_lie_where_the_others_put_them(whole):
 
 
 def test_a_ball_that_stands_elsewhere_in_both_directions_is_found(whole):
-    """Programs of another zero point, a plate askew, a ball in the wrong place of the plan: both directions agree."""
     runs = both_spoilt(whole, "h", elsewhere, 300.0)
     judged = SessionRuns(runs).judge(next(one for one in runs if one.run.label == "h cw 1"))
     found = finding_of(judged, Name.BORE)
@@ -120,7 +119,6 @@ def test_a_bar_of_another_length_in_one_test_is_found(whole):
 
 
 def test_both_directions_the_wrong_way_round_are_found(whole):
-    """Programs of both directions exchanged: both are mirrored, and agree."""
     across = {one.run.label: one.coefficients_um[4] for one in whole.runs}
     assert abs(across["h ccw 1"]) > 10.0, "this machine's circle lies on the axis through its start"
     runs = both_spoilt(whole, "h", mirrored, 1.0)

@@ -39,14 +39,12 @@ bar: {serial_number: DBB-0042, calibrated_length_mm: 150.0, calibrator_uncertain
 
 
 def settings_in(folder):
-    """The shop's settings, with a tolerance for every figure."""
     path = folder / "settings.yaml"
     path.write_text("format: dbb-settings/3\ntolerances:\n" + "".join(f"  - {one}\n" for one in LIMITS), "utf-8")
     return path
 
 
 def complete(folder):
-    """Write into a session what a certificate needs, and seal it."""
     path = folder / "session.yaml"
     head, runs = path.read_text("utf-8").split("runs:\n")
     kept = [line for line in head.splitlines() if line.partition(":")[0] in {"machine", "plan"}]
@@ -84,7 +82,6 @@ def four_reports(folder):
 
 
 def read_reports(folder):
-    """Page and numbers of each report, by what it shows."""
     return {
         page.stem: (page, json.loads(page.with_suffix(".json").read_text("utf-8"))) for page in folder.glob("*.html")
     }

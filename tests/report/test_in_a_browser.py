@@ -82,7 +82,6 @@ def page(request, tmp_path_factory):
 
 
 def test_axe_finds_nothing_and_all_keys_reach_all(browser, page):
-    """One test for all views: what takes time is the page, and the browser's start."""
     axe = axe_script()
     if axe is None:
         pytest.skip("axe-core is not there: install axe-core-python, or name axe.min.js in DBBSTATION_AXE")
@@ -105,7 +104,6 @@ def test_the_page_is_no_wider_than_the_screen_and_the_console_is_silent(browser,
 
 
 def test_the_console_of_this_browser_would_not_be_silent(browser, tmp_path):
-    """What the tests above rely on: a fault of a script and what a policy refuses are heard."""
     spoilt = tmp_path / "spoilt.html"
     spoilt.write_text(
         "<meta http-equiv='Content-Security-Policy' content=\"default-src 'none'; script-src 'unsafe-inline'\">"

@@ -24,7 +24,6 @@ from tests.plant.session import record
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """Fifteen tests in two sessions."""
     folder = tmp_path_factory.mktemp("plotted")
     paths = [folder / "before", folder / "after"]
     record(paths[0], seed=4, plan=table_ii_plan(4), mechanisms=[RandomKinematics()], rate_hz=5.0)
@@ -106,7 +105,6 @@ def test_a_dollar_sign_is_no_formula(found):
 
 @pytest.mark.parametrize("kind", [PlotKind.POLAR, PlotKind.DEVIATION])
 def test_both_directions_and_repeats_stand_in_one_picture(kind, found):
-    """A hundred repeats: twenty of each direction are drawn, all but the last thin; the sheet says how many are not."""
     of = only(found, {"before"}, {"a"})
     many = tuple(replace(one, entry=replace(one.entry, repeat=k)) for k in range(1, 101) for one in of.circles)
     figure = drawn(kind, replace(of, circles=many))
@@ -120,7 +118,6 @@ def test_both_directions_and_repeats_stand_in_one_picture(kind, found):
 
 
 def test_the_traces_are_those_of_the_circles(found):
-    """The greatest deviation is drawn where it was measured."""
     of = only(found, {"before"}, {"k"})
     (axes,) = drawn(PlotKind.DEVIATION, of).axes
     for line, one in zip(axes.lines, of.circles, strict=True):
@@ -131,7 +128,6 @@ def test_the_traces_are_those_of_the_circles(found):
 
 
 def test_compared_circles_have_one_scale(found):
-    """Rings of one deviation have one radius in both panels."""
     figure = drawn(PlotKind.COMPARE, only(found, {"before", "after"}, {"a"}))
     rings = [sorted(patch.radius for patch in axes.patches) for axes in figure.axes[:2]]
     assert rings[0] == rings[1]

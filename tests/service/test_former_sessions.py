@@ -122,7 +122,6 @@ def test_an_acceptance_is_the_report_of_both_sessions(shop: Path) -> None:
 
 
 def test_the_last_circles_of_a_test_come_from_disk_with_their_lengths(shop: Path) -> None:
-    """Against the rows of the run's file: every length on the turn, less the bar's nominal length."""
     traces = last_traces(shop / "now", "a")
     assert set(traces) == {Direction.CCW, Direction.CW}
     for direction, trace in traces.items():

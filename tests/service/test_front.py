@@ -50,7 +50,6 @@ def front(tmp_path: Path) -> Front:
 
 @pytest.fixture
 def session(front: Front) -> Path:
-    """A session with runs, two folders below the working folder."""
     folder = front.under / "hexapod-7" / "monday"
     shutil.copytree(SMALL, folder)
     return folder
@@ -122,7 +121,6 @@ def test_choices_are_remembered(front: Front, session: Path, tmp_path: Path) -> 
 
 
 def test_a_virtual_machine_is_never_offered_unless_it_is_asked_for(front: Front, session: Path) -> None:
-    """Somebody tried it, and then measures: the session goes on by what it was measured by, or asks."""
     tried = front.under / "virtual"
     virtual = front.virtual_choice().line
     front.memory.write(Remembered(line=REAL).with_session(tried, virtual))
@@ -375,7 +373,6 @@ def test_what_the_command_line_says_holds_for_the_virtual_machine_too(front: Fro
 
 
 def test_a_temperature_is_never_noted_before_what_was_noted_already(tmp_path: Path) -> None:
-    """A virtual machine that runs faster than real time is ahead of it."""
     folder = tmp_path / "session"
     shutil.copytree(SMALL.parent / "sealed", folder)
     ahead = datetime.now(UTC) + timedelta(minutes=5)

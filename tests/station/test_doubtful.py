@@ -40,7 +40,6 @@ def places_on_turn(plan_file: Path, share: Sequence[float]) -> list[int]:
 
 
 def test_lost_digits_cost_their_samples_and_nothing_else(plan_file: Path, tmp_path: Path) -> None:
-    """In the dwell, in the overlap, on the turn: the run stands, its figures are those of the run without damage."""
     places = places_on_turn(plan_file, (0.01, 0.1, 0.4, 0.7))
     damaged = tmp_path / "damaged"
     statuses, (completed,) = recorded(plan_file, damaged, dict.fromkeys(places, LOST_DIGIT))
@@ -71,7 +70,6 @@ def test_too_many_are_a_reason_to_repeat(plan_file: Path, tmp_path: Path) -> Non
 
 
 def test_a_bar_that_left_its_seat_is_not_hidden(plan_file: Path, tmp_path: Path) -> None:
-    """Hundreds of readings that agree are the bar; the run is refused for its length, as before."""
     first, last = places_on_turn(plan_file, (0.4, 0.5))
     away = dict.fromkeys(range(first, last), b"+148.500\r")
     statuses, (completed,) = recorded(plan_file, tmp_path / "session", away)
@@ -106,7 +104,6 @@ def test_the_screen_counts_doubtful_samples_beside_lost_ones() -> None:
 
 
 def test_before_the_circles_a_doubtful_length_is_called_one_too() -> None:
-    """On the checklist, and while the bar is on its calibrator."""
     sample = events.Sample(1.0, 50.123, "doubtful", "2 digits before the point")
     line = SimpleNamespace(latest=sample, failure=None, rate=SimpleNamespace(per_s=None))
     checklist = SimpleNamespace(_prepared=SimpleNamespace(first=None))

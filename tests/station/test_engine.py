@@ -252,7 +252,6 @@ def test_a_disk_that_is_full_ends_the_run_with_its_cause_and_the_same_command_go
 
 
 def test_a_clock_that_was_stepped_back_does_not_turn_the_order_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The time of day follows the steady clock within a program, and never falls behind the session's last run in the next."""
     seconds = [100.0]
     now = time_of_day(lambda: seconds[0])
     first = now()

@@ -128,7 +128,6 @@ def test_a_run_that_lost_more_than_the_plan_allows_is_measured_again(one_circle:
 
 
 def test_a_plan_may_allow_more(one_circle: Path, tmp_path: Path) -> None:
-    """The run counts then, and its count is told."""
     out = tmp_path / "session"
     text = one_circle.read_text(encoding="utf-8").replace("dbb-plan/1", "dbb-plan/2")
     one_circle.write_text(text + "largest_loss_percent: 5\n", encoding="utf-8")
@@ -163,7 +162,6 @@ def test_a_port_that_is_not_there_leaves_no_session(one_circle: Path, tmp_path: 
 @pytest.mark.skipif(sys.platform == "win32", reason="processes that are stopped and continued")
 @pytest.mark.parametrize("seconds", [1.0, pytest.param(10.0, marks=pytest.mark.nightly)])
 def test_a_host_that_falls_asleep_in_mid_run(one_circle: Path, tmp_path: Path, seconds: float) -> None:
-    """The run is complete, or what was lost is told and it is measured again; nothing else happens."""
     out = tmp_path / "session"
     part = out / "runs" / "a-ccw-1.csv.part"
     with (

@@ -79,7 +79,6 @@ def stuck_behind(readings: list[Reading]) -> list[Reading]:
 
 @pytest.mark.parametrize("override", [0.8, 0.6])
 def test_a_slow_circle_that_moves_is_waited_for(plan: Plan, override: float) -> None:  # noqa: F811
-    """The length goes on moving: the control's override is turned down, the gauge is sound."""
     circle = plan.tests["a"].run(Direction.CCW)
     readings = noisy(run_readings(circle, rate_hz=RATE_HZ), 0.5, 0.1)
     slow = [replace(one, t_s=one.t_s / override) for one in readings]

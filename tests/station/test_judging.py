@@ -89,7 +89,6 @@ class Shop:
             self.workplace.close()
 
     def drain(self) -> list[Reading]:
-        """What has come; the cable is pulled behind it."""
         readings, self._readings = self._readings, []
         if not readings and self._error is not None:
             raise self._error

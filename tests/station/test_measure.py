@@ -103,7 +103,6 @@ def test_a_polled_display_is_measured_too(plan_file: Path, tmp_path: Path) -> No
 
 
 def test_a_person_answers_with_keys(plan_file: Path, tmp_path: Path) -> None:
-    """Skips, and quits: no machine is needed for that."""
     out = tmp_path / "session"
     with bench(plan_file) as place:
         done = place.measure(out, auto=False, typed="s\nwhat\nx\nq\n")
@@ -167,14 +166,12 @@ def test_only_machines_on_this_computer_are_started(url: str, plan_file: Path, t
 
 
 def test_the_shipped_plans_can_be_measured() -> None:
-    """Every plan that comes with the package passes the dry run on the reference machine."""
     for path in sorted((shipped_folder("protocols") / "plans").glob("*.yaml")):
         check_plan(read_plan(path), read_machine(MACHINE_FILE), file=str(path))
 
 
 @pytest.mark.slow
 def test_balls_under_the_spindle_from_the_plan_to_the_figures(tmp_path: Path) -> None:
-    """Two of the fifteen tests of the shipped plan: measured, checked, continued with readings noted, evaluated."""
     text = (shipped_folder("protocols") / "plans" / "conventional.yaml").read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith("  - {name: ") or line[11] in "dg"]
     plan_file, out = tmp_path / "conventional.yaml", tmp_path / "session"

@@ -72,7 +72,6 @@ def mounted(image: Path, at: Path, options: str) -> Iterator[Path]:
 
 
 def made(image: Path, kind: FileSystem) -> Path:
-    """An empty file system, or a reason to skip."""
     if shutil.which(kind.make[0]) is None:
         pytest.skip(f"{kind.make[0]} is not installed")
     with image.open("wb") as file:

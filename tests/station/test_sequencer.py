@@ -204,7 +204,6 @@ def test_readings_without_a_length_are_kept_in_the_dwells_and_not_used(plan: Pla
 
 @pytest.mark.parametrize("status", ["fault", "overrange"])
 def test_a_reading_without_a_length_on_the_turn_ends_the_run_with_a_message(plan: Plan, status: Status) -> None:
-    """What is missing there no fit brings back, and the machine need not go on to its end for it."""
     sequencer = made(plan)
     sequencer.begin()
     run = run_readings(plan.tests["a"].circle)

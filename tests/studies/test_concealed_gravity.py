@@ -13,7 +13,6 @@ from tests.once import STUDIES, computed_once
 
 @pytest.fixture(scope="module")
 def study(reference, tmp_path_factory):
-    """The one that docs/diagnosis.md shows."""
     plans = shipped_folder("protocols") / "plans"
     jig, conditions = read_plan(plans / "table2.yaml"), read_plan(plans / "gravity-conditions.yaml")
     with pytest.MonkeyPatch.context() as patch:

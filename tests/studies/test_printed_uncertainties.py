@@ -103,7 +103,6 @@ def test_every_field_with_an_uncertainty_has_a_row_or_a_reason():
 
 @pytest.mark.slow
 def test_the_study_counts_each_of_these_rows():
-    """Machines of two seeds show all figures: one is good, the other worn. Cyclic errors are seen on some worn machines only."""
     rows = {figure for seed in (1, 2, 8) for figure, _ in _drawn(CELLS[0], seed)}
     rows |= {*coverage_calibration.FIGURES, coverage_feed.FIGURE}
     assert {row for wanted in PRINTED.values() for row in wanted} - rows == set()

@@ -27,7 +27,6 @@ def test_what_was_forgotten_does_not_count():
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux says and forgets it")
 def test_what_the_library_keeps_of_freed_blocks_does_not_count():
-    """Blocks below the threshold of malloc lie on its heap, which one later block keeps from shrinking by itself."""
     blocks = [np.ones(1000) for _ in range(int(LARGE_MB * 1024**2 / 8000))]
     with_them = largest_memory_mb()
     last = np.ones(1000)

@@ -14,7 +14,6 @@ MODULES = ("os", "select", "signal", "subprocess", "time")
 
 
 def names_used(tree: ast.AST, names: frozenset[str]) -> list[tuple[int, str]]:
-    """Lines that use a name of these modules."""
     return [
         (node.lineno, f"{node.value.id}.{node.attr}")
         for node in ast.walk(tree)

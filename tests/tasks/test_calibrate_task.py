@@ -35,7 +35,6 @@ def test_paths_and_loaded_sessions_give_the_same(result):
 
 
 def test_the_covariance_is_named_and_its_diagonal_is_that_of_the_uncertainties(result):
-    """u squared is the variance along what was identified, and that of the lost directions where these are the smaller part."""
     named = {f"{row.source}.{row.parameter}": k for k, row in enumerate(result.covariance.rows)}
     assert sorted(named) == sorted(result.parameters)
     matrix = result.covariance.matrix

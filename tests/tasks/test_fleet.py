@@ -148,7 +148,6 @@ def test_an_interruption_goes_on_where_it_stopped(sessions, tmp_path):
 
 @pytest.mark.usefixtures("here")
 def test_half_a_result_is_no_result(sessions, tmp_path):
-    """A file that was cut off by a power failure of a disk that lied is worked out again."""
     fleet([sessions], "circles", tmp_path / "out")
     path = next((tmp_path / "out" / "circles").glob("m03-*.json"))
     path.write_text(path.read_text("utf-8")[:100], "utf-8")

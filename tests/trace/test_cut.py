@@ -133,7 +133,6 @@ def test_a_circle_without_any_error_has_any_feed():
 
 
 def test_a_compensated_circle_with_little_shape_is_not_refused():
-    """Half a micrometre that comes and goes with friction: both passes differ by as much as they show."""
     recording = trace()
     inside = recording.length_mm < 150.7
     wander = 0.0005 * np.sin(0.23 * recording.t_s) + np.random.default_rng(1).normal(0, 0.0003, len(recording))
@@ -217,7 +216,6 @@ def test_with_recorded_angles_a_machine_may_be_off_as_far_as_a_bar_reaches(feed_
 
 
 def test_loss_that_the_line_counted_is_named_before_the_feed():
-    """Times of a device that is asked show no loss; its counter does."""
     recording, circle = trace(feed=970, noise_mm=0.0003), CIRCLE
     with pytest.raises(TraceError) as alone:
         cut(recording, circle)
@@ -245,7 +243,6 @@ def test_a_turn_is_cut_out_once_and_another_circle_anew():
 
 
 def test_samples_that_cannot_be_used_move_neither_edges_nor_feed():
-    """A digit that was lost in the dwell looks like the feed-in, one in the overlap like another feed."""
     whole = trace(noise_mm=0.0003)
     length, usable = whole.length_mm.copy(), np.ones(len(whole), dtype=bool)
     for place in (20, 60, 900, len(whole) // 2, len(whole) - 700, len(whole) - 30):

@@ -37,7 +37,6 @@ def test_a_stream_without_a_gap_lost_nothing() -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_times_without_a_fixed_rate_show_no_loss(seed: int) -> None:
-    """A computer that asks when it has time; an adapter that hands over sixteen samples at once."""
     rng = np.random.default_rng(seed)
     assert lost_samples(np.cumsum(rng.exponential(0.07, 2000))) == 0
     batches = np.repeat(np.cumsum(rng.uniform(0.012, 0.02, 200)), 16) + np.tile(np.arange(16) * 1e-6, 200)
@@ -75,7 +74,6 @@ def test_loss_is_suspected_before_the_feed() -> None:
 
 
 def test_samples_that_cannot_be_used_are_missing_also_where_times_show_no_loss() -> None:
-    """A computer that asks when it has time leaves no whole periods."""
     whole = trace(noise_mm=0.0003)
     jitter = np.random.default_rng(3).uniform(-0.45, 0.45, len(whole)) * np.median(np.diff(whole.t_s))
     usable = np.ones(len(whole), dtype=bool)

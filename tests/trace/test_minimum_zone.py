@@ -69,7 +69,6 @@ def test_no_search_that_knows_nothing_of_bisectors_finds_less():
 
 
 def test_long_noisy_traces_against_a_linear_programme():
-    """Of a nearly round path the zone is a linear Chebyshev fit about its own centre: no point may be improved on."""
     rng = np.random.default_rng(21)
     for _ in range(5):
         radius = 150.0 + 0.02 * np.cos(2 * TURN) + 0.005 * np.sin(7 * TURN) + rng.normal(0.0, 5e-4, len(TURN))
@@ -98,7 +97,6 @@ def test_even_lobes_have_twice_their_amplitude(lobes, share):
 
 
 def test_one_bump_is_not_all_seen():
-    """A single high point moves the centre: of its height h the zone of four points shows less than least squares do."""
     radius = np.full(len(TURN), 150.0)
     radius[0] += 0.01
     found = minimum_zone(path(radius))

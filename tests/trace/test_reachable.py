@@ -25,7 +25,6 @@ def doubted(circle, t_s, length_mm, *, on_turn):
 @pytest.mark.parametrize("rate_hz", [14.0, 250.0])
 @pytest.mark.parametrize("off_mm", [(0.0, 0.0, 0.0), (0.8, -0.5, 0.3)], ids=["true", "off"])
 def test_no_path_at_the_greatest_override_is_doubted(circle, rate_hz, off_mm) -> None:
-    """Feed-in, arc and feed-out of a ball that is off its place, by the distance of two points."""
     fast = circle_path(replace(circle, feed_mm_min=OVERRIDE * circle.feed_mm_min))
     t_s = np.arange(0.0, fast.duration_s, 1.0 / rate_hz)
     tip = np.column_stack([np.interp(t_s, fast.t_s, fast.poses[:, axis]) for axis in range(3)])
@@ -36,7 +35,6 @@ def test_no_path_at_the_greatest_override_is_doubted(circle, rate_hz, off_mm) ->
 @pytest.mark.parametrize("rate_hz", [8.0, 14.0, 250.0, 4000.0])
 @pytest.mark.parametrize("seed", range(3))
 def test_no_error_within_the_feed_in_is_doubted_on_the_turn(rate_hz, seed) -> None:
-    """Random curves of one to three undulations that reach as far as a turn may, faster than programmed."""
     dice = np.random.default_rng(seed)
     phi = np.arange(0.0, 2.0 * np.pi, 1e-3)
     order = np.arange(1, UNDULATIONS + 1)

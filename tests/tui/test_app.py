@@ -485,7 +485,6 @@ def test_a_session_that_another_process_writes_into_says_so_and_can_be_left(tmp_
 
 
 def test_the_session_before_is_drawn_dim_beneath_its_own_direction_and_test(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Measured and centred views have it; a difference, another test and a direction that has not run have not."""
     happening = complete()
     former = happening.board().traces[Direction.CCW]
     before = LiveTrace(former.run, former.circle)

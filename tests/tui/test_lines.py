@@ -37,5 +37,4 @@ def test_the_overview_says_that_verdicts_can_be_taken_back_when_the_plan_is_thro
 
 
 def test_what_an_operator_cannot_press_is_a_key_of_every_screen() -> None:
-    """Help leaves these keys out: each is one that help would have named."""
     assert set(_NOT_OPERATED.values()) <= set(HELP["everywhere"].keys)

@@ -421,7 +421,6 @@ def test_compensated_programs_are_written_and_command_the_session(front: Front) 
 
 
 def test_a_session_under_programs_is_offered_no_others(front: Front) -> None:
-    """What commanded its circles so far commands the rest."""
     choice = replace(front.virtual_choice(), plan=front.under / "plan.yaml")
     plain = front.prepare(choice)
     programs = {("low", Direction.CCW): RunProgram("low-ccw.ngc", b"", "")}

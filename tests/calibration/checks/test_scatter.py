@@ -45,7 +45,6 @@ def sessions(machine, stated):
 
 @pytest.fixture(scope="module")
 def as_stated(machine):
-    """Seats of sessions whose plan states the truth, session by session."""
     return [seats_of(calibration) for calibration in sessions(machine, 1.0)]
 
 
@@ -64,7 +63,6 @@ def test_sizes_that_are_right_are_said_to_fit(as_stated):
 
 @pytest.mark.slow
 def test_sizes_that_are_a_third_of_the_truth_are_found_out(machine):
-    """Five mountings, of which the fit takes half for itself, show a factor of three mostly; ten show it always."""
     checks = [check_scatter(seats_of(calibration)) for calibration in sessions(machine, 1.0 / 3.0)]
     few, many = zip(*checks, strict=True)
     assert sum(not check.fits for check in few) > 0.6 * SESSIONS
@@ -73,7 +71,6 @@ def test_sizes_that_are_a_third_of_the_truth_are_found_out(machine):
 
 @pytest.mark.slow
 def test_the_squares_of_seats_are_chi_square(as_stated):
-    """Mean of chi-square is its degrees of freedom, its variance twice that."""
     seats = [seat for session in as_stated for seat in session]
     freedom = sum(seat.freedom for seat in seats)
     assert freedom > 0.7 * 2 * len(seats)  # a level bar sees two coordinates of every ball, and the fit takes some

@@ -158,7 +158,6 @@ def test_without_drive_friction_currents_change_nothing(small):
 
 @pytest.mark.slow
 def test_long_runs_say_as_much_as_their_means(tmp_path, fitted):
-    """Fifty times the samples: seen through nodes and quarter degrees, still right and sharper."""
     recorded = session(tmp_path / "s", 21, tests="ab", rate_hz=250.0)
     more = session(tmp_path / "t", 21, tests="cde", rate_hz=5.0)
     calibration = calibrate(recorded.machine, recorded.observations + more.observations, sources())

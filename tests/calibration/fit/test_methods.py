@@ -144,7 +144,6 @@ def test_conv_b_refuses_circles_without_micrometer_readings(machine, on_jig):
 
 
 def test_recordings_with_their_centres_removed_are_refused(machine, on_jig):
-    """What software with centre compensation writes: radius plus deviation, to a tenth of a µm."""
     compensated = []
     for observation in on_jig:
         circle = centred(observation.raw)
@@ -167,7 +166,6 @@ def test_parameters_that_do_not_hold_what_is_lost_are_refused(machine, under_spi
 
 
 def test_what_no_run_depends_on_is_prescribed_itself(machine, on_jig):
-    """A session without a pause says nothing of what pauses take back; base joints cannot hold that."""
     sources = [*default_sources(), known_sources()["thermal-frame"]]
     calibration = calibrate(machine, on_jig, sources, prescribe=())
     assert ("thermal-frame", "pause_loss_um_m") in calibration.prescribed
@@ -189,7 +187,6 @@ def test_a_tolerance_of_the_machine_file_stands_in_for_what_is_lost_and_is_said_
 
 @pytest.mark.parametrize("name", ["gravity", "backlash", "servo-lag", "joint-friction", "spindle-growth"])
 def test_predicted_is_what_the_virtual_machine_reads_whatever_its_errors(machine, name):
-    """The virtual machine drives to the place, stands still, and puts the ball at its own tip."""
     source = known_sources()[name]
     values = np.array([p.grid[len(p.grid) // 2] if p.grid else p.plausible for p in source.parameters(machine)])
     truth = MachineModel(machine, (*random_kinematics(machine, 3), Fitted(source, values)))

@@ -75,7 +75,6 @@ def test_short_runs_and_commanded_ones_have_no_nodes(long_runs):
 
 
 def test_samples_at_odd_places_and_gaps_are_no_matter(long_runs, rng):
-    """Angles with jitter, in any order, and one sector without a sample."""
     run = long_runs.observations[0]
     phi = rng.uniform(0.0, 360.0, 5000)
     phi = phi[(phi < 42.0) | (phi > 48.0)]

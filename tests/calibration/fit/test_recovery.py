@@ -81,7 +81,6 @@ def test_predicted_positions_are_the_true_ones(raised, rng):
 
 
 def test_compensated_commands_take_the_true_machine_where_it_should_go(raised):
-    """The loop closes on a machine that this package did not write."""
     truth, recorded, calibration = raised
     circle = recorded.observations[0].raw.circle
     wanted = Motion(circle.poses(np.arange(0.0, 360.0, 0.5)), is_path=True)
@@ -124,7 +123,6 @@ def test_without_noise_and_set_up_errors_the_fit_is_exact(tmp_path):
 
 
 def test_mountings_and_balls_come_back_as_their_sum(level):
-    """A ball mounted once cannot tell the mounting from the CMM; their sum is known to a micrometre or so."""
     truth, _, calibration = level
     found = dict(zip(calibration.layout.names, calibration.x, strict=True))
     for mounting, (number, shift_um) in enumerate(truth.mounting_shift_um.items()):

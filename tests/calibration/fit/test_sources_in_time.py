@@ -51,7 +51,6 @@ def test_lags_are_found_but_for_what_all_struts_share(clean):
 
 @pytest.mark.slow
 def test_a_skew_is_found_by_the_machines_own_errors(clean):
-    """Beside what the session has of its own: feed-in and feed-out are found to a sample's fraction only."""
     skew = known_sources()["time-skew"]
     _, own_ms, _ = fitted_with(clean, skew, [0.0])
     found, ms, sigma_ms = fitted_with(clean, skew, [20.0])

@@ -152,7 +152,6 @@ def test_a_bumped_run_steps(recorded, sound):
 
 
 def test_one_run_filed_under_another_test_is_recognised(recorded, sound):
-    """The readings of test g filed under test a: the fit spreads them over everything."""
     runs = list(recorded.observations)
     k, g = number(recorded, "a", "ccw"), number(recorded, "g", "ccw")
     runs[k] = filed(runs[k], runs[g])
@@ -165,7 +164,6 @@ def test_one_run_filed_under_another_test_is_recognised(recorded, sound):
 
 @pytest.mark.nightly  # one run of another test is in CI
 def test_a_test_done_in_the_wrong_bore_is_recognised(recorded, sound):
-    """Ball and programs of test g where the plan says b, in both directions."""
     runs = list(recorded.observations)
     for direction in ("ccw", "cw"):
         k = number(recorded, "b", direction)
@@ -187,7 +185,6 @@ def test_gravity_is_no_reason_to_doubt_anything(tmp_path):
 
 
 def test_runs_left_out_for_want_of_physics_are_taken_back_with_it_and_bumped_ones_are_not(tmp_path):
-    """A raised test far out on the plate shows what level ones hide: without gravity it is no circle of this machine."""
     plan = elevated(table_ii_plan(9), 8.0, ["h"])
     record(tmp_path / "s", seed=9, plan=plan, mechanisms=[Gravity(4e-5)], rate_hz=20.0)
     recorded = load_sessions([tmp_path / "s"])

@@ -34,7 +34,6 @@ def test_centres_are_counted_from_the_ball_and_from_the_first_position(reference
 
 
 def test_after_is_what_the_model_leaves(reference):
-    """All base joints shifted along X shift every circle; a model that knows it leaves nothing."""
     shift = np.tile([0.03, 0.0, 0.0], 6)
     model = MachineModel(reference, (Fitted(known_sources()["base-joints"], shift),))
     (run,) = evaluate(model, [observation("a", 30.0)]).runs
@@ -45,8 +44,6 @@ def test_after_is_what_the_model_leaves(reference):
 
 
 def test_a_base_that_is_turned_makes_the_plane_slope(reference):
-    """Base joints turned by w about X: every point of the machine turns with them, Z rises by w Y; and about Z,
-    a move along X goes sideways by w X."""
     turn = 1e-4
     for axis, flatness, parallelism in ((0, 380 * turn, 0.0), (2, 0.0, 380 * turn)):
         shift = np.cross(turn * np.eye(3)[axis], reference.hexapod.base_joints_mm).ravel()

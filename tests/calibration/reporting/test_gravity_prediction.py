@@ -134,7 +134,6 @@ def test_currents_find_the_centre_of_gravity_and_predict_as_well(tmp_path):
 
 
 def test_programs_compensated_with_the_joint_model_cut_round_on_the_machine_itself(tmp_path):
-    """Commands go to the simulation that was measured, without noise and mountings: what is left is the model's fault."""
     folder = recorded_machine(tmp_path, 3, rubs=False, rate_hz=20.0)
     model = joint(folder, GRAVITY).model.of_the_machine()
 

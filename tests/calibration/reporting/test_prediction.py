@@ -35,7 +35,6 @@ def test_few_samples_are_no_reason_to_fail():
 
 
 def test_a_machine_whose_frame_is_stretched_along_x_cuts_an_oval(reference):
-    """Base joints wider apart along X by a thousandth: what the model predicts is what it simulates, not what was read."""
     nominal = observation("a", 0.0)
     model = MachineModel(reference, (Fitted(known_sources()["base-joints"], _stretched(reference, 1e-4)),))
     (found,) = predicted_circles(model, [nominal])

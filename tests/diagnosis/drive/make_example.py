@@ -13,7 +13,6 @@ TOGETHER = 4
 
 
 def example() -> str:
-    """Text of the file."""
     columns = record(TRUTH, to_and_fro(seconds=SECONDS), seed=20261121)
     means = [column.reshape(-1, TOGETHER).mean(axis=1) for column in columns]
     rows = [f"{t - means[0][0]:.3f},{x:.5f},{f:.2f}" for t, x, f in zip(*means, strict=True)]

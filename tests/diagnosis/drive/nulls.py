@@ -58,7 +58,6 @@ def one_way(rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def drawn(kind: str, seed: int) -> tuple[Truth, DriveRecording]:
-    """A drive without anything but mass and friction, and its recording."""
     rng = np.random.default_rng([KINDS.index(kind), seed])
     truth = Truth(mass_kg=rng.uniform(30, 200), viscous=rng.uniform(100, 600), coulomb=rng.uniform(8, 40))
     if kind == "one-way":
@@ -92,7 +91,6 @@ def judged(kind: str, seed: int) -> tuple[set[str], list[bool]]:
 
 
 def study(kind: str, count: int, seed: int) -> dict[str, object]:
-    """Figures of so many drives under one kind of noise."""
     outcomes = [judged(kind, 1000 * seed + k) for k in range(count)]
     return {
         "kind": kind,

@@ -46,7 +46,6 @@ def holds(number, true):
 
 
 def seeds(count):
-    """So many of four; the others are nightly."""
     return [pytest.param(seed, marks=() if seed < count else pytest.mark.nightly) for seed in range(4)]
 
 
@@ -171,7 +170,6 @@ def test_a_zero_that_jumps_is_found_with_its_time_beside_friction():
 
 
 def test_a_law_that_no_name_has_is_told_beside_the_nearest():
-    """Friction with the root of the speed, which Coulomb and viscous friction imitate to nine tenths."""
     summary = answered(Truth(sliding=lambda _t, _x, v, _d: 60.0 * abs(v) ** 0.5))
     assert summary["unexplained"]["significant"]
     assert summary["unexplained"]["variable"] == "speed"

@@ -14,8 +14,6 @@ from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 @pytest.mark.parametrize(("count", "at_turns", "share"), [(2, 0, 0.25), (8, 4, 0.047), (50, 12, 0.24), (6, 6, 0.05)])
 def test_the_probability_is_that_of_two_binomials(count, at_turns, share):
-    """Places anywhere, against a share at turns that is anything above theirs and has one chance in twenty, integrated by parts."""
-
     def likelihood(q):
         return q**at_turns * (1.0 - q) ** (count - at_turns)
 

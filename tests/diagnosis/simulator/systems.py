@@ -96,7 +96,6 @@ def model_of(system, seed, *, clean=False):
 
 
 def asked(system, seed, *, clean=False, hold_out=True):
-    """What is said of a system."""
     model, simulator, known = model_of(system, seed, clean=clean), system.make(SUBSTEPS), {}
 
     def run(asks):
@@ -120,7 +119,6 @@ def verdict_of(system, answer):
 
 
 def _mass(noise, truth, right, values=None):
-    """A mass on a spring and a damper, pushed."""
     ports = (SimulatorPort("force", "N", {"place": "m", "speed": "m/s"}),)
 
     def rate(t, x, u, p, ports):

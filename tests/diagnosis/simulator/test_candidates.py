@@ -15,7 +15,6 @@ def test_a_hinge_is_sought_where_its_signal_was():
 
 
 def test_places_on_a_signal_whose_values_repeat_are_each_once():
-    """A heater at two levels, and a few rows between them: between equal places nothing can be interpolated."""
     port = SimulatorPort("body", "W", {"heat": "W"})
     heat = np.array([0.0] * 40 + [5.0] * 3 + [10.0] * 57)
     signals = {"body": {"t": np.arange(100.0), "heat": heat}}

@@ -21,7 +21,6 @@ NONE = (0.0,) * 6
 
 
 def model_of(mechanisms, seed=1):
-    """Two circles in both directions."""
     rng, session = np.random.default_rng(seed), LinearSession(scene_of(subset(table_ii_plan(3), ["a", "h"])), 180)
     readings, runs = session.signature(mechanisms), []
     for course in session.courses:

@@ -79,7 +79,6 @@ def test_kinds_of_rows_have_the_root_mean_square_of_their_own():
 
 
 def test_a_larger_input_tells_a_cubic_from_a_line_and_is_proposed(rng):
-    """At small levels a cubic beside a line is hardly seen: by the third power, twice the input shows eight times as much."""
     runs = work(rng, inputs=held(rng, 200, 10, 0.2))
     cubic = Term("flow", TermForm.CUBIC, ("level",), (-0.4,))
     drag = Term("flow", TermForm.DRAG, ("level",), (-0.1,))

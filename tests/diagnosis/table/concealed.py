@@ -82,7 +82,6 @@ def _sines(rng: Rng, cycles: tuple[float, float], count: int) -> Array:
 
 
 def _switched(rng: Rng, levels: Sequence[float], changes: int) -> Array:
-    """Levels that change at random rows."""
     at = np.sort(rng.choice(np.arange(5, ROWS - 5), changes, replace=False))
     chosen = rng.choice(len(levels), changes + 1)
     return np.asarray(levels, dtype=np.float64)[chosen[np.searchsorted(at, np.arange(ROWS), side="right")]]
@@ -111,7 +110,6 @@ def _load_cell(rng: Rng) -> Case:
 
 
 def _payload(rng: Rng) -> Case:
-    """An arm of two links that sags under what it carries."""
     q1, q2 = (np.radians(70.0 * _sines(rng, (2.0, 7.0), 2)) for _ in range(2))
     payload = _switched(rng, (0.0, 40.0, 80.0), 14)
     return Case(
@@ -125,7 +123,6 @@ def _payload(rng: Rng) -> Case:
 
 
 def _screw(rng: Rng) -> Case:
-    """A slide with lost motion."""
     place = 120.0 * _sines(rng, (3.0, 9.0), 2)
     oil = 22.0 + 6.0 * (1.0 - np.exp(-np.linspace(0.0, rng.uniform(1.0, 4.0), ROWS)))
     return Case(
@@ -204,7 +201,6 @@ def _creep(rng: Rng) -> Case:
 
 
 def _dead_time(rng: Rng) -> Case:
-    """A flow meter that is read some rows late."""
     row, rows_late = float(rng.choice([0.05, 0.5])), int(rng.integers(4, 12))
     valve = _switched(rng, (10.0, 30.0, 45.0, 80.0), 25)
     pressure = 3.0 + 0.3 * _sines(rng, (2.0, 6.0), 2)
@@ -349,7 +345,6 @@ TOLD = (Verdict.IDENTIFIED, Verdict.HAPPENED, Verdict.DOES_NOT_PREDICT, Verdict.
 
 
 def _summed(said: dict[Verdict, list[str]], right: tuple[str, ...], wrong: list[str]) -> str:
-    """One word for an answer."""
     if wrong:
         return "wrong"
     for verdict, word in ((Verdict.IDENTIFIED, "right"), (Verdict.AMBIGUOUS, "ambiguous")):
@@ -370,7 +365,6 @@ def _off(findings: Sequence[CauseFinding], case: Case) -> str:
 
 
 def main() -> None:
-    """Run what the file has not, and count the answers."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--seeds", default="1,2")
     options.add_argument("--sizes", default="0,2,5")

@@ -131,7 +131,6 @@ def injected(kind: str, seed: int) -> tuple[Table, str, float] | None:
 
 
 def answer(kind: str, seed: int, what: str) -> dict[str, object]:
-    """What the three levels say of one table."""
     truth, size = EFFECTS[kind][2], 0.0
     if what == "injected":
         made = injected(kind, seed)

@@ -11,7 +11,6 @@ SECONDS, SEED = 60.0, 7
 
 
 def example() -> str:
-    """Text of the file."""
     head = [
         "# A simulated axis of 200 mm, to and fro at 20 Hz while its oil warms up. Beside the simulation it has 8 um of play,",
         "# and its screw, held at -100 mm, grows by 12 um per metre and kelvin beyond 22 degC.",

@@ -53,7 +53,6 @@ class Moving:
 
     @property
     def speed(self) -> NDArray[np.float64]:
-        """Of the place, over its root mean square."""
         speed = np.gradient(self.place, self.t)
         return np.asarray(speed / np.sqrt(np.mean(speed**2)))
 
@@ -116,7 +115,6 @@ def _jitter(rng: np.random.Generator, axis: Moving) -> NDArray[np.float64]:
 
 
 def _filtered(rng: np.random.Generator, axis: Moving, b: object, a: object) -> NDArray[np.float64]:
-    """Filtered white noise, begun early enough that its start is forgotten."""
     return np.asarray(lfilter(b, a, rng.standard_normal(len(axis.t) + 400))[400:])
 
 
@@ -182,7 +180,6 @@ def null_table(kind: str, seed: int, effect: str = "", size: float = 0.0) -> Tab
 
 
 def table_of(axis: Moving, measured: NDArray[np.float64], simulated: NDArray[np.float64]) -> Table:
-    """Table of a moving axis, as a person would write it."""
     clock = Variable("t_s", "s", Kind.TIME, axis.t)
     variables = (
         clock,
@@ -217,7 +214,6 @@ def named_in(
 
 
 def identified_in(kind: str, seed: int, effect: str = "", size: float = 0.0, *, hold_out: bool = True) -> list[str]:
-    """Names that are called identified."""
     named = named_in(kind, seed, effect, size, hold_out=hold_out)
     return [name for name, one in named.items() if one.verdict is Verdict.IDENTIFIED]
 
@@ -244,12 +240,10 @@ COLUMNS = ("kind", "seed", "effect", "size", *map(str, TOLD), "gained", "seconds
 
 
 def is_right(name: str, effect: str) -> bool:
-    """Whether a name is one of an effect."""
     return bool(effect) and any(own in name for own in EFFECTS[effect][1])
 
 
 def main() -> None:
-    """Run what the file has not, and print the table."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--count", type=int, default=60)
     options.add_argument("--seed", type=int, default=1)

@@ -62,7 +62,6 @@ Rng = np.random.Generator
 
 
 def _robot(rng: Rng, rows: int, at: NDArray[np.float64]) -> Recorded:
-    """Three joints along splines through points chosen at random."""
     knots = np.linspace(0.0, 1.0, int(rng.integers(6, 16)))
     joints = {f"q{k}_deg": CubicSpline(knots, rng.uniform(-120.0, 120.0, len(knots)))(at) for k in (1, 2, 3)}
     q1, q2, q3 = (np.radians(one) for one in joints.values())
@@ -75,7 +74,6 @@ def _robot(rng: Rng, rows: int, at: NDArray[np.float64]) -> Recorded:
 
 
 def _tank(rng: Rng, rows: int, at: NDArray[np.float64]) -> Recorded:
-    """A heater in steps, a room that warms, a first-order body."""
     duty = rng.uniform(0.0, 100.0, 12)[np.minimum((at * 12).astype(int), 11)]
     room = 20.0 + 3.0 * np.sin(2.0 * np.pi * rng.uniform(0.5, 2.0) * at + 1.0)
     body, fade = np.empty(rows), 0.0
@@ -107,7 +105,6 @@ def _spindle(rng: Rng, rows: int, at: NDArray[np.float64]) -> Recorded:
 
 
 def _poses(rng: Rng, rows: int, at: NDArray[np.float64]) -> Recorded:
-    """Poses chosen at random, visited over hours, while a hall warms."""
     x, y, z = (rng.uniform(-500.0, 500.0, rows) for _ in range(3))
     columns = {"x_mm": x, "y_mm": y, "z_mm": z, "hall_c": 20.0 + 2.0 * at + 0.1 * rng.standard_normal(rows)}
     distance = np.sqrt((x - 900.0) ** 2 + y**2 + z**2)
@@ -130,7 +127,6 @@ def _butter(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
 
 
 def _smoothed(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """Averaged exponentially, twice."""
     noise, fade = rng.standard_normal(len(seen.time) + 500), float(rng.uniform(0.05, 0.4))
     for _ in range(2):
         last = 0.0
@@ -149,7 +145,6 @@ def _pink(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
 
 
 def _coarse(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """White, read in steps as large as it."""
     step = float(rng.uniform(0.8, 2.5))
     return np.round(rng.standard_normal(len(seen.time)) / step) * step + 0.05 * rng.standard_normal(len(seen.time))
 
@@ -160,13 +155,11 @@ def _by_load(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
 
 
 def _calming(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """It fades, as where something settles, with correlated neighbours."""
     noise = np.convolve(rng.standard_normal(len(seen.time) + 4), [1.0, 0.8, 0.5, 0.2], "valid")[: len(seen.time)]
     return noise * (0.3 + np.exp(-np.linspace(0.0, rng.uniform(1.0, 5.0), len(noise))))
 
 
 def _bursts(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """Now and then six times as loud for a while."""
     loud = np.ones(len(seen.time))
     for start in rng.integers(0, len(loud), 4):
         loud[start : start + int(rng.integers(5, 40))] = 6.0
@@ -174,14 +167,12 @@ def _bursts(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
 
 
 def _outliers(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """One row in sixty is wrong by twenty times the noise."""
     noise = rng.standard_normal(len(seen.time))
     wrong = rng.random(len(noise)) < 1.0 / 60.0
     return np.where(wrong, rng.normal(0.0, 20.0, len(noise)), noise)
 
 
 def _irregular(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """A process that forgets with time, at times that lie unevenly."""
     steps = np.diff(seen.time, prepend=seen.time[0])
     longest = float(rng.uniform(2.0, 40.0)) * float(np.median(steps[1:]))
     noise, last = np.empty(len(steps)), rng.standard_normal()
@@ -202,19 +193,16 @@ def _held(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
 
 
 def _hum(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """A line of which the phase wanders, in white noise."""
     phase = np.cumsum(2.0 * np.pi * rng.uniform(0.02, 0.45) + 0.15 * rng.standard_normal(len(seen.time)))
     return np.sin(phase + rng.uniform(0.0, 6.0)) + 0.5 * rng.standard_normal(len(phase))
 
 
 def _skewed(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """One-sided: exponential, some of it from the row before."""
     noise = rng.exponential(1.0, len(seen.time) + 1)
     return noise[1:] + 0.5 * noise[:-1]
 
 
 def _two_resonances(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """Two modes of a structure, lightly damped."""
     sos = []
     for _ in range(2):
         radius, turn = float(rng.uniform(0.9, 0.985)), float(rng.uniform(0.1, 2.8))
@@ -224,24 +212,20 @@ def _two_resonances(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
 
 
 def _wandering(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """An integrated walk's slow bends, leaking, below white noise."""
     slow = sosfilt([[1.0, 0.0, 0.0, 1.0, -1.97, 0.9704]], rng.standard_normal(len(seen.time) + 900))[900:]
     return slow / np.std(slow) + float(rng.uniform(0.1, 0.6)) * rng.standard_normal(len(slow))
 
 
 def _median(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """Noise with long tails, after a running median."""
     return medfilt(rng.standard_t(2.5, len(seen.time)), int(rng.choice([3, 5, 9])))
 
 
 def _differenced(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """High-passed, as of an amplifier that is coupled through a capacitor."""
     noise = rng.standard_normal(len(seen.time) + 1)
     return noise[1:] - float(rng.uniform(0.6, 1.0)) * noise[:-1]
 
 
 def _tails_that_last(rng: Rng, seen: Recorded) -> NDArray[np.float64]:
-    """Neighbours resemble each other, and what is new has long tails."""
     keep = float(rng.uniform(0.5, 0.95))
     return np.asarray(sosfilt([[1.0, 0.0, 0.0, 1.0, -keep, 0.0]], rng.standard_t(3.0, len(seen.time) + 300))[300:])
 

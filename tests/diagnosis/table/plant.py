@@ -54,7 +54,6 @@ class Recording:
     columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def csv(self) -> str:
-        """Text of the file."""
         names = ",".join(self.columns)
         rows = zip(*self.columns.values(), strict=True)
         return "\n".join([names, *(",".join(f"{value:.7g}" for value in row) for row in rows)]) + "\n"

@@ -175,7 +175,6 @@ def test_rows_that_are_held_back_decide_nothing(tmp_path):
 
 @pytest.mark.parametrize("name", ["twice", "product", "play"])
 def test_what_a_first_list_shows_to_be_hopeless_is_never_taken_in(tmp_path, monkeypatch, name):
-    """The same table with every peak of every list made finer."""
     path = record(FOUND[name][0]).write(tmp_path / "x.csv")
     channel = load_tables([path], ASKED).table.channel(())
     bank = Bank(channel)
@@ -231,7 +230,6 @@ def predicted_rms(found: Mismatch, columns: list) -> float:
 
 
 def test_effects_that_cancel_each_other_are_said():
-    """Two derivatives that are nearly one, of parameters that move against each other."""
     t = np.linspace(0.0, 1.0, 300)
     one, other = np.sin(9.0 * t), np.sin(9.0 * t) + 0.1 * np.cos(31.0 * t)
     difference = 10.0 * one - 9.9 * other + 0.001 * np.random.default_rng(5).standard_normal(300)
@@ -256,7 +254,6 @@ def test_effects_that_cancel_each_other_are_said():
 
 
 def test_uncertainties_are_not_less_than_those_of_parts_that_differ():
-    """A slope that differs from part to part by far more than its noise says: its spread is in its uncertainty."""
     rng = np.random.default_rng(8)
     rows = np.arange(600)
     warm = np.tile(np.linspace(-1.0, 1.0, 60), 10)

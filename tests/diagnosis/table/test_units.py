@@ -42,7 +42,6 @@ def test_a_driven_variable_is_stated_with_its_unit_or_without():
 
 @pytest.mark.parametrize("driven", ["cause", "torque"])
 def test_of_two_that_say_the_same_the_driven_one_comes_second(driven):
-    """Whatever their order: the two columns are alike to a thousandth of their size."""
     rng = np.random.default_rng(3)
     rows = 300
     values = np.sin(np.arange(rows) / 11.0)

@@ -121,7 +121,6 @@ def test_every_source_survives_in_a_model(tmp_path: Path, source) -> None:
 
 
 def test_a_parameter_that_a_source_had_not_yet_is_zero(tmp_path: Path, reference) -> None:
-    """A model with a warm-up, as it was written before pauses counted."""
     source = known_sources()["thermal-struts"]
     rows = tuple((source.name, "", name) for name in ("growth_um_m", "time_constant_s", "pause_loss_um_m"))
     path = tmp_path / "model.yaml"
@@ -191,7 +190,6 @@ def test_tampering_is_refused(tmp_path: Path, reference, old: str, new: str, sai
 
 
 def test_a_file_that_was_cut_short_is_refused(tmp_path: Path, reference) -> None:
-    """After whatever line it ends: what the fit could not see must not be lost without a word."""
     path = tmp_path / "model.yaml"
     write_model(path, drawn(reference, 3))
     lines = path.read_text().splitlines(keepends=True)

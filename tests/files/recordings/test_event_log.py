@@ -186,7 +186,6 @@ def test_a_copy_is_put_right_from_what_was_sealed(folder: Path) -> None:
 
 
 def test_a_former_session_file_comes_forward_by_itself(folder: Path) -> None:
-    """A writer that died between log and session file, or a copy from a backup: the log has what is missing."""
     former = (folder / "session.yaml").read_bytes()
     with SessionWriter.open(folder) as writer:
         writer.judge(writer.runs[0], accepted=False, reason="chip")
@@ -320,7 +319,6 @@ def test_the_log_is_listed_with_reasons_and_anchor(folder: Path) -> None:
 
 
 def test_a_link_in_the_place_of_the_copies_is_not_followed(folder: Path, tmp_path: Path) -> None:
-    """It may lead to a whole disk: nothing there is read or written."""
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     (elsewhere / "letter.txt").write_text("dear", encoding="utf-8")

@@ -46,7 +46,6 @@ class BehindError(RuntimeError):
 
 
 def missing() -> str:
-    """Why the planner cannot run here; empty where it can."""
     lacking = [name for name in NEEDED if shutil.which(name) is None]
     if lacking:
         return f"LinuxCNC is not installed: no {', '.join(lacking)}"

@@ -38,7 +38,6 @@ def test_both_directions_show_one_figure(reference):
 
 
 def test_columns_are_sectoral_harmonics_of_the_sphere(reference, rng):
-    """So that the figure has neither seam nor pole for a raised bar."""
     motion = random_run(rng)
     away = motion.poses[:, :3] - motion.setup.fixed_ball_mm
     polar = np.arccos(away[:, 2] / np.linalg.norm(away, axis=1))
@@ -60,7 +59,6 @@ def test_runs_with_one_bar_share_it(reference, rng):
 
 
 def test_joints_can_take_the_oval_but_not_the_lobes(reference):
-    """Joint errors bend circles into ovals (scale, squareness); figures of three and more lobes are not theirs."""
     share = concealed_share(reference, jig_runs(4.0), lambda m: FORM.derivative(m, reference, np.zeros(8)))
     assert (share[:2] > 0.3).all()
     assert (share[2:] < 0.1).all()

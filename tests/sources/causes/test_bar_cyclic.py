@@ -53,7 +53,6 @@ def test_runs_of_the_same_bar_share_the_phase(reference):
 
 
 def test_a_model_puts_the_encoder_where_all_other_sources_put_it(reference, rng):
-    """Nobody measured: the wave follows the predicted distance, lead-in and all."""
     joints = Fitted(BaseJoints(), rng.normal(0, 0.05, 18))
     sizes = np.array([0.2, 0.1, 20.0])
     motion = run((100, 0, -1008), (0, -15))
@@ -75,7 +74,6 @@ def test_recordings_bring_the_readings():
 
 
 def test_readings_that_sweep_many_periods_tell_sine_cosine_and_period(reference, rng):
-    """Least squares on the effect and its derivative, from a period that is a little wrong, under noise."""
     x = 150 + 0.04 * np.sin(np.linspace(0, 2 * np.pi, 720, endpoint=False))
     truth = np.array([0.15, -0.08, 20.3])
     measured = wave_um(x, reference, *truth) + rng.normal(0, 0.1, len(x))
@@ -90,7 +88,6 @@ def test_readings_that_sweep_many_periods_tell_sine_cosine_and_period(reference,
 
 
 def test_readings_that_sweep_a_fifth_of_a_period_tell_nothing_beside_shift_and_length(reference):
-    """Sine and cosine beside a free constant, shift of the ball and the squared shift's second harmonic."""
     theta = np.linspace(0, 2 * np.pi, 720, endpoint=False)
 
     def left(sweep_um):

@@ -38,7 +38,6 @@ def all_struts(reference, lengths_mm, time_s, load_n=None) -> Motion:
 
 @pytest.mark.parametrize("load_n", [900.0, -400.0])
 def test_constant_load_both_ways_gives_load_and_friction_by_hand(reference, load_n):
-    """I+ paid out, I- drawn in: half their sum is k (F - a), half their difference k (F_c + e |F| + b v)."""
     speed, time = 4.0, np.arange(0.0, 20.0, 0.5)
     travel = speed * np.where(time < 10.0, time, 20.0 - time)
     motion = all_struts(reference, travel, time, np.full((len(time), 6), load_n))
@@ -52,7 +51,6 @@ def test_constant_load_both_ways_gives_load_and_friction_by_hand(reference, load
 
 
 def test_a_pulled_strut_needs_a_positive_current(reference):
-    """At home the platform hangs: a sixth of its weight each, along the strut."""
     motion = all_struts(reference, [0.0, 1.0], [0.0, 1.0])
     gains = np.tile([GAIN_A_KN, 0.0, 0.0, 0.0, 0.0], 6)
     struts = inverse(reference.hexapod, Frames.from_poses(motion.poses, reference.hexapod.rotation))

@@ -53,7 +53,6 @@ def test_a_ball_off_the_tip_reads_exactly_as_platform_joints_all_shifted_the_oth
 
 
 def test_turned_by_half_a_turn_the_offset_across_the_axis_changes_its_sign(reference):
-    """What the text tells people to try: the platform is turned here, where they turn the spindle."""
     upright = Motion(np.array([[0.0, 0.0, -1008.0, 0.0, 0.0, 0.0]]))
     offset = np.array([0.3, -0.2, 0.5])
     there = MachineModel(reference, (Fitted(BALL, offset),)).actual_poses(upright)[0, :3]
@@ -83,7 +82,6 @@ def test_ten_um_per_m_are_one_um_over_a_hundred_mm(reference):
 
 
 def test_the_ripple_comes_again_after_a_turn_of_the_screw(machine, rng):
-    """Poses whose struts are all longer by the lead, by half of it and by a quarter."""
     motion = random_run(rng, 30)
     frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
     sizes = rng.normal(0, 2, 12)
@@ -136,7 +134,6 @@ def test_upright_circles_alone_show_nothing_of_platform_joints(reference):
 
 
 def test_a_ball_too_low_raises_every_upright_circle(reference):
-    """The tip hangs by the offset below where it was sent; a bar level with its ball does not see that."""
     motion = run((0, 0, -1008), (0, 0))
     model = MachineModel(reference, (Fitted(BALL, np.array([0.0, 0.0, -0.1]), "session"),))
     expected = np.hypot(150.0, 0.1)

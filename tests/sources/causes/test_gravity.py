@@ -125,7 +125,6 @@ def test_a_hanging_platform_pulls_its_struts_longer(reference):
 
 @pytest.mark.parametrize("rotation", Rotation)
 def test_the_sag_has_the_least_energy_of_springs_and_weight(reference, rotation, rng):
-    """Six springs and a weight, without any equilibrium written down: stiff, so that the sag stays first order."""
     machine = random_machine(reference, rotation, rng)
     poses = np.array([[40.0, -60.0, -1050.0, 9.0, -7.0, 2.0]])
     frames = Frames.from_poses(poses, rotation)

@@ -69,7 +69,6 @@ def test_plans_say_on_which_plate_a_ball_stands():
 
 
 def test_the_bar_reads_less_by_what_the_ball_comes_nearer(reference):
-    """At the outermost point of the circle about a corner ball, which the plate moves outwards."""
     motion = run((100, 0, -1150), (0, 0))
     warm = MachineModel(reference, (Fitted(WARM, np.array([5.0]), "session"),)).bar(motion).length_mm
     assert 1e3 * (warm[0] - 150.0) == pytest.approx(-5 * 1.15, abs=1e-3)
@@ -78,7 +77,6 @@ def test_the_bar_reads_less_by_what_the_ball_comes_nearer(reference):
 
 @pytest.mark.parametrize("depth", [0.0, 60.0])
 def test_balls_stand_on_the_normals_of_the_bent_plate(reference, rng, depth):
-    """The bent middle surface itself, its normal by differences, the ball at its height along it."""
     bow, saddle, twist = sizes = rng.normal(0, 4, 3)
 
     def height(x, y):

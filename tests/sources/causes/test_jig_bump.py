@@ -29,7 +29,6 @@ def test_balls_of_runs_after_it_are_shifted(reference, start_s, moved):
 
 @pytest.mark.parametrize("off", [-1e-12, 1e-12])
 def test_a_number_of_runs_that_a_fit_has_rounded_is_that_number(reference, off):
-    """The first run behind the bump would otherwise jump to and fro between two steps of a fit."""
     found = BUMP.effect(run_at(200.0), reference, np.array([*SHIFT_UM, 1.0 + off])).fixed_ball_mm
     assert found == pytest.approx(1e-3 * np.array(SHIFT_UM))
     assert not BUMP.effect(run_at(0.0), reference, np.array([*SHIFT_UM, 1.0 + off])).fixed_ball_mm.any()

@@ -48,7 +48,6 @@ def two_angles(axis, unit):
 
 
 def test_the_drag_does_the_work_of_friction_about_two_axes(reference, rng):
-    """Whatever way a joint goes, friction takes its moment times the angles that it turns by."""
     motion = random_run(rng, 4000)
     frames = Frames.from_poses(motion.poses, reference.hexapod.rotation)
     struts, ends = struts_of(reference, motion), platform_joints(reference, frames)
@@ -69,7 +68,6 @@ def test_the_drag_does_the_work_of_friction_about_two_axes(reference, rng):
 
 
 def test_tensions_do_the_work_of_the_drag(reference, rng):
-    """By virtual work: a strut's tension is what the drag does where that strut alone grows."""
     machine = replace(
         random_machine(reference, reference.hexapod.rotation, rng), compliance=Compliance(1e-6, growing_share=0.0)
     )
@@ -162,10 +160,6 @@ def test_single_poses_are_refused(reference, rng):
 
 
 def test_what_is_left_open_holds_the_joints_of_the_independent_plant(reference):
-    """There a moment comes across a strut as M / L however far it leans over, and the wind-up takes another angle.
-
-    Where a strut leans far both laws differ by more than half, which passed for a bumped jig.
-    """
     session = LinearSession(scene_of(table_ii_plan()))
     for strut in range(6):
         shares = np.eye(6)[strut]

@@ -58,10 +58,6 @@ def offsets(axes_base, axes_platform, machine, offset_um):
 
 @pytest.mark.parametrize("offset_um", [(25.0, 0.0), (0.0, -18.0), (12.0, 30.0)])
 def test_axes_that_do_not_meet_in_a_chain_of_bodies(machine, rng, offset_um):
-    """Length of the part between the second axes, which is what a drive sets, with both offsets built into the chain.
-
-    The second axis of a joint stands e from the first, across it, in the plane of the first axis and the strut.
-    """
     axes_base, axes_platform = across_the_strut(machine, rng)
 
     def between_second_axes(frames):

@@ -98,7 +98,6 @@ def test_rows_at_one_time_and_single_rows_are_no_movement(reference, rng):
 
 @pytest.mark.parametrize("source", [LAG, SKEW], ids=["lag", "skew"])
 def test_unequal_lags_turn_their_sign_with_the_direction(reference, source):
-    """Half the sum of both directions says nothing of it, half their difference everything."""
     there, back = (run((100, -100, -1150), (10, 10), clockwise=c, step_deg=1.0) for c in (False, True))
     off = Fitted(StrutReferenceLength(), np.array([0.2, -0.1, 0.3, 0.1, -0.2, 0.0]))  # for a skew to show on
     nominal = MachineModel(reference, (off,))
@@ -129,7 +128,6 @@ def test_a_common_lag_shrinks_the_circle_and_does_nothing_else_to_it(reference, 
 
 
 def test_a_common_lag_is_a_time_skew(reference, rng):
-    """Of the opposite sign, on a machine whose errors show it, to first order in the time."""
     off = (Fitted(StrutReferenceLength(), rng.normal(0, 0.2, 6)), Fitted(BaseJoints(), rng.normal(0, 0.2, 18)))
     motion = run((-100, 100, -870), (-10, -10), step_deg=0.5)
     nominal = MachineModel(reference, off).bar(motion).length_mm
@@ -169,7 +167,6 @@ def test_no_kinematic_parameter_can_take_a_lag(reference):
 
 
 def test_lags_are_compensated(reference):
-    """A machine that is told where to go ahead of time goes where it should, lags of both signs included."""
     model = MachineModel(reference, (Fitted(LAG, np.array([8.0, -3.0, 5.0, 2.0, 12.0, 6.0])),))
     wanted = replace(run((100, 100, -1150), (-10, 10), step_deg=0.5), kept=slice(None))
     commanded = compensated(model, wanted)

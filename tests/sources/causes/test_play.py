@@ -68,7 +68,6 @@ def test_two_stops_a_load_and_friction(friction):
 
 
 def test_struts_under_load_do_not_notice_their_reversals(reference):
-    """Upright in the middle all struts are pulled all the way round: the play is closed, reversal or not."""
     for test in "afk":
         motion = jig_run(test)
         assert not changes_sign(reference, motion).any()
@@ -93,7 +92,6 @@ def test_steps_sit_where_the_force_changes_sign_whatever_the_direction(reference
 
 
 def test_with_friction_the_drive_takes_a_strut_across_before_its_force_turns(reference):
-    """Struts are pushed where they are long: they grow on the way there, and are left behind once friction holds."""
     seen = 0
     for test in "bchilm":
         motion = jig_run(test, step_deg=0.5)
@@ -133,7 +131,6 @@ def test_without_friction_it_has_no_history(reference, rng):
 
 
 def test_the_force_is_what_the_drive_holds(reference, rng):
-    """By virtual work: what the potential energy of platform and struts gains where a motor shortens its strut."""
     machine = random_machine(reference, reference.hexapod.rotation, rng)
     motion = random_run(rng, 60)
     frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)

@@ -174,7 +174,6 @@ def test_where_rows_repeat_at_the_turn_or_the_path_comes_straight_back_the_outer
 
 
 def test_the_way_does_not_jump_where_two_rows_are_equally_far_out():
-    """A compensation moves both; were the way to jump there, it would go to and fro for ever."""
     travel, _ = turning_columns(np.arange(-160, 161) * 0.02 + np.pi + 0.01)
     travel[161:, 0] = -40.0 + (travel[161:, 0] + 40.0) / 1.5  # as one that undoes a spike of negative height
     first, second = 159, 160
@@ -201,7 +200,6 @@ def test_both_ends_of_the_travel_have_opposite_spikes_and_each_strut_its_own(ref
 
 
 def test_both_directions_have_it_on_either_side_with_one_sign(reference):
-    """At the end of its travel a strut that sticks is too long, whichever way the circle goes."""
     there, back = (run(PLACE, TILT, clockwise=c, step_deg=0.5, lead_in_deg=180) for c in (False, True))
     ccw, cw = (spike_um(reference, m, 3.0)[m.kept] for m in (there, back))
     cw = np.roll(cw[::-1], 1, axis=0)

@@ -37,7 +37,6 @@ def motion(test, direction, shift_deg=0.0):
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_it_is_the_circle_begun_elsewhere(case, which):
-    """The machine's reading at angles that are larger by d, to the curvature of what the machine does wrong."""
     truth, test = case
     direction = test.directions[which]
     late = Fitted(SOURCE, np.array([0.3]), "h")
@@ -68,7 +67,6 @@ def test_derivative(case):
 
 
 def test_the_stated_size_is_that_of_edges_between_samples(rng):
-    """Edges steeper than the sampling: the middle of two that are each found halfway between two samples."""
     circle = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml").tests["a"].circle
     spacing = 0.2
     errors = []

@@ -154,7 +154,6 @@ def test_a_grown_plate_is_one_of_another_size(reference, rng):
 
 
 def test_machine_and_struts_grown_alike_are_the_same_machine_in_larger(reference, rng):
-    """Base, struts and platform all larger by e put the tip e further from the base, tilted as before."""
     motion = replace(random_run(rng, 40), time_s=np.full(40, FOR_EVER_S))
     e = 30e-6
     platform = e * reference.hexapod.platform_joints_mm

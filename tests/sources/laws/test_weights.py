@@ -126,7 +126,6 @@ def test_springs_under_the_joints_carry_all_that_hangs_there(machine, rng, with_
 
 
 def test_weight_of_rods_and_yielding_frame_look_like_gravity(reference):
-    """What kinematic parameters leave of each, compared with what they leave of gravity, over the jig circles."""
     runs = jig_runs(step_deg=5.0)
 
     def left(source):

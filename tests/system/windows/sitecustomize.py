@@ -42,7 +42,6 @@ _HELD, _DENIED, _EXISTS, _FORBIDDEN_NAME = 32, 5, 183, 123
 
 @cache
 def declared(module: str, platform: str) -> frozenset[str]:
-    """Names that typeshed declares for a module on a platform."""
     spec = importlib.util.find_spec("mypy")
     stubs = Path(spec.origin).parent / "typeshed" / "stdlib"
     path = next(one for one in (stubs / f"{module}.pyi", stubs / module / "__init__.pyi") if one.exists())
@@ -88,7 +87,6 @@ class Seen(ModuleType):
         setattr(self._real, name, value)
 
     def __delattr__(self, name: str) -> None:
-        """Put back what a test had replaced."""
         setattr(self._real, name, self._before.pop(name))
 
 
@@ -113,7 +111,6 @@ def _open_in_binary(path, flags, *more, **named):
 
 
 def take_names_away() -> None:
-    """Let the program see what Windows has."""
     more = {"os": {"O_BINARY": BINARY, "open": _open_in_binary}}
     seen = {name: Seen(importlib.import_module(name), more.get(name, {})) for name in PARTLY}
     seen["msvcrt"] = _Msvcrt("msvcrt")
@@ -149,7 +146,6 @@ class Files:
         self._open = io.open
 
     def install(self) -> None:
-        """Put them in the place of the system's."""
         os.rename, os.replace, os.open, os.mkdir = self.rename, self.replace, self.open, self.mkdir
         os.unlink = os.remove = self.unlink
         builtins.open = io.open = self.open_file
@@ -176,7 +172,6 @@ class Files:
         self._real["unlink"](path, dir_fd=dir_fd)
 
     def open(self, path, flags, mode=0o777, *, dir_fd=None):
-        """No folder is opened."""
         whole = self._whole(path, dir_fd)
         if flags & os.O_CREAT:
             self._allowed(whole)
@@ -191,12 +186,10 @@ class Files:
         return self._open(file, mode, *more, **named)
 
     def mkdir(self, path, mode=0o777, *, dir_fd=None):
-        """No name is made that Windows forbids."""
         self._allowed(self._whole(path, dir_fd))
         self._real["mkdir"](path, mode, dir_fd=dir_fd)
 
     def _whole(self, path, dir_fd=None):
-        """The absolute path, links followed up to its folder."""
         base = "" if dir_fd is None else os.readlink(f"/proc/self/fd/{dir_fd}")
         folder, name = os.path.split(os.path.join(base, os.fsdecode(path)))
         return os.path.join(os.path.realpath(folder or "."), name)
@@ -210,7 +203,6 @@ class Files:
             _refuse(errno.EACCES, _DENIED, path)
 
     def _opened(self):
-        """Files that a process which sees files so has open."""
         for process in os.listdir(self._peers):
             with _quiet():
                 for number in os.listdir(f"/proc/{process}/fd"):

@@ -28,7 +28,6 @@ def lengths(parts):
     ],
 )
 def test_angles_that_turn_round(angles, expected):
-    """The farthest sample ends a run; where it comes twice it may be either run's."""
     found = lengths(parts_by_direction(np.concatenate(angles)))
     assert len(found) == len(expected)
     assert sum(found) == sum(expected)

@@ -30,7 +30,7 @@ class Certified:
 
     @property
     def title(self) -> str:
-        """Return `Certificate of circular tests`, or `Not a certificate: operator unknown, ...`."""
+        """Return `Certificate of circular tests`, or `Not a certificate` with what it lacks."""
         if not self.lacking:
             return "Certificate of circular tests"
         more = len(self.lacking) - MOST_NAMED

@@ -101,7 +101,7 @@ def loaded(group: str, faults: list[Problem]) -> list[Loaded]:
         remedy = f"mend or uninstall {package}"
         try:
             found.append(Loaded(point.load(), point.value, place, remedy))
-        except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
+        except FOREIGN as error:
             faults.append(Problem(place.file, 0, 0, f"cannot be loaded: {in_words(error)}", remedy))
     return found
 
@@ -122,12 +122,16 @@ def added(
     found[one.name], whose[one.name] = one, place.file
 
 
-def in_words(error: Exception) -> str:
+FOREIGN = (Exception, SystemExit)
+"""What code of somebody else can raise: also the end of the program, which is for the user alone to ask."""
+
+
+def in_words(error: BaseException) -> str:
     """Return an exception of foreign code with its kind."""
     return f"{type(error).__name__}: {error}"
 
 
-def line_in(error: Exception, file: str) -> int:
+def line_in(error: BaseException, file: str) -> int:
     """Return the last line of a file in a traceback; 0 if it has none."""
     frames = traceback.extract_tb(error.__traceback__)
     return next((frame.lineno or 0 for frame in reversed(frames) if frame.filename == file), 0)

@@ -116,7 +116,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             input_book(),
             cli.make_context("dbbstation", _own_first(given), obj=tuple(given)) as context,
         ):
-            code = cli.invoke(context)
+            code = _invoked(context)
             flush_output()
     except click.exceptions.Exit as left:
         code = left.exit_code
@@ -146,6 +146,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
         echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
         sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _invoked(context: click.Context) -> object:
+    """Return what a command returns.
+
+    Raises:
+        StationError: code of somebody else, such as a user's source, has ended the program.
+    """
+    try:
+        return cli.invoke(context)
+    except SystemExit as left:
+        what = f"code that a file brings ended the program, with {left.code!r}"
+        raise StationError(what, remedy="let it raise an error in place of sys.exit") from left
 
 
 _SHOWN_BY_PYTHON = warnings.showwarning

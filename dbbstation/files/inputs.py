@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import logging
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
-from typing import TYPE_CHECKING
+from functools import wraps
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from dbbstation.files.places import real_path, text_of_name
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from pathlib import Path
+
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
 
 _LOG = logging.getLogger(__name__)
 
@@ -63,6 +67,17 @@ def input_book() -> Iterator[InputBook]:
         yield book
     finally:
         _BOOK.reset(token)
+
+
+def in_a_book(task: Callable[Given, Result]) -> Callable[Given, Result]:
+    """Let a task note what it reads, if no command does: from Python, too, it then never replaces its own input."""
+
+    @wraps(task)
+    def call(*args: Given.args, **named: Given.kwargs) -> Result:
+        with nullcontext() if _BOOK.get() is not None else input_book():
+            return task(*args, **named)
+
+    return call
 
 
 def note_input(path: Path, digest: str) -> None:

@@ -13,7 +13,7 @@ from inspect import isabstract
 from types import ModuleType
 from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.catalogue import FoundClass, classes_of, in_words, line_in
+from dbbstation.catalogue import FOREIGN, FoundClass, classes_of, in_words, line_in
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.places import real_path
 from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
@@ -84,7 +84,7 @@ def own_instances(
         try:
             one = kind()
             fault = fault_of(one)
-        except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
+        except FOREIGN as error:
             line = line_in(error, place.file) or place.line
             faults.append(Problem(place.file, line, 0, f"{kind.__name__}: {in_words(error)}", contract))
             continue
@@ -117,6 +117,8 @@ def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:
         faults.append(Problem(str(path), error.lineno or 0, error.offset or 0, what, "mend the line"))
     except ValueError as error:
         faults.append(Problem(str(path), 0, 0, f"is not Python: {error}", "name a Python file"))
+    except (MemoryError, RecursionError):
+        faults.append(Problem(str(path), 0, 0, "is nested too deeply", "name a file that a person has written"))
     return None
 
 
@@ -127,7 +129,7 @@ def _run(path: Path, tree: ast.Module, faults: list[Problem]) -> ModuleType | No
     sys.modules[module.__name__] = module  # where dataclasses look up the types of their fields
     try:
         exec(compile(tree, str(path), "exec", dont_inherit=True), module.__dict__)  # noqa: S102 - asked for by name
-    except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
+    except FOREIGN as error:
         del sys.modules[module.__name__]
         what = f"cannot be run: {in_words(error)}"
         faults.append(Problem(str(path), line_in(error, str(path)), 0, what, "mend the line"))

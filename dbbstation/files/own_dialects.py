@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dbbstation.catalogue import FoundClass, in_words, line_in
+from dbbstation.catalogue import FOREIGN, FoundClass, in_words, line_in
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.own_classes import classes_in_files
 from dbbstation.nc.dialect import Dialect
@@ -54,7 +54,7 @@ def _tried(found: FoundClass[Dialect]) -> Dialect:
         try:
             dialect = kind()
             said = faults_of(dialect)
-        except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
+        except FOREIGN as error:
             said = [f"{in_words(error)}, when it was tried"]
             line = line_in(error, place.file) or line
         else:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.catalogue import FOREIGN
 from dbbstation.diagnosis.simulator.ports import SimulationFault
 from dbbstation.simulators.exchanged import ExchangedSimulator
 
@@ -80,7 +81,7 @@ class FmuSimulator(ExchangedSimulator):
                 output=list(dict.fromkeys(wanted.values())),
                 timeout=self._limit_s,
             )
-        except Exception as error:  # whatever FMPy and the FMU raise
+        except FOREIGN as error:
             raise SimulationFault(f"{self._path.name}: {error}") from error
         if float(found["time"][-1]) < float(t[-1]) - 1e-6 * float(t[-1] - t[0]):
             raise SimulationFault(f"{self._path.name} takes longer than {self._limit_s:g} s; raise `time_limit_s`")

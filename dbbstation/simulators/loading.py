@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.catalogue import in_words, line_in
+from dbbstation.catalogue import FOREIGN, in_words, line_in
 from dbbstation.diagnosis.simulator.contract import Simulator
 from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
 from dbbstation.diagnosis.simulator.own import PortSource
@@ -152,7 +152,7 @@ def _simulator_of(python: Path, _content: bytes) -> Simulator:
         raise InputError([Problem(place.file, place.line, 0, f"{kind.__name__} lacks simulate", CONTRACT)])
     try:
         return kind()
-    except Exception as error:  # whatever the code of somebody else raises
+    except FOREIGN as error:
         line = line_in(error, place.file) or place.line
         raise InputError([Problem(place.file, line, 0, f"{kind.__name__}: {in_words(error)}", CONTRACT)]) from error
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import in_words, line_in
+from dbbstation.catalogue import FOREIGN, in_words, line_in
 from dbbstation.computing.processes import processes
 from dbbstation.diagnosis.simulator.contract import simulated
 from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
@@ -197,7 +197,7 @@ def _one(source: Path | ExchangedSimulator, model: Model, ask: SimulationRequest
     place = str(source) if isinstance(source, Path) else source.said
     try:
         return simulated(simulator, model, ask)
-    except Exception as error:
+    except FOREIGN as error:
         line = line_in(error, place) if isinstance(source, Path) else None
         where = f"{place}:{line}" if line else place
         what = f"the simulation failed: {in_words(error)}"

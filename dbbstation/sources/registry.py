@@ -6,7 +6,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import FoundClass, added, in_folders, in_words, installed, line_in, looked_up
+from dbbstation.catalogue import FOREIGN, FoundClass, added, in_folders, in_words, installed, line_in, looked_up
 from dbbstation.errors import InputError, ModelError, Problem
 from dbbstation.sources import causes, unmodelled
 from dbbstation.sources.contract import ErrorSource
@@ -77,7 +77,7 @@ def _checked(found: FoundClass[ErrorSource], faults: list[Problem]) -> ErrorSour
         try:
             source = kind()
             said = tried(source, trial_machine())
-        except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
+        except FOREIGN as error:
             said = [f"{in_words(error)}, when it was tried on a circle"]
             line = line_in(error, place.file) or line
         else:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dbbstation.files.atomic import write_folder
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.inputs import in_a_book
 from dbbstation.files.own_dialects import dialect_given
 from dbbstation.nc.circle_program import Approach
 from dbbstation.nc.export import circle_programs
@@ -35,6 +36,7 @@ CLEARANCE_MM = 20.0
 """Height of rapid moves above the first point where nobody says another [mm]."""
 
 
+@in_a_book
 def write_circle_programs(
     plan_file: Path,
     machine_file: Path,

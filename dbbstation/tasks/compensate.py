@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.files.atomic import refuse_existing, write_text
+from dbbstation.files.inputs import in_a_book
 from dbbstation.files.own_dialects import dialect_given
 from dbbstation.nc.compensate import CHORD_MM
 from dbbstation.nc.export import compensated_program
@@ -36,6 +37,7 @@ UNITS_NOT_SAID = (
 )
 
 
+@in_a_book
 def compensate(
     program: str | PathLike[str],
     model: Model,

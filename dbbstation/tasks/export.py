@@ -12,6 +12,7 @@ import numpy as np
 from dbbstation.errors import InputError, OutputError, Problem, TraceError
 from dbbstation.files.atomic import refuse_existing, streamed, write_text
 from dbbstation.files.csv_rows import csv_text
+from dbbstation.files.inputs import in_a_book
 from dbbstation.files.provenance import beside_table, refuse_existing_table
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.run_lines import split_head
@@ -43,6 +44,7 @@ FORMATS = (".csv", ".parquet")
 """Formats of a table, by the ending of its file."""
 
 
+@in_a_book
 def export(
     sessions: Sessions,
     out: str | PathLike[str],

@@ -10,6 +10,7 @@ import numpy as np
 
 from dbbstation.files.formats.number_language import PLAIN
 from dbbstation.files.formats.pose_table import PoseTable, read_poses, write_poses
+from dbbstation.files.inputs import in_a_book
 from dbbstation.files.provenance import refuse_existing_table
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.uncertainty import predicted_poses
@@ -36,6 +37,7 @@ STAGES = {"reading": 0, "travel": 32, "predicting": 48, "writing": 67}
 AXES = 6
 
 
+@in_a_book
 def predict(
     model: Model,
     poses: ArrayLike | str | PathLike[str],

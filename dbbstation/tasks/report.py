@@ -11,6 +11,7 @@ from dbbstation.diagnosis.effects import effects_of
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.errors import StationError
 from dbbstation.files.atomic import refuse_outputs, write_bytes
+from dbbstation.files.inputs import in_a_book
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.report.content import Modelled, Reported, certified_of, content_of, numbers_of
 from dbbstation.report.html import report_html
@@ -52,6 +53,7 @@ STAGES = {
 USUAL_COVERAGE = 2.0
 
 
+@in_a_book
 def report(
     sessions: Sessions,
     out: str | PathLike[str],

@@ -40,7 +40,9 @@ def test_a_simulator_that_exits_is_no_empty_success(tmp_path):
     text = (tmp_path / "pendulum.py").read_text(encoding="utf-8")
     first = "        times, torques ="
     assert text.count(first) == 1
-    (tmp_path / "pendulum.py").write_text(text.replace(first, f"        raise SystemExit(0)\n{first}"), encoding="utf-8")
+    (tmp_path / "pendulum.py").write_text(
+        text.replace(first, f"        raise SystemExit(0)\n{first}"), encoding="utf-8"
+    )
     done = call("mismatch", tmp_path / "pendulum.csv", "--simulator", tmp_path / "pendulum.yaml", "--json")
     assert (done.code, done.out) == (FAILED, "")
     assert "the simulation failed: SystemExit: 0" in done.err

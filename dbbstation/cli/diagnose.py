@@ -96,6 +96,7 @@ def diagnose(
             exclude=exclude,
             keep_unexplained=keep_unexplained,
             hold_out=not no_held_out,
+            until_interrupted=True,
             known=every_source(source_files),
             progress=progress,
             say=lambda text: say(f"note: {text}"),

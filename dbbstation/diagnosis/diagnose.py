@@ -56,6 +56,7 @@ def diagnose(
     progress: Callable[[str], None] = lambda _: None,
     *,
     hold_out: bool = True,
+    until_interrupted: bool = False,
 ) -> Diagnosis:
     """Find what a kinematic calibration leaves out; see docs/decisions.md, 19.
 
@@ -71,7 +72,7 @@ def diagnose(
     """
     most = sectors_for(len(observations))
     runs = [thinned(observation, most) for observation in observations]
-    explained = explain(machine, runs, sources, progress)
+    explained = explain(machine, runs, sources, progress, until_interrupted=until_interrupted)
     progress("verdicts")
     explained, findings = judged(explained)
     progress("held-out tests")

@@ -60,20 +60,29 @@ def explain(
     runs: Sequence[Observation],
     sources: Sequence[ErrorSource],
     progress: Callable[[str], None],
+    *,
+    until_interrupted: bool = False,
 ) -> Explained:
     """Compare sets of causes, freeing balls and bars that are certainly off.
 
-    Foreign runs are omitted first and reinstated if explained.
+    Foreign runs are omitted first and reinstated if explained. With `until_interrupted` an interruption ends the comparison with what
+    was found.
     """
     progress("kinematic calibration")
     fit = partial(calibrate, machine)
     before, outliers = calibrate_robust(fit, runs, balls=False)
-    explained = _with_set_up(fit, before, outliers, sources, progress)
+
+    def settle(about: Calibration) -> tuple[CircleChannel, SettledCircles]:
+        progress("candidates")
+        channel = CircleChannel(about, sources)
+        return channel, _Settling(channel, progress).run(until_interrupted=until_interrupted)
+
+    explained = _with_set_up(fit, before, outliers, settle)
     if explained.settled.members and outliers and not explained.settled.stopped:
         belonging, staying = in_place_after_all(explained.settled.after, runs, outliers)
         if len(staying) < len(outliers):
             del explained  # its columns fill as much memory as the next ones will
-            return _with_set_up(fit, fit(belonging), staying, sources, progress)
+            return _with_set_up(fit, fit(belonging), staying, settle)
     return explained
 
 
@@ -89,14 +98,11 @@ def _with_set_up(
     fit: Fit,
     before: Calibration,
     outliers: tuple[Outlier, ...],
-    sources: Sequence[ErrorSource],
-    progress: Callable[[str], None],
+    settle: Callable[[Calibration], tuple[CircleChannel, SettledCircles]],
 ) -> Explained:
     """Compare, free certain set-up faults one by one, and compare again."""
     while True:
-        progress("candidates")
-        channel = CircleChannel(before, sources)
-        settled = _Settling(channel, progress).run()
+        channel, settled = settle(before)
         explained = Explained(before, outliers, channel, misfit_of(before, settled.noise), settled)
         off = [m for m in settled.best.members if m.cause.setup]
         off = [m for m in off if settled.posterior.probability([m.cause.name]) >= SURE]
@@ -129,11 +135,11 @@ class _Settling:
         self._given_up: set[tuple[str, str]] = set()
         self._likely = CLOSE  # the most probable set alone is wanted, until nothing changes
 
-    def run(self) -> SettledCircles:
-        """Run until stable; an interruption returns the last round.
+    def run(self, *, until_interrupted: bool) -> SettledCircles:
+        """Run until stable, or until interrupted.
 
         Raises:
-            KeyboardInterrupt: in the first round.
+            KeyboardInterrupt: in the first round, and in any if not `until_interrupted`.
         """
         self._unmodelled.look(self._fit, (), self._noise_mm)
         stopped, settled = False, self._compared()
@@ -144,6 +150,8 @@ class _Settling:
                 self._likely = self._likely if left else LIKELY
                 settled = self._compared()
         except KeyboardInterrupt:
+            if not until_interrupted:
+                raise
             # Columns that the round before had may have been given back: about the last fit the sets are compared once more.
             stopped, settled = True, self._compared()
         return replace(_fitted_as_named(self._channel, settled), stopped=stopped)

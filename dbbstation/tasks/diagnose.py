@@ -116,6 +116,7 @@ def diagnose(
     exclude: Sequence[str] = (),
     keep_unexplained: bool = False,
     hold_out: bool = True,
+    until_interrupted: bool = False,
     known: Mapping[str, ErrorSource] | None = None,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
@@ -129,6 +130,7 @@ def diagnose(
         tests: names; empty for all.
         exclude: names of tests.
         hold_out: choose anew without each group of tests, to check predictions.
+        until_interrupted: a KeyboardInterrupt ends the comparison with the best set so far.
         keep_unexplained: keep an unmodelled effect as a compensated curve.
         known: error sources by name; None: those of package and installed packages.
         progress: called with each stage.
@@ -146,7 +148,8 @@ def diagnose(
     """
     telling = Telling(progress, stop, say)
     every = every_source() if known is None else known
-    diagnosed = _diagnosed(sessions, sources, (tuple(tests), tuple(exclude)), every, telling, hold_out=hold_out)
+    how = partial(search.diagnose, hold_out=hold_out, until_interrupted=until_interrupted)
+    diagnosed = _diagnosed(sessions, sources, (tuple(tests), tuple(exclude)), every, telling, how)
     found = diagnosed.diagnosis
     unnamed = _kept(found, telling) if keep_unexplained else None
     fit = found.after if unnamed is None else unnamed.fit
@@ -174,8 +177,7 @@ def _diagnosed(
     chosen: tuple[Sequence[str], Sequence[str]],
     known: Mapping[str, ErrorSource],
     telling: Telling,
-    *,
-    hold_out: bool = True,
+    how: Callable[..., Diagnosis] = search.diagnose,
 ) -> Diagnosed:
     named = sources_named(default_candidates(known) if candidates is None else candidates, known)
     for source in named:
@@ -184,7 +186,7 @@ def _diagnosed(
             raise ModelError(what, remedy="leave it out; --keep-unexplained keeps what is left")
     recorded = loaded(sessions, *chosen, telling)
     usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
-    found = search.diagnose(recorded.machine, recorded.observations, usable, telling.stage, hold_out=hold_out)
+    found = how(recorded.machine, recorded.observations, usable, telling.stage)
     return Diagnosed(recorded, found, lacking)
 
 

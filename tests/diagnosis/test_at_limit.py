@@ -16,7 +16,7 @@ from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.inference.hypotheses import search
 from dbbstation.sources.contract import Parameter
 from dbbstation.sources.registry import sources_named
-from dbbstation.tasks.diagnose import diagnose_sessions
+from dbbstation.tasks.diagnose import diagnose, diagnose_sessions
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.disturbances import WALK_STEP_S, WanderingBar
@@ -168,9 +168,9 @@ def test_who_interrupts_the_comparison_gets_what_it_had_found(backlash, monkeypa
         return search(comparison, causes, seeds, **options)
 
     monkeypatch.setattr(explain, "search", interrupted)
-    found = diagnose_sessions([backlash], None, (), lambda _: None).diagnosis
+    found = diagnose([backlash], until_interrupted=True)
     assert found.limits[0].what == "stopped"
-    assert found.chosen_anew is None
+    assert found.held_out == "not-tested"
     (best,) = [source for source in found.sources if source.name == "backlash"]
     assert best.probability > 0.95
     for strut in range(1, 7):
@@ -185,7 +185,7 @@ def test_who_interrupts_before_anything_is_found_gets_nothing(backlash, monkeypa
 
     monkeypatch.setattr(explain, "search", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        diagnose_sessions([backlash], None, (), lambda _: None)
+        diagnose([backlash], until_interrupted=True)
 
 
 @pytest.mark.slow

@@ -1,0 +1,78 @@
+"""How much the answers of sessions hang on constants of the comparison: each is moved, and the sets that are found are compared.
+
+python -m tests.plant.foreign.constants FOLDER --out docs/validation/limit-constants.json
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+from dbbstation.diagnosis import explain, shape_look, shapes
+from dbbstation.diagnosis.diagnose import judged, usable_sources
+from dbbstation.diagnosis.thinned import sectors_for, thinned
+from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.load import load_sessions
+
+MOVED: dict[str, tuple[Any, str, tuple[float, ...], int]] = {
+    "IDLE": (explain, "IDLE", (0.7, 0.97), 4),
+    "HALF": (shape_look, "HALF", (0.25, 1.0), 4),
+    "WALK_STEPS": (shapes, "WALK_STEPS", (3, 12), 2),
+}
+"""By constant: its module and name, other values, and the session on which it decides most."""
+
+
+def found(folder: Path) -> tuple[str, float, float]:
+    """Named causes with their laws and number of unmodelled effects; the residual [µm]; processor time [s]."""
+    recorded, began = load_sessions([folder]), time.process_time()
+    runs = [thinned(one, sectors_for(len(recorded.observations))) for one in recorded.observations]
+    known = known_sources()
+    usable, _ = usable_sources(recorded.machine, runs, sources_named(default_candidates(known), known))
+    explained, _ = judged(explain.explain(recorded.machine, runs, usable, lambda _: None))
+    settled = explained.settled
+    named = sorted(f"{m.cause.name} ({m.variant.law})" for m in settled.members)
+    others = len(settled.best.members) - len(named)
+    said = f"{', '.join(named) or 'no cause'}; {others} without a name"
+    return said, 1e3 * settled.left.rms, time.process_time() - began
+
+
+def main() -> None:
+    """Read the command line and do what it says."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.plant.foreign.constants", description=__doc__.splitlines()[0]
+    )
+    parser.add_argument("folder", type=Path, help="that `python -m tests.plant.foreign make` wrote")
+    parser.add_argument("--out", type=Path, required=True)
+    given = parser.parse_args()
+    columns: dict[str, tuple[str, float, float]] = {}
+    for name, (module, attribute, values, session) in MOVED.items():
+        usual = getattr(module, attribute)
+        for value in (usual, *values):
+            key = f"session {session}, as it is" if value == usual else f"session {session}, {name} {value:g}"
+            if key in columns:
+                continue
+            with mock.patch.object(module, attribute, value):
+                columns[key] = found(given.folder / f"{session:04d}")
+            sys.stderr.write(f"{key}: {columns[key]}\n")
+    kept = {
+        "question": "Do answers hang on the constants of the comparison?",
+        "data": "Two sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5 and 6.",
+        "command": "python -m tests.plant.foreign.constants FOLDER",
+        "date": datetime.now(UTC).date().isoformat(),
+        "seed": 48,
+        "limits": "One session for each constant, without held-out tests.",
+        "columns": ["found", "left beyond noise / µm", "processor time / s"],
+        "figures": {key: [said, round(left, 2), round(spent)] for key, (said, left, spent) in columns.items()},
+    }
+    given.out.write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from dbbstation.circles.extremes import drawn_paths
+from dbbstation.circles.form import form_and_noise
 from dbbstation.circles.strip import strip_widths
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
@@ -33,7 +35,9 @@ def prepare() -> None:
     for one in (MachineModel(machine), model):
         one.actual(motion)
         one.bar(motion).by_source(joints.source, machine, joints.values)
-    strip_widths(np.ones((1, 8)), np.zeros((1, 8)), np.arange(0.0, 360.0, 45.0))
+    noise = form_and_noise(np.random.default_rng(1).standard_normal(128))
+    for path in drawn_paths(noise, np.arange(128.0) * (360.0 / 128.0), np.ones(65), 1, (2, 0)):
+        strip_widths(path.highest_um, path.lowest_um, path.theta_deg)
 
 
 if __name__ == "__main__":

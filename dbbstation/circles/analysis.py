@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,7 +50,6 @@ class CircleAnalysis:
 
     Attributes:
         chosen: of G, F and H.
-        g_um: circular deviation G, minimum zone.
         centre_mm: least-squares less commanded, X and Y.
         radius_error_um: least-squares less nominal radius.
         mean_radial_error_um: mean reading less nominal bar length [CAL Table III].
@@ -65,7 +65,6 @@ class CircleAnalysis:
     raw: RawCircle
     chosen: Filter
     path: CirclePath
-    g_um: float
     g_least_squares_um: float
     centre_mm: tuple[float, float]
     radius_error_um: float
@@ -80,6 +79,11 @@ class CircleAnalysis:
     noise: CircleNoise
     lost: int
     residual_um: NDArray[np.float64]
+
+    @cached_property
+    def g_um(self) -> float:
+        """Circular deviation G, minimum zone [µm]; only figures need it, no finding does."""
+        return 1e3 * self.path.zone().width_mm
 
 
 @with_one_thread
@@ -105,7 +109,6 @@ def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter =
         raw=raw,
         chosen=chosen,
         path=path,
-        g_um=1e3 * path.zone().width_mm,
         g_least_squares_um=1e3 * float(np.ptp(path.least_squares.deviation_mm)),
         centre_mm=measured.centre_mm,
         radius_error_um=radius_error_um,
@@ -136,7 +139,6 @@ def refiltered(one: CircleAnalysis, chosen: Filter) -> CircleAnalysis:
         one,
         chosen=chosen,
         path=path,
-        g_um=1e3 * path.zone().width_mm,
         g_least_squares_um=1e3 * float(np.ptp(path.least_squares.deviation_mm)),
         f_centred=_extremes(one.radius_error_um + 1e3 * path.least_squares.deviation_mm),
         f_commanded=_extremes(1e3 * (path.about_ball_mm - path.radius_mm)),

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.circles.form import drawn_lines
+from dbbstation.machine.compiled import compiled
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
@@ -110,13 +111,14 @@ def drawn_paths(
     count = len(theta_deg)
     order, starts, middle_deg = _sectors(theta_deg, passed)
     rng = np.random.default_rng([SEED, seed])
-    extremes: list[list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = [[] for _ in taken]
-    for _ in range(BLOCKS):  # long recordings would take much memory at once
-        lines = drawn_lines(apart, passed, DRAWS // BLOCKS, rng)
-        noise = np.fft.irfft(lines, count, axis=1)[:, order]
+    extremes = [np.empty((2, DRAWS, len(starts))) for _ in taken]
+    waves = _waves(max(taken), order, count)
+    for block in np.split(np.arange(DRAWS), BLOCKS):  # long recordings would take much memory at once
+        lines = drawn_lines(apart, passed, len(block), rng)
+        noise = np.fft.irfft(lines, count, axis=1)
         for each, first in zip(extremes, taken, strict=True):
-            left = noise - _waves(lines[:, :first], order, count) if first else noise
-            each.append((np.maximum.reduceat(left, starts, axis=1), np.minimum.reduceat(left, starts, axis=1)))
+            sizes = np.ascontiguousarray(lines[:, :first]).view(np.float64)
+            _extremes(noise, sizes, waves, order, np.append(starts, len(order)), *each[:, block[0] : block[-1] + 1])
     found = []
     for each, first in zip(extremes, taken, strict=True):
         left_passed = np.where(np.arange(len(passed)) < first, 0.0, passed)
@@ -124,8 +126,8 @@ def drawn_paths(
         found.append(
             DrawnPath(
                 form_um=_means(apart.form_um, order, starts),
-                highest_um=np.concatenate([highest for highest, _ in each]),
-                lowest_um=np.concatenate([lowest for _, lowest in each]),
+                highest_um=each[0],
+                lowest_um=each[1],
                 theta_deg=middle_deg,
                 sigma_um=float(np.sqrt((2.0 * power.sum() - power[0]) / count)),
                 least=_least_share(apart.power_um2, left_passed),
@@ -155,14 +157,37 @@ def _sectors(
     return order, starts, (sector[starts] + 0.5) * (FULL_TURN_DEG / sectors)
 
 
-def _waves(lines: NDArray[np.complex128], at: NDArray[np.int64], count: int) -> NDArray[np.float64]:
-    """Return what the first lines of spectra, as of `numpy.fft.rfft`, add to some of their n samples, shape (draws, samples)."""
-    undulations = np.arange(lines.shape[1])
-    angles = np.outer(undulations, at) * (2.0 * np.pi / count)
+def _waves(lines: int, at: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+    """Return what parts of the first lines of a spectrum, real and imaginary by turns, add to some of n samples, shape (2 lines, samples)."""
+    undulations = np.arange(lines)[:, None]
+    angles = undulations * at * (2.0 * np.pi / count)
     share = np.where(undulations > 0, 2.0, 1.0) / count
-    return np.asarray(
-        np.hstack([share * lines.real, -share * lines.imag]) @ np.vstack([np.cos(angles), np.sin(angles)])
-    )
+    return np.asarray(np.hstack([share * np.cos(angles), -share * np.sin(angles)]).reshape(2 * lines, len(at)))
+
+
+@compiled
+def _extremes(
+    noise: NDArray[np.float64],
+    sizes: NDArray[np.float64],
+    waves: NDArray[np.float64],
+    order: NDArray[np.int64],
+    edges: NDArray[np.int64],
+    highest: NDArray[np.float64],
+    lowest: NDArray[np.float64],
+) -> None:
+    """Write the greatest and least noise in each sector, shape (draws, s) each, less the first waves at their sizes, (draws, 2 lines)."""
+    left = np.empty(len(order))
+    for draw in range(len(noise)):
+        for k in range(len(order)):
+            left[k] = noise[draw, order[k]]
+        for wave in range(sizes.shape[1]):
+            for k in range(len(order)):
+                left[k] -= sizes[draw, wave] * waves[wave, k]
+        for sector in range(len(edges) - 1):
+            high = low = left[edges[sector]]
+            for k in range(edges[sector] + 1, edges[sector + 1]):
+                high, low = max(high, left[k]), min(low, left[k])
+            highest[draw, sector], lowest[draw, sector] = high, low
 
 
 def _means(values: NDArray[np.float64], order: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -63,7 +63,7 @@ def ran(checkout: Path, words: tuple[str, ...], places: dict[str, str], *, modul
     with tempfile.TemporaryDirectory() as out, tempfile.TemporaryFile() as said:
         line = [word.format(out=out, **places) for word in words]
         environment = {
-            **os.environ,
+            **{name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"},
             "PYTHONPATH": str(checkout),
             "XDG_CACHE_HOME": f"{out}/cache",
             "DBBSTATION_LOG": "off",

@@ -18,8 +18,13 @@ if TYPE_CHECKING:
 
     import pytest
 
-OF_TABLES = ("dbbstation.tasks.mismatch.mismatch",)
-"""Tasks on tables of the package, which documents show and tests look at; what `drive` found cannot be written down."""
+OF_TABLES = ("dbbstation.tasks.mismatch.mismatch", "dbbstation.tasks.drive.drive")
+"""Tasks on tables of the package, which documents show and tests look at."""
+
+OF_SESSIONS = tuple(
+    f"dbbstation.tasks.{name}.{name}" for name in ("calibrate", "diagnose", "compare", "evaluate", "drive")
+)
+"""Tasks that a command carries out for each way of printing what it found."""
 
 STUDIES = ("studies.concealed_gravity.concealed_gravity",)
 """Studies that a document shows and tests look at."""
@@ -60,6 +65,10 @@ def computed_once(factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch, *t
         patch.setattr(task, _kept(getattr(import_module(module), name), of_the_run(factory)))
 
 
+_HERE: dict[Path, tuple[list[str], object]] = {}
+"""Answers that hold functions which were made on the way and cannot be written down: each worker computes them."""
+
+
 def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
     tells = "say" in inspect.signature(task).parameters
 
@@ -68,18 +77,17 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
         wanted = {name: value for name, value in more.items() if name not in TELLING}
         asked = repr((task.__module__, task.__name__, _request(words), _request(wanted)))
         place = folder / f"{hashlib.sha256(asked.encode()).hexdigest()}.pickle"
+        if place in _HERE:
+            return _told(_HERE[place][0], more, _HERE[place][1])
         with alone(place):
             if not place.exists():
                 told: list[str] = []
                 answer = task(*words, **{**more, **({"say": told.append} if tells else {})})
                 try:
                     place.write_bytes(pickle.dumps((told, answer)))
-                except (
-                    AttributeError,
-                    TypeError,
-                    pickle.PicklingError,
-                ):  # it holds functions that were made on the way: everybody computes it anew
+                except (AttributeError, TypeError, pickle.PicklingError):
                     place.unlink(missing_ok=True)
+                    _HERE[place] = told, answer
                     return _told(told, more, answer)
         told, answer = pickle.loads(place.read_bytes())  # noqa: S301 - written above
         return _told(told, more, answer)
@@ -94,9 +102,11 @@ def _told(told: list[str], more: dict[str, Any], answer: object) -> object:
 
 
 def _request(value: object) -> object:
-    """What is asked, a file by its name and content wherever it lies."""
-    if isinstance(value, str | Path) and value and Path(value).is_file():
-        return Path(value).name, hashlib.sha256(Path(value).read_bytes()).hexdigest()
+    """What is asked, a file or a folder by its name and content wherever it lies."""
+    if isinstance(value, str | Path) and value and Path(value).exists():
+        path = Path(value)
+        files = sorted(one for one in path.rglob("*") if one.is_file()) if path.is_dir() else [path]
+        return path.name, [(str(one.relative_to(path)), hashlib.sha256(one.read_bytes()).hexdigest()) for one in files]
     if isinstance(value, dict):
         return sorted((name, _request(one)) for name, one in value.items())
     return [_request(one) for one in value] if isinstance(value, tuple | list) else value

@@ -11,6 +11,8 @@ from dbbstation.cli import FAILED
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.session import record
 
+pytestmark = pytest.mark.usefixtures("answers_kept")
+
 
 @pytest.fixture(scope="module")
 def jig_session(tmp_path_factory):

@@ -12,6 +12,8 @@ import pytest
 from dbbstation.cli import DONE
 from dbbstation.files.shipped import shipped_folder
 
+pytestmark = pytest.mark.usefixtures("answers_kept")
+
 FIGURES = {"centre_deviation_um", "mean_radial_error_um", "circularity_um"}
 WHEN = ("before", "after")
 

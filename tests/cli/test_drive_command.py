@@ -9,6 +9,8 @@ from dbbstation.cli import DONE, FAILED
 from dbbstation.files.shipped import shipped_folder
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
+pytestmark = pytest.mark.usefixtures("answers_kept")
+
 
 @pytest.fixture(scope="module")
 def strut(tmp_path_factory):

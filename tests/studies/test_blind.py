@@ -283,7 +283,7 @@ def study(tmp_path_factory):
     answers = []
     for name, hidden in (("0001", []), ("0002", [Gravity()])):
         plan = subset(table_ii_plan(int(name)), "abhimo")
-        truth = record(folder / name, plan=plan, seed=int(name), mechanisms=[RandomKinematics(), *hidden], rate_hz=25.0)
+        truth = record(folder / name, plan=plan, seed=int(name), mechanisms=[RandomKinematics(), *hidden], rate_hz=8.0)
         effects = [effect("gravity", 90.0, amplitudes={"strut_compliance_um_kn": 9.68})] if hidden else []
         told = answer(name, "single" if hidden else "clean", *effects)
         answers.append(told | {"truth": {k: np.asarray(v).tolist() for k, v in _machine_of(truth).items()}})

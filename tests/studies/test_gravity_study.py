@@ -26,8 +26,6 @@ from studies.gravity_figure import gravity_figure, same_place
 
 pytestmark = pytest.mark.slow  # four machines are fitted in four ways
 
-MACHINES = 4
-
 # Median of six random machines, 1 µm of noise, conditions A to I [µm], by two programs that share nothing with this one.
 ELSEWHERE_UM = {
     WITHOUT: (52, 17, 37, 108, 21, 6, 7, 7, 8),
@@ -37,11 +35,11 @@ ELSEWHERE_UM = {
 }
 
 
-@pytest.fixture(scope="module")
-def study(reference):
+@pytest.fixture(scope="module", params=[2, pytest.param(4, marks=pytest.mark.nightly)])
+def study(request, reference):
     plans = shipped_folder("protocols") / "plans"
     jig, conditions = read_plan(plans / "table2.yaml"), read_plan(plans / "gravity-conditions.yaml")
-    return gravity_study(reference, jig, conditions, range(300, 300 + MACHINES), lambda _: None)
+    return gravity_study(reference, jig, conditions, range(300, 300 + request.param), lambda _: None)
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from dbbstation.calibration.checks.scatter import check_scatter, seats_of
 from dbbstation.calibration.fit.calibrate import calibrate
@@ -16,18 +17,22 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import draw_session
 
-SESSIONS = 40
-
 
 @pytest.fixture(scope="module")
 def machine():
     return read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
 
 
-def sessions(machine, stated):
+@pytest.fixture(scope="module", params=[16, pytest.param(40, marks=pytest.mark.nightly)])
+def count(request):
+    """Number of sessions."""
+    return request.param
+
+
+def sessions(machine, stated, count):
     plan = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
     truth = MachineModel(machine, random_kinematics(machine, 5))
-    for seed in range(SESSIONS):
+    for seed in range(count):
         runs = draw_session(truth, plan, np.random.default_rng(seed), 0.0005, 48)
         said = [
             replace(
@@ -44,28 +49,29 @@ def sessions(machine, stated):
 
 
 @pytest.fixture(scope="module")
-def as_stated(machine):
-    return [seats_of(calibration) for calibration in sessions(machine, 1.0)]
+def as_stated(machine, count):
+    return [seats_of(calibration) for calibration in sessions(machine, 1.0, count)]
 
 
 @pytest.mark.slow
-def test_sizes_that_are_right_are_said_to_fit(as_stated):
+def test_sizes_that_are_right_are_said_to_fit(as_stated, count):
     checks = [check_scatter(seats) for seats in as_stated]
     assert {len(check) for check in checks} == {2}
     fits = [check.fits for both in checks for check in both]
-    # 95 of 100, so that fewer than 68 of 80 have a chance of 1 in 1000.
-    assert sum(fits) >= 68
+    # 95 of 100; fewer have a chance of 1 in 1000.
+    assert sum(fits) >= binom.ppf(1e-3, 2 * count, 0.95)
     for holder, stated_um in enumerate((np.hypot(0.58, 0.8), np.hypot(1.85, 0.8))):
         assert checks[0][holder].stated_um == pytest.approx(stated_um, abs=1e-3)
         found = np.sqrt(np.mean([both[holder].found_um ** 2 for both in checks]))
-        assert found == pytest.approx(stated_um, rel=0.1)
+        # Forty sessions know the size to 5 %, one standard deviation.
+        assert found == pytest.approx(stated_um, rel=0.1 * np.sqrt(40 / count))
 
 
 @pytest.mark.slow
-def test_sizes_that_are_a_third_of_the_truth_are_found_out(machine):
-    checks = [check_scatter(seats_of(calibration)) for calibration in sessions(machine, 1.0 / 3.0)]
+def test_sizes_that_are_a_third_of_the_truth_are_found_out(machine, count):
+    checks = [check_scatter(seats_of(calibration)) for calibration in sessions(machine, 1.0 / 3.0, count)]
     few, many = zip(*checks, strict=True)
-    assert sum(not check.fits for check in few) > 0.6 * SESSIONS
+    assert sum(not check.fits for check in few) > 0.6 * count
     assert all(check.fits is False and check.interval_um[0] > check.stated_um for check in many)
 
 

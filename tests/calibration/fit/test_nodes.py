@@ -15,7 +15,7 @@ from dbbstation.sources.contract import Effect, LinearSource, Need, Owner, Param
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
-from tests.plant.plan import elevated, table_ii_plan
+from tests.plant.plan import EIGHT, elevated, subset, table_ii_plan
 from tests.plant.session import record
 
 ERRORS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.1)
@@ -25,7 +25,9 @@ USUAL = ("strut-reference-length", "base-joints", "mounting", "ball-coordinate",
 @pytest.fixture(scope="module")
 def long_runs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("plant") / "long"
-    record(folder, seed=7, plan=elevated(table_ii_plan(7), 5.0, "abcde"), mechanisms=[ERRORS], rate_hz=200.0)
+    record(
+        folder, seed=7, plan=elevated(subset(table_ii_plan(7), EIGHT), 5.0, "abd"), mechanisms=[ERRORS], rate_hz=200.0
+    )
     return load_sessions([folder])
 
 
@@ -34,7 +36,7 @@ def without_nodes(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [(), ("gravity", "bar-drift")])
+@pytest.mark.parametrize("more", [pytest.param((), marks=pytest.mark.nightly), ("gravity", "bar-drift")])
 def test_a_fit_through_nodes_is_that_of_all_samples(long_runs, monkeypatch, more):
     sources = sources_named((*USUAL, *more))
     seen = calibrate(long_runs.machine, long_runs.observations, sources)

@@ -27,7 +27,7 @@ from tests.plant.session import record
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("doubt") / "s"
-    record(folder, seed=9, mechanisms=[RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)], rate_hz=20.0)
+    record(folder, seed=9, mechanisms=[RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)], rate_hz=10.0)
     return load_sessions([folder])
 
 

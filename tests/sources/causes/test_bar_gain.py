@@ -66,6 +66,6 @@ def test_circles_of_two_sizes_find_it_and_circles_of_one_say_that_they_cannot(tm
 
 
 def gain_of(folder, plan, scale):
-    record(folder, seed=1512, plan=plan, mechanisms=[KINEMATICS, scale], rate_hz=10.0)
+    record(folder, seed=1512, plan=plan, mechanisms=[KINEMATICS, scale], rate_hz=4.0)
     found = diagnose_sessions([folder], ("bar-gain", "bar-scale"), (), lambda _: None).diagnosis
     return next(f for f in found.sources if f.name == "bar-gain")

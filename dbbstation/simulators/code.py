@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,7 +49,7 @@ _LATE = """    times, values = before or ([], [])
 def missing_code(answer: SimulatorComparison) -> str:
     """Return a Python module with a function per term: `value(t, signals)`, or with a state."""
     lines = [
-        f'"""What {answer.model.name} lacks, as found from its recordings. Add each term at its port."""',
+        f'"""What {_told(answer.model.name)} lacks, as found from its recordings. Add each term at its port."""',
         "",
         "import math",
         *(["import runpy"] if any(term.own is not None for term in answer.terms) else []),
@@ -65,6 +66,11 @@ def missing_code(answer: SimulatorComparison) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _told(text: str) -> str:
+    """A text as it may stand in a docstring: somebody's name for a model must not become code."""
+    return " ".join(text.split()).replace("\\", "/").replace('"', "'")
+
+
 def _values(finding: object) -> list[str]:
     values = getattr(finding, "values", {})
     return [f"{name}: {one.value:.6g} ± {one.uncertainty:.2g} {one.unit}".rstrip() for name, one in values.items()]
@@ -72,7 +78,8 @@ def _values(finding: object) -> list[str]:
 
 def function_name(term: Term) -> str:
     """Name of a term's function."""
-    return "_".join([term.port, *term.name.split(" at ")[0].replace("-", " ").split()]).lower()
+    words = "_".join([term.port, *term.name.split(" at ")[0].replace("-", " ").split()]).lower()
+    return re.sub(r"\W", "_", words)
 
 
 def _function(term: Term, verdict: str, values: Sequence[str]) -> list[str]:
@@ -80,7 +87,8 @@ def _function(term: Term, verdict: str, values: Sequence[str]) -> list[str]:
     shape = repr(float(term.shape[0])) if term.shape else "0.0"
     remembers = _body(term, a, shape)
     arguments = "t, signals, before=None" if remembers else "t, signals"
-    said = [f'    """{term.name[0].upper()}{term.name[1:]}: {verdict}.', "", *(f"    {one}" for one in values)]
+    name = _told(term.name)
+    said = [f'    """{name[:1].upper()}{name[1:]}: {verdict}.', "", *(f"    {_told(one)}" for one in values)]
     if remembers:
         said += ["", "    Returns the value and the state; hand the state of the last accepted step back as `before`."]
     signals = [f"    {name} = signals[{signal!r}]" for name, signal in zip("xz", term.signals, strict=False)]

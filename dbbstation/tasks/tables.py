@@ -237,8 +237,9 @@ class _Reader:
     def __init__(self, files: Sequence[TableFile], asked: TableOptions, unit: str) -> None:
         self._files, self._asked, self._unit = files, asked, unit
         self._notes: list[str] = []
-        self._names = [name for name in files[0].names if all(name in file.names for file in files)]
-        elsewhere = dict.fromkeys(name for file in files for name in file.names if name not in self._names)
+        shared = set(files[0].names).intersection(*(file.names for file in files))
+        self._names = [name for name in files[0].names if name in shared]
+        elsewhere = dict.fromkeys(name for file in files for name in file.names if name not in shared)
         if elsewhere:
             self._notes.append(f"not in every file and left out: {', '.join(elsewhere)}")
 

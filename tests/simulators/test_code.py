@@ -1,5 +1,6 @@
 """Terms as code: what is pasted does what was found."""
 
+import ast
 from types import SimpleNamespace
 
 import numpy as np
@@ -42,3 +43,21 @@ def test_the_code_of_a_term_does_what_the_term_does(term):
         # A curve is written out at 41 places: off by an eighth of their distance squared times its bend.
         close = 2e-2 if term.form is TermForm.CURVE else 1e-9
         assert found == pytest.approx(value(t, signals), abs=close)
+
+
+HOSTILE = 'x"""\nimport os; os.abort()\n"""\\'
+
+
+def test_no_name_that_somebody_gave_becomes_code():
+    """The same statements, whatever the model, the term, the port and the signal are called."""
+
+    def shape(name):
+        term = Term(name, TermForm.LINEAR, (name,), (2.0,))
+        value = SimpleNamespace(value=1.0, uncertainty=0.1, unit=name)
+        finding = SimpleNamespace(name=term.name, verdict="identified", values={name: value})
+        tree = ast.parse(
+            missing_code(SimpleNamespace(model=SimpleNamespace(name=name), terms=(term,), findings=(finding,)))
+        )
+        return [type(node).__name__ for node in ast.walk(tree)]
+
+    assert shape(HOSTILE) == shape("x")

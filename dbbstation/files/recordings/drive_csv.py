@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import io
 import math
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -144,7 +145,8 @@ def _check_names(names: list[str], file: str, line: int, faults: list[Problem]) 
         faults.append(Problem(file, line, 0, f"neither `{FORCE}` nor `{CURRENT}` is there", shown))
     faults.extend(
         Problem(file, line, 0, f"the column `{name}` stands here more than once", "remove one")
-        for name in sorted({name for name in names if names.count(name) > 1})
+        for name, times in sorted(Counter(names).items())
+        if times > 1
     )
 
 

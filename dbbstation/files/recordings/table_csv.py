@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -49,7 +50,9 @@ class TableFile:
 
     def faults_of(self, name: str) -> list[Problem]:
         """Return cells of a column that are neither number nor empty, with lines."""
-        found = []
+        found: list[Problem] = []
+        if np.isfinite(self.values[name]).all():
+            return found
         for line, cell, value in zip(self.lines.tolist(), self.cells[name], self.values[name], strict=True):
             if not np.isfinite(value) and cell.lower() not in NO_NUMBER:
                 what = f"{name} is `{shortened(cell)}`, not a finite number"
@@ -133,11 +136,13 @@ def table_csv(names: Sequence[str], columns: Sequence[Sequence[object]]) -> str:
 def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: int) -> list[Problem]:
     faults = [
         Problem(file, line, 0, f"the column `{name}` stands here more than once", "rename one")
-        for name in sorted({name for name in names if name and names.count(name) > 1})
+        for name, times in sorted(Counter(filter(None, names)).items())
+        if times > 1
     ]
     if "" in names:
         faults.append(Problem(file, line, 0, f"column {names.index('') + 1} has no name", "name it"))
-    faults += [missing_column(name, names, file, line) for name in dict.fromkeys(needed) if name not in names]
+    there = set(names)
+    faults += [missing_column(name, names, file, line) for name in dict.fromkeys(needed) if name not in there]
     return faults
 
 

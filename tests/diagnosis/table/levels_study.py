@@ -1,10 +1,10 @@
 """Tables with an effect and their twins without it: what each of three levels answers, and what is found at the size that is stated.
 
-    python -m tests.diagnosis.table.levels_study --seeds 1,2,3 --out docs/validation/levels.json
+    python -m tests.diagnosis.table.levels_study --seeds 11,12,13,14,15 --out docs/validation/levels.json
 
 Results are kept in the file, and rows that are there are not run again: a study that was interrupted goes on where it stopped. Effects follow
 their variables at once, with a memory, or are concealed by parameters in part. With `injected`, an effect of the size from which the twin's
-answer says that it is found is added to the twin.
+answer says that it is found is added to the twin. With `noise`, tables of a moving axis have ten kinds of noise and no effect.
 """
 
 from __future__ import annotations
@@ -27,9 +27,12 @@ from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.inference.curves import Spline
 from dbbstation.inference.levels import TIME, FollowsAnswer
 from dbbstation.inference.variables import Kind, Variable
+from tests.diagnosis.table.nulls import NOISES, null_table
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from tests.diagnosis.table.nulls import Moving
 
 NOISE_UM = 1.0
 SIZES = (2.0,)
@@ -88,6 +91,36 @@ EFFECTS: dict[str, tuple[str, Effect, frozenset[str]]] = {
 
 SAME = {"simulated_um": "stroke_mm"}
 
+LAWS = {
+    "bend": ("curve over force_kn",),
+    "growth": ("product of stroke_mm and room_c", "linear in room_c"),
+    "play": ("hysteresis of stroke_mm", "hysteresis of simulated_um"),
+    "saturation": ("saturation of force_kn", "curve over force_kn"),
+    "creep": ("memory of force_kn",),
+    "warming": ("memory of pump_bar",),
+    "tank": ("integral of pump_bar",),
+    "sag": ("curve over stroke_mm", "curve over simulated_um"),
+    "column": ("product of stroke_mm and room_c", "linear in room_c"),
+    "load-path": ("curve over force_kn", "dead zone of force_kn"),
+}
+"""Names that are right of each: the law itself, and what contains it. A growth about a temperature beyond the range has a straight line."""
+
+
+def pink(rng: np.random.Generator, axis: Moving) -> NDArray[np.float64]:
+    """Power in proportion to one over the frequency, down to a two-hundredth of a cycle a row."""
+    spectrum = np.fft.rfft(rng.standard_normal(2 * len(axis.t)))
+    frequency = np.maximum(np.fft.rfftfreq(2 * len(axis.t)), 0.005)
+    return np.fft.irfft(spectrum / np.sqrt(frequency))[: len(axis.t)]
+
+
+def hum(rng: np.random.Generator, axis: Moving) -> NDArray[np.float64]:
+    """White noise and mains of as much power, whose phase wanders by a radian in a hundred rows."""
+    phase = 2.0 * np.pi * 0.21 * np.arange(len(axis.t)) + np.cumsum(0.1 * rng.standard_normal(len(axis.t)))
+    return rng.standard_normal(len(axis.t)) + np.sqrt(2.0) * np.sin(phase)
+
+
+NOISES.update({"pink": pink, "hum": hum})
+
 
 def table_of(kind: str, seed: int, size: float) -> Table:
     """Return a table in which one effect of this size is missing, or nothing; the twin has the same motion and noise."""
@@ -131,8 +164,10 @@ def injected(kind: str, seed: int) -> tuple[Table, str, float] | None:
 
 
 def answer(kind: str, seed: int, what: str) -> dict[str, object]:
-    truth, size = EFFECTS[kind][2], 0.0
-    if what == "injected":
+    truth, size = EFFECTS[kind][2] if kind in EFFECTS else frozenset(), 0.0
+    if what == "noise":
+        table = null_table(kind, 20_000 + seed)
+    elif what == "injected":
         made = injected(kind, seed)
         if made is None:
             return {"kind": kind, "seed": seed, "what": what, "differs": "none"}
@@ -143,12 +178,13 @@ def answer(kind: str, seed: int, what: str) -> dict[str, object]:
         table = table_of(kind, seed, size)
         truth = truth if what == "effect" else frozenset()
     began = time.process_time()
-    levels = find_mismatch(table).levels
+    found = find_mismatch(table)
+    levels = found.levels
     located = [one for one in levels.follows if one.answer is FollowsAnswer.FOLLOWS]
     named = [{SAME.get(v, v) for each in one.variables for v in (*each, *one.or_variables)} for one in located]
     return {
         "kind": kind,
-        "group": EFFECTS[kind][0],
+        "group": EFFECTS[kind][0] if kind in EFFECTS else "noise",
         "seed": seed,
         "what": what,
         "size": size,
@@ -157,8 +193,10 @@ def answer(kind: str, seed: int, what: str) -> dict[str, object]:
         "why": levels.differs.why,
         "follows": [one.name for one in located],
         "others": [f"{one.answer}: {one.name}" for one in levels.follows if one not in located],
-        "laws": [one.form.name for one in located if one.form and one.form.name],
-        "right": any(one & truth for one in named),
+        "laws": sorted({name for one in located if one.form for name in one.form.names}),
+        "identified": [one.name for one in found.identified],
+        "wrong_name": any(one.name not in LAWS.get(kind, ()) for one in found.identified) and what != "injected",
+        "right": any(one & truth for one in named) or (TIME in truth and any(one.in_time for one in levels.follows)),
         "wrong": any(not one & (truth | {TIME}) for one in named),
         "correction": levels.correction,
         "seconds": round(time.process_time() - began, 1),
@@ -193,6 +231,10 @@ def figures(rows: list[dict[str, object]]) -> dict[str, list[object]]:
         "effect: right class": rate("effect", lambda r: bool(r["right"])),
         "effect: wrong class": rate("effect", lambda r: bool(r["wrong"])),
         "effect: a law is named": rate("effect", lambda r: bool(r["laws"])),
+        "effect: a wrong name is identified": rate("effect", lambda r: bool(r.get("wrong_name"))),
+        "noise: yes": rate("noise", lambda r: r["differs"] == "yes"),
+        "noise: a class follows": rate("noise", lambda r: bool(r["follows"])),
+        "random walk: no": rate("noise", lambda r: r["kind"] == "walk" and r["differs"] == "no"),
         "injected: yes": rate("injected", lambda r: r["differs"] == "yes"),
         "injected: no": rate("injected", lambda r: r["differs"] == "no"),
     }
@@ -201,9 +243,8 @@ def figures(rows: list[dict[str, object]]) -> dict[str, list[object]]:
 def main() -> None:
     """Run what the file has not, and write it after each table."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--seeds", default="1,2,3")
-    options.add_argument("--kinds", default=",".join(EFFECTS))
-    options.add_argument("--what", default="effect,twin,injected")
+    options.add_argument("--seeds", default="11,12,13")
+    options.add_argument("--what", default="effect,twin,noise,injected")
     options.add_argument("--out", type=Path, required=True)
     chosen = options.parse_args()
     stored = json.loads(chosen.out.read_text(encoding="utf-8")) if chosen.out.exists() else {"tables": []}
@@ -211,7 +252,7 @@ def main() -> None:
     known = {(r["kind"], r["seed"], r["what"]) for r in rows}
     for seed in map(int, chosen.seeds.split(",")):
         for what in chosen.what.split(","):
-            for kind in chosen.kinds.split(","):
+            for kind in NOISES if what == "noise" else EFFECTS:
                 if (kind, seed, what) in known:
                     continue
                 rows.append(answer(kind, seed, what))
@@ -225,12 +266,12 @@ def _stored(rows: list[dict[str, object]], seeds: str) -> dict[str, object]:
     commit = subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip()
     seconds = float(np.median([float(str(row.get("seconds", 0.0))) for row in rows]))
     return {
-        "question": "Do three levels of answer hold on tables with an effect of twice the noise, and on their twins?",
-        "data": f"{len(rows)} tables of a simulated press. Sizes are before fitted parameters take their part.",
-        "command": "python -m tests.diagnosis.table.levels_study --seeds 1,2,3 --out docs/validation/levels.json",
+        "question": "Do three levels of answer hold on tables with an effect of twice the noise, on their twins, and on ten kinds of noise?",
+        "data": f"{len(rows)} tables of a simulated press and a moving axis. Sizes are before fitted parameters take their part.",
+        "command": f"python -m tests.diagnosis.table.levels_study --seeds {seeds} --out docs/validation/levels.json",
         "commit": commit,
         "date": datetime.now(UTC).date().isoformat(),
-        "seed": seeds,
+        "seed": ",".join(sorted({str(row["seed"]) for row in rows}, key=int)),
         "limits": f"A sample: the command goes on where the file ends. Median time {seconds:.1f} s of one processor.",
         "columns": ["tables", "of", "95 % interval"],
         "figures": figures(rows),

@@ -25,6 +25,19 @@ def test_terms_follow_signals_at_their_port():
     )
 
 
+def test_a_signal_that_is_marked_comes_after_others():
+    rng = np.random.default_rng(1)
+    signals = {"joint": {"t": np.arange(60.0), "x": rng.standard_normal(60), "torque": rng.standard_normal(60)}}
+    units = {"x": "m", "torque": "N m"}
+    plain = {one.name: one for one in candidates((SimulatorPort("joint", "N", units),), signals)}
+    port = SimulatorPort("joint", "N", units, results=frozenset({"torque"}))
+    marked = {one.name: one for one in candidates((port,), signals)}
+    for name, one in marked.items():
+        follows = "torque" in one.term.signals
+        assert one.driven == (frozenset({"torque"}) if follows else frozenset())
+        assert plain[name].log_odds - one.log_odds == pytest.approx(np.log(19.0) if follows else 0.0)
+
+
 def test_errors_of_parts_are_pooled_by_rows():
     """Two parts of 10 and 30 rows: root of the mean square over all rows; gains are those of the parts."""
     key = frozenset({"x at joint"})

@@ -38,6 +38,15 @@ def test_a_good_one_has_no_faults(tmp_path):
     assert faults_of(tmp_path) == []
 
 
+def test_a_signal_may_be_a_result(tmp_path):
+    (tmp_path / "mass.py").write_text(PYTHON)
+    marked = "signals: {speed: m/s, torque: {unit: N m, result: true}, angle: {unit: rad}}"
+    (tmp_path / "model.yaml").write_text(YAML.replace("signals: {speed: m/s}", marked))
+    port = parse_simulator(tmp_path / "model.yaml", []).ports["push"]
+    assert port.units == {"speed": "m/s", "torque": "N m", "angle": "rad"}
+    assert port.results == {"torque"}
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "said"),
     [
@@ -47,6 +56,7 @@ def test_a_good_one_has_no_faults(tmp_path):
         ("uncertainty: 1", "uncertainty: -1", 7, "uncertainty"),
         ("ports:", "portz:", 10, "portz"),
         ("mass: {value", "7mass: {value", 7, "7mass"),
+        ("{speed: m/s}", "{speed: {unit: m/s, reslt: true}}", 11, "reslt"),
     ],
 )
 def test_what_is_wrong_in_the_file_is_said_with_its_line(tmp_path, old, new, line, said):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -84,6 +84,10 @@ class HeldOutError:
     def after(self) -> float:
         """Return the choice's error over all parts."""
         return self._all([fold.after for fold in self.folds])
+
+    def corrected(self, after: Sequence[float]) -> HeldOutError:
+        """Return the same with other errors of the corrected parts."""
+        return replace(self, folds=tuple(replace(fold, after=one) for fold, one in zip(self.folds, after, strict=True)))
 
     @property
     def is_worse(self) -> bool:

@@ -275,6 +275,9 @@ class PartGains(Protocol):
     def of(self, wanted: Collection[str] | None) -> ClassGain:
         """Return the gain of everything over some variables; None: everything."""
 
+    def errors_with(self, wanted: Collection[str]) -> list[float]:
+        """Return the rms error of each part with what follows some variables alone; none: with everything."""
+
 
 @dataclass(frozen=True, eq=False)
 class ChosenWithoutParts:
@@ -294,6 +297,18 @@ class ChosenWithoutParts:
     def of(self, wanted: Collection[str] | None) -> ClassGain:
         """Return the gain of everything over some variables; None: everything."""
         return gain_of(self.parts, wanted)
+
+    def errors_with(self, wanted: Collection[str]) -> list[float]:
+        """Return the rms error of each part with what follows some variables alone; none: with everything."""
+        left = [left_with(part.settled, wanted)[part.rows] for part in self.parts]
+        return [float(np.sqrt(np.mean(np.square(rows)))) for rows in left]
+
+
+def left_with(one: Settled, wanted: Collection[str]) -> NDArray[np.float64]:
+    """Return the residual beside what follows some variables alone, refitted with the base, shape (n,); none: beside everything."""
+    follow = _follow(one)
+    rest = [name for name in one.best.names if wanted and not follow(name) & set(wanted)]
+    return _left_without(one, rest) if rest else one.channel.residual - one.predicted()
 
 
 def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None) -> ClassGain:

@@ -36,8 +36,9 @@ def law_form(settled: Settled, one: VariableClass, parts: Sequence[NDArray[np.bo
     where it beats each other candidate, and nothing, by the odds at which something is sure, without its best part. Where a sum of several
     is best, each of these is asked in its own place, beside the others.
 
-    A candidate that contains the law, as a curve contains a straight line, predicts parts about as well, and is no rival of the simpler
-    one. Unless the evidence of all rows refutes it, which counts what more amplitudes cost, it is listed beside the name.
+    A candidate that contains the law, as a curve contains a straight line, predicts parts about as well as
+    the simpler one. The evidence of all rows, which counts what more amplitudes cost, may refute it, and any other with more amplitudes.
+    Otherwise the first is listed beside the name, and the other leaves the law open.
 
     Args:
         settled: what the comparison came to.
@@ -64,13 +65,17 @@ def _place(
     order = sorted(totals, key=lambda name: -totals[name])
     alive = [name for name in order if not _is_worse(scores[order[0]], scores[name], parts)]
     best = max(alive, key=lambda name: worth[name])
-    not_worse, same = [], []
+    not_worse, same = list[str](), list[str]()
     for name in order:
         if name == best or _is_worse(scores[best], scores[name], parts):
             continue
-        if not _contains(settled, candidates[name], candidates[best], others):
-            not_worse.append(name)
-        elif worth[best] - worth[name] < SURELY or _contains(settled, candidates[best], candidates[name], others):
+        contains = _contains(settled, candidates[name], candidates[best], others)
+        refuted = worth[best] - worth[name] >= SURELY and (
+            contains or _count(candidates[name]) > _count(candidates[best])
+        )
+        if not refuted:
+            (same if contains else not_worse).append(name)
+        elif contains and _contains(settled, candidates[best], candidates[name], others):
             same.append(name)
     pattern = settled.bank.patterns.get(best)
     picked = pattern is not None and pattern.family in LOOKED_FOR
@@ -158,6 +163,11 @@ def _contains(settled: Settled, one: Sequence[Member], other: Sequence[Member], 
         float(np.sum(np.square(_left(effect, np.hstack([beside, form]))))) <= (1.0 - EQUIVALENT**2) * left
         for form in forms
     )
+
+
+def _count(members: Sequence[Member]) -> int:
+    """Amplitudes."""
+    return sum(len(member.variant.columns) for member in members)
 
 
 def _left(effect: NDArray[np.float64], by: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -174,6 +174,16 @@ class Levels:
     follows: tuple[Followed, ...]
     correction: bool | None
 
+    @property
+    def corrects(self) -> frozenset[str]:
+        """Variables of the classes that a correction is made of; none: it is made of everything."""
+        every = [one for one in self.follows if one.answer in CORRECTS]
+        own = frozenset(name for one in every for names in one.variables for name in names)
+        return own | {name for one in every for name in one.or_variables if name != TIME}
+
+
+CORRECTS = (FollowsAnswer.FOLLOWS, FollowsAnswer.GOES_ON, FollowsAnswer.NOT_TESTED)
+"""Answers of classes that a correction is made of: what happened, or predicts nothing, is true of these rows alone."""
 
 SAYS_YES = (FollowsAnswer.FOLLOWS, FollowsAnswer.GOES_ON, FollowsAnswer.HAPPENED)
 

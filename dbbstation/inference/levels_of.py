@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,10 +71,11 @@ def levels_of(
         _doubts(settled, left, sizes, size),
         (size, matters is not None, samples, sizes),
     )
-    correction = False if worse and held_out is None and settled.best.members else None
-    if held_out is not None and settled.best.members:
-        correction = held_out.after < held_out.as_simulated
-    return Levels(differs, classes, correction)
+    levels = Levels(differs, classes, False if worse and held_out is None and settled.best.members else None)
+    if held_out is None or parts is None or not settled.best.members:
+        return levels
+    corrected = held_out.corrected(parts.errors_with(levels.corrects))
+    return replace(levels, correction=corrected.after < corrected.as_simulated)
 
 
 def _doubts(settled: Settled, left: LeftOver, sizes: tuple[Detectable, ...], matters: float) -> tuple[str, ...]:

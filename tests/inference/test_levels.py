@@ -319,3 +319,21 @@ def test_a_torque_carries_the_difference_and_a_temperature_does_not(rng):
     )
     assert {name for name, one in variables.items() if may_result(one, whole)} == {"torque"}
     assert not may_result(variables["torque"], replace(whole, time=None))
+
+
+def test_a_correction_is_made_of_what_follows(both):
+    """A play that follows beside a step in time: refits by least squares with the play alone."""
+    data, settled, parts = both
+    levels = levels_of(settled, left_over(settled), None, None)
+    happened = [replace(one, answer=FollowsAnswer.HAPPENED) if one.name == "angle" else one for one in levels.follows]
+    assert levels.corrects == {"q", "angle"}
+    assert replace(levels, follows=tuple(happened)).corrects == {"q"}
+    assert replace(levels, follows=()).corrects == frozenset()
+    expected = [np.sqrt(squares(data.residual, [direction(data.q)], part.rows) / part.rows.sum()) for part in parts]
+    chosen = ChosenWithoutParts(parts)
+    assert chosen.errors_with({"q"}) == pytest.approx(expected, rel=0.02)
+    every = [
+        float(np.std(part.settled.channel.residual[part.rows] - part.settled.predicted()[part.rows])) for part in parts
+    ]
+    assert chosen.errors_with(()) == pytest.approx(every, rel=0.05)
+    assert np.mean(chosen.errors_with(())) < np.mean(chosen.errors_with({"q"}))

@@ -14,7 +14,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.blocks import compress, with_random
 from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.folds import held_out_error, parts_of
-from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, followed_by, share_of
+from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, followed_by, left_with, share_of
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
@@ -177,6 +177,11 @@ class Mismatch:
         return self.settled.predicted()
 
     @property
+    def correction(self) -> NDArray[np.float64]:
+        """What follows variables, base parameters included, over all rows, shape (n,)."""
+        return self.settled.channel.residual - left_with(self.settled, self.levels.corrects)
+
+    @property
     def rms_before(self) -> float:
         """Return the rms beyond base parameters, in the table's unit."""
         base = self.settled.channel.base.samples @ np.array([f.before.value for f in self.fitted])
@@ -241,6 +246,8 @@ def _found(
     left = left_over(settled)
     parts = ChosenWithoutParts(chosen) if hold_out else None
     levels = levels_of(settled, left, parts, held_out, matters, worse=is_worse_here)
+    if held_out is not None and parts is not None and settled.best.members:
+        held_out = held_out.corrected(parts.errors_with(levels.corrects))
     findings = read_off(settled, Trial(held_out, refits, is_worse_here=is_worse_here), levels)
     return Mismatch(
         table=table,

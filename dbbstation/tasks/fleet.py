@@ -218,9 +218,10 @@ def _once(sessions: Iterator[_Named], telling: Telling) -> list[_Named]:
 
 
 def _plain(options: FleetOptions) -> dict[str, object]:
-    """Return options that decide results: settings by their tolerances."""
+    """Return options that decide results: settings by their tolerances, and where a report says that they stand."""
     data = {key: value for key, value in vars(options).items() if key not in {"source_files", "settings"}}
-    return {**data, "tolerances": [asdict(one) for one in options.settings.tolerances]}
+    settings = options.settings
+    return {**data, "tolerances": [asdict(one) for one in settings.tolerances], "from": settings.tolerances_from}
 
 
 def _taken(one: _Named, kept: FleetFolder, key: str, result: Worked | Ended) -> _Outcome:

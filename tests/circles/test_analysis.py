@@ -164,6 +164,15 @@ def test_readings_that_come_in_steps():
     assert one.noise.sigma_um >= 1.0 / np.sqrt(12.0)
 
 
+def test_two_readings_by_turns_show_their_step():
+    """The coarsest gauge that shows a step: a form within one of its steps."""
+    raw = measured(lambda theta: 12.0 * np.cos(2 * theta))
+    one = analyse(replace(raw, length_mm=np.where(raw.length_mm > 150.0, 150.01, 150.0)))
+    assert one.noise.resolution_um == pytest.approx(10.0)
+    held = analyse(replace(raw, length_mm=np.where(PHI < -1.0, 150.01, 150.0)))
+    assert held.noise.resolution_um == 0.0
+
+
 def whole_run(form_um, circle=CCW, drift_um_per_turn=0.0):
     """A recording with feed-in, overshoot and feed-out at 100 Hz."""
     rate, out_s = 100.0, 1.0

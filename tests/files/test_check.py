@@ -140,3 +140,14 @@ def test_samples_that_a_run_lost_are_named(capsys, tmp_path: Path) -> None:
     assert err.count("samples were lost") == 1
     assert "a-ccw-1.csv: 20 of 400 samples were lost (5 %), more than the 0.5 % that the plan allows" in err
     assert run(capsys, path)[1].endswith("run: 380 samples in 39.9 s, 20 lost\n")
+
+
+def test_readings_that_no_bar_has_are_told_of_the_whole_file(capsys, tmp_path: Path) -> None:
+    """A deviation in place of the length: the sample stands in the text, as its line does not depend on the format."""
+    rows = [f"{0.1 * k:.1f},{150.0 if k < 40 else 0.25}" for k in range(60)]
+    bad = tmp_path / "run.csv"
+    bad.write_text("\n".join(["t_s,length_mm", *rows, ""]))
+    code, _, err = run(capsys, bad)
+    assert code == 1
+    assert err.startswith(f"{bad}: length_mm is 0.25 in sample 41, expected ")
+    assert "; 19 more are so" in err

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files import keys
+from dbbstation.files.formats.settings import Settings
 from dbbstation.files.formats.simulator import parse_simulator
 from dbbstation.files.keys import key_of
 from dbbstation.history.trend import TrendOptions
+from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.service.worked_out import counted
 from dbbstation.simulators.loading import LoadedSimulator
+from dbbstation.tasks import fleet as fleet_module
+from dbbstation.tasks.fleet_work import FleetOptions
 from dbbstation.tasks.history import history
+from dbbstation.tasks.telling import StoppedError
 from tests.simulators.test_program import PROGRAM, YAML
 
 SMALL = Path("fixtures/sessions/small").absolute()
@@ -81,6 +87,70 @@ def test_a_history_reads_a_session_again_whose_files_changed(session, name, monk
             read()
     else:
         assert (read(), read()) == (1, 0)
+
+
+def test_a_history_reads_a_model_again_that_changed_or_whose_causes_did(session, monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    own = Path(shutil.copy("fixtures/sources/scale_bow.py", tmp_path / "own.py"))
+    model = Path(shutil.copy("fixtures/models/small.yaml", session.parent / "model.yaml"))
+
+    def read() -> int:
+        return history(session.parent, TrendOptions(coverage_factor=2.0), source_files=[own]).worked_out
+
+    assert (read(), read()) == (2, 0)
+    for path in (model, own):
+        with path.open("a", encoding="utf-8") as file:
+            file.write("\n# another\n")
+        assert (read(), read()) == (1, 0)
+
+
+def fleet_key(session: Path, task: str, options: FleetOptions, monkeypatch: pytest.MonkeyPatch) -> str:
+    """By what the result of a session would be known; nothing is done."""
+    known: list[str] = []
+
+    def noted(request: dict[str, object], inputs: list[tuple[str, str]]) -> str:
+        known.append(key_of(request, inputs))
+        return known[-1]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(fleet_module, "key_of", noted)
+        with pytest.raises(StoppedError):
+            fleet_module.fleet(
+                [session.parent], task, session.parent.parent / "out", options=options, stop=lambda: True
+            )
+    return " ".join(known)  # none where a file of the session is not as the session says: nothing is done with it
+
+
+@pytest.mark.parametrize("name", DECIDING)
+def test_a_result_of_a_fleet_is_of_all_files_of_its_session(session, name, monkeypatch):
+    before = fleet_key(session, "circles", FleetOptions(), monkeypatch)
+    assert fleet_key(session, "circles", FleetOptions(), monkeypatch) == before
+    with (session / name).open("a", encoding="utf-8") as file:  # the first line of the session names its format
+        file.write("# another\n")
+    assert fleet_key(session, "circles", FleetOptions(), monkeypatch) != before
+
+
+def test_a_result_of_a_fleet_is_of_its_task_and_of_every_option(session, monkeypatch, tmp_path):
+    own = Path(shutil.copy("fixtures/sources/scale_bow.py", tmp_path / "own.py"))
+    others = {
+        "sources": ("base-joints",),
+        "method": "ball",
+        "law_over_time": True,
+        "findings": True,
+        "tests": ("a",),
+        "exclude": ("b",),
+        "source_files": (own,),
+        "settings": Settings(tolerances_from="shop.yaml:3"),
+    }
+    assert {field.name for field in fields(FleetOptions)} == set(others)
+    found = [fleet_key(session, task, FleetOptions(), monkeypatch) for task in ("circles", "calibrate")]
+    limit = Settings(tolerances=(Tolerance(CircleFigure.CIRCULAR_DEVIATION, 20.0),))
+    found.append(fleet_key(session, "circles", FleetOptions(settings=limit), monkeypatch))
+    for name, other in others.items():
+        found.append(fleet_key(session, "circles", replace(FleetOptions(), **{name: other}), monkeypatch))
+    change(own)
+    found.append(fleet_key(session, "circles", FleetOptions(source_files=(own,)), monkeypatch))
+    assert len(set(found)) == len(found)
 
 
 @pytest.fixture

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
+from dbbstation.circles.analysis import analyse
 from dbbstation.quality.copied import copied
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.knowledge import seen
@@ -76,6 +78,23 @@ def test_chance_makes_no_copy_of_equal_forms(whole, step_um):
         runs.append(replace(one, analysis=replace(one.analysis, raw=raw)))
     for each in runs:
         assert copied(each, [other for other in runs if other is not each]).verdict is FindingVerdict.GOOD
+
+
+@pytest.mark.parametrize(("noise_um", "step_um"), [(1.0, 0.1), (0.5, 0.2)])
+def test_as_many_equal_readings_are_allowed_as_chance_makes(whole, noise_um, step_um):
+    """The likeliest reading of a normal noise comes with the probability 2 Phi(step / 2 sigma) - 1; the noise is known to some percent."""
+    one = run(whole, "a ccw 1")
+    runs = []
+    for seed in range(2):
+        readings = 150.0 + 1e-3 * np.random.default_rng(seed).normal(0.0, noise_um, len(one.run.recording))
+        length = 1e-3 * step_um * np.round(1e3 * readings / step_um)
+        raw = replace(one.analysis.raw, length_mm=length[: len(one.analysis.raw)])
+        runs.append(replace(one, analysis=analyse(raw)))
+    count = len(runs[0].analysis.raw)
+    chance = 2.0 * ndtr(0.5 * step_um / noise_um) - 1.0
+    in_a_row = np.log(count**2 / 1e-9) / -np.log(chance)
+    allowed = copied(runs[0], runs[1:]).limit * count / 100.0
+    assert in_a_row <= allowed <= 1.3 * in_a_row + 1.0
 
 
 def test_a_copy_that_was_moved_is_another_matter(whole):

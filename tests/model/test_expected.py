@@ -1,0 +1,44 @@
+"""Where a circle should lie: on machines that are moved as rigid bodies, by plane geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbbstation.model.expected import SECTORS, expected_circle
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.model.observation import Observation
+from dbbstation.plan.circle import Circle, Direction
+from dbbstation.sources.contract import Fitted, Setup
+from dbbstation.sources.registry import known_sources
+from dbbstation.trace.circle import RawCircle
+
+KNOWN = known_sources()
+
+
+def observed(elevation_deg: float, direction: Direction) -> Observation:
+    place = (20.0, -30.0, -1008.0)
+    centre = (*place[:2], place[2] + 150.0 * float(np.sin(np.radians(elevation_deg))))
+    circle = Circle(place, centre, 150, (0, 0, 0), 1000, 40.0, 45, 1.5, elevation_deg, direction)
+    phi_deg = (np.arange(SECTORS) + 0.5) * 360.0 / SECTORS
+    raw = RawCircle("", circle, phi_deg / circle.turning_deg_s, phi_deg, np.full(SECTORS, circle.bar_mm))
+    return Observation("a", 1, raw, Setup("s", "m", "b", "i", np.array(place), 0.0, 0.0, 0.0), started_s=0.0)
+
+
+@pytest.mark.parametrize("direction", list(Direction))
+@pytest.mark.parametrize("elevation_deg", [0.0, 50.0])
+def test_all_base_joints_moved_move_the_circle(reference, elevation_deg: float, direction: Direction) -> None:
+    """Base joints that stand by a vector elsewhere take the platform with them; a raised bar sees it by cos e, and says so."""
+    moved = np.tile([0.08, -0.05, 0.0], 6)
+    model = MachineModel(reference, (Fitted(KNOWN["base-joints"], moved),))
+    expected = expected_circle(observed(elevation_deg, direction), model, [])
+    assert expected.centre_mm == pytest.approx([0.08, -0.05], abs=1e-4)  # (0.09 mm)² / 300 mm is the second order
+    assert expected.radial_mm == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("elevation_deg", [0.0, 50.0])
+def test_all_base_joints_raised_are_read_by_the_sine_of_the_bar(reference, elevation_deg: float) -> None:
+    model = MachineModel(reference, (Fitted(KNOWN["base-joints"], np.tile([0.0, 0.0, 0.1], 6)),))
+    expected = expected_circle(observed(elevation_deg, Direction.CCW), model, [])
+    assert expected.centre_mm == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert expected.radial_mm == pytest.approx(0.1 * np.sin(np.radians(elevation_deg)), abs=1e-4)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,8 +20,7 @@ if TYPE_CHECKING:
     from dbbstation.errors import Problem
     from dbbstation.files.checking import Checked
     from dbbstation.nc.circle_program import Approach
-    from dbbstation.results.checked import CheckedFile, CheckResult
-    from dbbstation.results.sampling import SampledCircle
+    from dbbstation.results.checked import CheckedFile, CheckResult, DryRunResult, SampledPlanResult
     from dbbstation.sources.contract import ErrorSource
 
 
@@ -147,14 +145,17 @@ def _hold_against(results: Sequence[Checked], anchor: str | None) -> None:
 
 
 def _result(
-    results: Sequence[Checked], runs: Sequence[DryRun], seen: Sequence[SampledPlan], problems: Sequence[Problem]
+    results: Sequence[Checked],
+    runs: Sequence[DryRunResult],
+    seen: Sequence[SampledPlanResult],
+    problems: Sequence[Problem],
 ) -> CheckResult:
-    from dbbstation.results.checked import CheckResult, DryRunResult, SampledPlanResult
+    from dbbstation.results.checked import CheckResult
 
     return CheckResult(
         files=tuple(_file(result) for result in results),
-        dry_runs=tuple(DryRunResult(str(r.plan), str(r.machine), r.programs, not r.problems) for r in runs),
-        sampling=tuple(SampledPlanResult(str(one.plan), one.circles) for one in seen),
+        dry_runs=tuple(runs),
+        sampling=tuple(seen),
         problems=tuple(problems),
         warnings=tuple(warning for result in results for warning in result.warnings),
     )
@@ -167,7 +168,7 @@ def _file(result: Checked) -> CheckedFile:
     return CheckedFile(str(result.path), result.kind, not result.problems, result.summary, runs or None)
 
 
-def _print(results: Sequence[Checked], runs: Sequence[DryRun]) -> None:
+def _print(results: Sequence[Checked], runs: Sequence[DryRunResult]) -> None:
     """Print sound files and notes; faults become the command's error."""
     from dbbstation.cli.output import say
 
@@ -181,34 +182,17 @@ def _print(results: Sequence[Checked], runs: Sequence[DryRun]) -> None:
             echo(f"ok  {run.plan} on {run.machine}  dry run: {run.programs} programs within travel and feeds")
 
 
-@dataclass(frozen=True)
-class DryRun:
-    """A trial of a plan's programs."""
-
-    plan: Path
-    machine: Path
-    programs: int
-    problems: list[Problem]
-
-
-@dataclass(frozen=True)
-class SampledPlan:
-    """What an instrument sees of a plan."""
-
-    plan: Path
-    circles: tuple[SampledCircle, ...]
-    notes: list[str]
-
-
-def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[SampledPlan]:
+def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[SampledPlanResult]:
     from dbbstation.cli.sampling import sampled_circles, sampling_notes
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.instrument.library import load_instrument
+    from dbbstation.results.checked import SampledPlanResult
 
     protocol = load_instrument(instrument, profile)
     read = [(file, read_plan(file)) for file in plans]
     return [
-        SampledPlan(file, sampled_circles(plan, protocol), list(sampling_notes(plan, protocol))) for file, plan in read
+        SampledPlanResult(str(file), sampled_circles(plan, protocol), tuple(sampling_notes(plan, protocol)))
+        for file, plan in read
     ]
 
 
@@ -253,20 +237,23 @@ def _dry_run(
     exclude: tuple[str, ...],
     step_deg: float,
     approach: Approach | None,
-) -> DryRun:
+) -> DryRunResult:
     from dbbstation.cli.progress import count_bar
     from dbbstation.errors import Problem
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.nc.export import dry_run
+    from dbbstation.results.checked import DryRunResult
 
     plan, machine = read_plan(plan_file), read_machine(machine_file)
     chosen = chosen_of(plan.name, plan.tests, tests, exclude)
     with count_bar("programs") as trying:
         count, faults = dry_run(plan, machine, tests=chosen, step_deg=step_deg, approach=approach, progress=trying)
     on = f"on {machine_file}: "
-    problems = [Problem(str(plan_file), 0, 0, f"{on}{fault.where}: {fault.what}", fault.remedy) for fault in faults]
-    return DryRun(plan_file, machine_file, count, problems)
+    problems = tuple(
+        Problem(str(plan_file), 0, 0, f"{on}{fault.where}: {fault.what}", fault.remedy) for fault in faults
+    )
+    return DryRunResult(str(plan_file), str(machine_file), count, not problems, problems)
 
 
 def _print_schema(name: str) -> None:

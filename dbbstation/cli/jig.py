@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dbbstation.files.formats.jig import JigFile
-    from dbbstation.plan.repeatability import Repeatability
+    from dbbstation.plan.repeatability import HolderResult
 
 _UNITS = ("mm", "µm", "um", "m", "inch", "mil", "µinch")
 _SHEET = click.argument("sheet", type=click.Path(path_type=Path), metavar="SHEET")
@@ -183,7 +183,7 @@ def holders(
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.files.recordings.cmm_sheet import read_sheet
     from dbbstation.plan.repeatability import repeatability
-    from dbbstation.results.jig import HoldersResult, holder_result
+    from dbbstation.results.jig import HoldersResult
 
     if (before is None) != (out is None):
         raise click.UsageError(
@@ -192,7 +192,7 @@ def holders(
     if out is not None:
         refuse_existing_table(out, force=force)
     rows = read_sheet(sheet, _pairs(columns, "--column", _WHAT), _micro(unit), 1.0, of_one_holder=True)
-    found: dict[str, Repeatability] = {}
+    found: dict[str, HolderResult] = {}
     try:
         for name, places in _by_holder(rows, holder, sheet).items():
             found[name] = repeatability(places, cmm_repeatability_um)
@@ -203,15 +203,14 @@ def holders(
     if before is not None and out is not None:
         _write_holders(found, before, out, sheet, force=force)
     if as_json:
-        told = {name: holder_result(one) for name, one in found.items()}
-        print_result(HoldersResult(told, None if out is None else str(out)))
+        print_result(HoldersResult(found, None if out is None else str(out)))
         return
     _print_holders(found)
     if out is not None:
         echo(f"holders written to {out}")
 
 
-def _write_holders(found: Mapping[str, Repeatability], before: Path, out: Path, sheet: Path, *, force: bool) -> None:
+def _write_holders(found: Mapping[str, HolderResult], before: Path, out: Path, sheet: Path, *, force: bool) -> None:
     """Write a jig file with new values of its holders.
 
     Raises:
@@ -234,21 +233,21 @@ def _write_holders(found: Mapping[str, Repeatability], before: Path, out: Path, 
     write_table(out, jig_text(new), provenance(), force=force)
 
 
-def _print_holders(found: Mapping[str, Repeatability]) -> None:
+def _print_holders(found: Mapping[str, HolderResult]) -> None:
     from dbbstation.cli.output import print_table
     from dbbstation.plan.repeatability import UNLIKE_AXES
 
     lines: list[list[object]] = []
     for name, one in found.items():
-        axes = ", ".join(f"{scatter.s_um:.2f}" for scatter in one.axes)
+        axes = ", ".join(f"{scatter.s_um:.2f}" for scatter in one.axes.values())
         interval = f"{one.together.low_um:.2f} to {one.together.high_um:.2f}"
         distance = f"{one.rms_distance_um:.2f}"
         lines.append([name, one.places, one.mountings, axes, f"{one.together.s_um:.2f}", interval, distance])
     titles = ["holder", "places", "mountings", "s of x, y, z [µm]", "s per axis [µm]", "95 %", "rms distance [µm]"]
     print_table(titles, lines)
     for name, one in found.items():
-        if one.axes_differ < UNLIKE_AXES:
-            echo(f"{name}: the axes scatter differently (p = {one.axes_differ:.2g}); a jig file has one value for all")
+        if one.p_axes_alike < UNLIKE_AXES:
+            echo(f"{name}: the axes scatter differently (p = {one.p_axes_alike:.2g}); a jig file has one value for all")
 
 
 def _micro(unit: str | None) -> str | None:

@@ -45,9 +45,8 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
       dbbstation session list 2026-11-20-hexapod-7 --json
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_result, print_table
-    from dbbstation.facts.serialise import read_plain
     from dbbstation.files.recordings.session import read_session
-    from dbbstation.results.sessions import ListedRun, ListedSession, SampleCounts
+    from dbbstation.results.sessions import ListedRun, ListedSession
     from dbbstation.text.counting import repeats_in_order
 
     read = read_session(folder)
@@ -63,7 +62,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
                 started=None if run.started is None else run.started.isoformat(),
                 state=run.state.value,
                 reason=run.reason or None,
-                counts=None if run.counts is None else read_plain(SampleCounts, run.counts.data()),
+                counts=run.counts,
                 file=run.path.relative_to(read.folder).as_posix(),
             )
             for run in repeats_in_order(read.runs)

@@ -7,6 +7,7 @@ chi-square [GUM E.4.3].
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -30,44 +31,48 @@ FEWEST = 2
 
 
 @dataclass(frozen=True)
-class Scatter:
-    """A standard deviation with its freedom."""
+class HolderScatter:
+    """A standard deviation with its interval.
+
+    Attributes:
+        standard_uncertainty_um: s / sqrt(2 f) [GUM E.4.3].
+    """
 
     s_um: float
     low_um: float
     high_um: float
-    freedom: int
-
-    @property
-    def u_um(self) -> float:
-        """Return the estimate's standard uncertainty, s / sqrt(2 f) [GUM E.4.3] [µm]."""
-        return self.s_um / math.sqrt(2.0 * self.freedom)
+    standard_uncertainty_um: float
+    degrees_of_freedom: int
 
 
 @dataclass(frozen=True)
-class Repeatability:
-    """Scatter of a holder.
+class HolderResult:
+    """A holder's repeatability.
 
     Attributes:
+        repeatability_um: standard deviation per axis, as in a jig file.
+        together: of all coordinates.
         axes: x, y and, if measured, z.
-        together: of all coordinates, for a holder file: one standard deviation per axis.
+        level: probability of the intervals.
         rms_distance_um: from the mean place; estimates sigma sqrt(number of axes).
         mean_distance_um: corrected for the estimated mean place.
-        axes_differ: probability of so large a variance ratio for equal axes.
+        p_axes_alike: probability of so large a ratio of variances for equal axes.
         of_cmm_um: subtracted standard deviation of the CMM.
     """
 
-    axes: tuple[Scatter, ...]
-    together: Scatter
+    repeatability_um: float
+    together: HolderScatter
+    axes: Mapping[str, HolderScatter]
+    level: float
     rms_distance_um: float
     mean_distance_um: float
     places: int
     mountings: int
-    axes_differ: float
-    of_cmm_um: float = 0.0
+    p_axes_alike: float
+    of_cmm_um: float
 
 
-def repeatability(places_um: Sequence[NDArray[np.float64]], cmm_um: float = 0.0, level: float = LEVEL) -> Repeatability:
+def repeatability(places_um: Sequence[NDArray[np.float64]], cmm_um: float = 0.0, level: float = LEVEL) -> HolderResult:
     """Return a holder's repeatability.
 
     Args:
@@ -84,23 +89,25 @@ def repeatability(places_um: Sequence[NDArray[np.float64]], cmm_um: float = 0.0,
     off = [place - place.mean(axis=0) for place in several]
     squares = np.sum([np.sum(one**2, axis=0) for one in off], axis=0)
     freedom = sum(len(one) - 1 for one in off)
-    axes = tuple(scatter(float(total), freedom, cmm_um, level) for total in squares)
+    axes = [scatter(float(total), freedom, cmm_um, level) for total in squares]
     together = scatter(float(squares.sum()), freedom * len(squares), cmm_um, level)
     # Distances from the mean of the mountings themselves are too small by sqrt((n - 1) / n).
     distances = np.concatenate([np.linalg.norm(one, axis=1) * math.sqrt(len(one) / (len(one) - 1)) for one in off])
-    return Repeatability(
-        axes=axes,
+    return HolderResult(
+        repeatability_um=together.s_um,
         together=together,
+        axes=dict(zip("xyz", axes, strict=False)),
+        level=level,
         rms_distance_um=math.sqrt(float(squares.sum()) / freedom),
         mean_distance_um=float(distances.mean()),
         places=len(several),
         mountings=len(distances),
-        axes_differ=_axes_differ(squares, freedom),
+        p_axes_alike=_axes_differ(squares, freedom),
         of_cmm_um=cmm_um,
     )
 
 
-def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float = LEVEL) -> Scatter:
+def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float = LEVEL) -> HolderScatter:
     """Return the standard deviation of a sum of squares, with chi-square interval.
 
     Args:
@@ -114,7 +121,7 @@ def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float 
         squares_um2 / float(chi2.ppf(tail, freedom)),
     )
     s_um, low_um, high_um = (math.sqrt(max(one - cmm_um**2, 0.0)) for one in variances)
-    return Scatter(s_um, low_um, high_um, freedom)
+    return HolderScatter(s_um, low_um, high_um, s_um / math.sqrt(2.0 * freedom), freedom)
 
 
 def _axes_differ(squares: NDArray[np.float64], freedom: int) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from dbbstation.errors import Problem
-from dbbstation.facts.serialise import Absent
+from dbbstation.facts.serialise import Absent, Kept
 from dbbstation.quality.finding import Finding
 from dbbstation.results.sampling import SampledCircle
 
@@ -43,6 +43,7 @@ class DryRunResult:
     machine: str
     programs: int
     ok: bool
+    problems: Annotated[tuple[Problem, ...], Kept]
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class SampledPlanResult:
 
     plan: str
     circles: tuple[SampledCircle, ...]
+    notes: Annotated[tuple[str, ...], Kept]
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Annotated
 from dbbstation.circles.budget import Budget
 from dbbstation.circles.quick_look import Symptom
 from dbbstation.circles.reversals import Harmonic, ReversalStep
+from dbbstation.facts.run import OfRunInSession
 from dbbstation.facts.serialise import Absent
 from dbbstation.quality.finding import Finding
 
@@ -53,17 +54,13 @@ class NoiseFigures:
 
 
 @dataclass(frozen=True)
-class RunWithoutCircle:
+class RunWithoutCircle(OfRunInSession):
     """A run without circle.
 
     Attributes:
         findings: absent if not asked for.
     """
 
-    session: str
-    test: str
-    direction: str
-    repeat: int
     problem: str | None
     findings: Annotated[tuple[Finding, ...] | None, Absent] = None
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dbbstation.calibration.reporting.evaluation import CircleDeviations
+from dbbstation.facts.held import ReportVerdict
 from dbbstation.facts.value import Value
 from dbbstation.results.diagnosis import BeforeAfter
-from dbbstation.results.report import ReportVerdict
 
 
 @dataclass(frozen=True)

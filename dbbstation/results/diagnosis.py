@@ -9,6 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from dbbstation.calibration.outliers.outlier import Outlier
+from dbbstation.facts.run import OfRun
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
@@ -28,12 +29,9 @@ class BeforeAfter:
 
 
 @dataclass(frozen=True)
-class CircularityLeft:
+class CircularityLeft(OfRun):
     """Residual circularity of one run [µm]."""
 
-    test: str
-    direction: str
-    repeat: int
     before: float
     after: float
 

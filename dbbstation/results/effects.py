@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.facts.run import OfRun
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -12,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CuredRun:
+class CuredRun(OfRun):
     """One run with and without a cause; G up to 30 undulations per revolution.
 
     Attributes:
@@ -21,9 +23,6 @@ class CuredRun:
         measured_centre_um: less the commanded one, X and Y.
     """
 
-    test: str
-    direction: str
-    repeat: int
     g_um: float
     centre_um: tuple[float, ...]
     measured_g_um: float

@@ -5,21 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from dbbstation.facts.run import OfRun
 from dbbstation.facts.serialise import Absent
 from dbbstation.quality.finding import Finding
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecordedRun:
+class RecordedRun(OfRun):
     """A run of the session.
 
     Attributes:
         mounting: of the ball; None if not counted.
     """
 
-    test: str
-    direction: str
-    repeat: int
     mounting: int | None
     state: str
     file: str

@@ -4,18 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.facts.held import ComparedTolerance, HeldTolerance, ToleranceOfTest, WorstCircle
 from dbbstation.plan.tolerance import OF_A_MODEL
 from dbbstation.quality.conformity import Conformity
-from dbbstation.results.report import (
-    ComparedTolerance,
-    HeldTolerance,
-    MeanAndLargest,
-    MeasuredFigures,
-    MeasuredMean,
-    MeasuredSize,
-    ToleranceOfTest,
-    WorstCircle,
-)
+from dbbstation.results.report import MeanAndLargest, MeasuredFigures, MeasuredMean, MeasuredSize
 from dbbstation.results.tolerances import filter_words, held_against
 from dbbstation.text.digits import expanded_uncertainty
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dbbstation.facts.run import OfRunInSession
 from dbbstation.results.circle_figures import PlaneVector
 
 
 @dataclass(frozen=True)
-class DrawnCircle:
+class DrawnCircle(OfRunInSession):
     """A drawn run.
 
     Attributes:
@@ -16,10 +17,6 @@ class DrawnCircle:
         centre_um: least-squares less commanded centre.
     """
 
-    session: str
-    test: str
-    direction: str
-    repeat: int
     g_um: float
     u_g_um: float | None
     centre_um: PlaneVector

@@ -7,27 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from dbbstation.facts.held import ComparedTolerance, ReportVerdict, ToleranceOfTest
+from dbbstation.facts.run import OfRunInSession
 from dbbstation.facts.serialise import Kept
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.effects import CauseContribution
 from dbbstation.results.evaluation import EvaluationResult
 from dbbstation.results.frame import Framed
-
-
-@dataclass(frozen=True)
-class ReportVerdict:
-    """The report's first statement.
-
-    Attributes:
-        kind: `within`, `exceeded`, `cannot tell`, or `none` without tolerances.
-        reasons: a sentence for each broken tolerance.
-        to_do: in order.
-    """
-
-    kind: str
-    headline: str
-    reasons: tuple[str, ...]
-    to_do: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -45,71 +31,6 @@ class CertificateState:
 
 
 @dataclass(frozen=True)
-class WorstCircle:
-    """The circle with the largest toleranced figure.
-
-    Attributes:
-        direction: `ccw` or `cw`; `both` for both together.
-        expanded_um: U = k u; None if unknown.
-        why_not: None if known.
-    """
-
-    test: str
-    direction: str
-    repeat: int
-    um: float
-    expanded_um: float | None
-    why_not: str | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class HeldTolerance:
-    """A tolerance against circles [ISO 14253-1].
-
-    Attributes:
-        filter: of the figure in words, or None.
-        tests: empty for all.
-        directions: empty for both.
-        conformity: `exceeded` if one circle exceeds it, else `cannot tell` if one is within U; None without circles.
-        within: whether no circle exceeds it or is undecided.
-        exceeded: number of circles.
-        undecided: number of circles within U.
-        circles: number that it applies to.
-        worst: circle with the largest figure, or None.
-    """
-
-    quantity: str
-    filter: str | None
-    largest_um: float
-    tests: tuple[str, ...]
-    directions: tuple[str, ...]
-    conformity: str | None
-    within: bool
-    exceeded: int
-    undecided: int
-    circles: int
-    worst: WorstCircle | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class ComparedTolerance(HeldTolerance):
-    """A tolerance held against circles now, and against those before.
-
-    Attributes:
-        before: None without applicable circles.
-    """
-
-    before: HeldTolerance | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class ToleranceOfTest(ComparedTolerance):
-    """A tolerance against the circles of one test."""
-
-    test: str
-
-
-@dataclass(frozen=True)
 class MeasuredSize:
     """A figure of one circle as measured.
 
@@ -122,13 +43,9 @@ class MeasuredSize:
 
 
 @dataclass(frozen=True)
-class MeasuredFigures:
+class MeasuredFigures(OfRunInSession):
     """Measured figures of one circle, with those of the same run before."""
 
-    session: str
-    test: str
-    direction: str
-    repeat: int
     now: Mapping[str, MeasuredSize]
     before: Mapping[str, MeasuredSize] | None
 

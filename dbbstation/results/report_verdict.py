@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.facts.held import ReportVerdict
 from dbbstation.quality.conformity import Conformity
 from dbbstation.results.model_warnings import lacks_physics
 from dbbstation.results.ranked import told_causes
-from dbbstation.results.report import ReportVerdict
 from dbbstation.text.digits import with_uncertainty
 
 if TYPE_CHECKING:

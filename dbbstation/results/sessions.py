@@ -2,21 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-
-@dataclass(frozen=True)
-class SampleCounts:
-    """Counts of a run's samples.
-
-    Attributes:
-        rejected: unused, by reason.
-    """
-
-    received: int
-    lost: int
-    rejected: Mapping[str, int]
+from dbbstation.files.recordings.entries import Counts
 
 
 @dataclass(frozen=True)
@@ -38,7 +26,7 @@ class ListedRun:
     started: str | None
     state: str
     reason: str | None
-    counts: SampleCounts | None
+    counts: Counts | None
     file: str
 
 

@@ -12,6 +12,7 @@ from dbbstation.circles.budget import budgets, pair_budgets
 from dbbstation.circles.path import Filter
 from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.rice import without_noise
+from dbbstation.facts.run import OfRunInSession
 from dbbstation.plan.tolerance import FILTERED, OF_A_MODEL, OF_BOTH_DIRECTIONS, CircleFigure
 from dbbstation.quality.conformity import Conformity, Size, conformity
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class ToleratedCircle:
+class ToleratedCircle(OfRunInSession):
     """Figures of one circle that may have a tolerance.
 
     Attributes:
@@ -34,10 +35,6 @@ class ToleratedCircle:
         others: further toleranced figures, by figure and filter cut-off.
     """
 
-    session: str
-    test: str
-    direction: str
-    repeat: int
     sizes: Mapping[CircleFigure, Size]
     others: Mapping[tuple[CircleFigure, int], Size] = field(default_factory=dict)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dbbstation.facts.held import ComparedTolerance, ReportVerdict, ToleranceOfTest
+
 
 @dataclass(frozen=True)
 class TextAnswer:
@@ -92,71 +94,15 @@ class ProgramsAnswer:
 
 
 @dataclass(frozen=True)
-class VerdictAnswer:
-    """The verdict by the shop's tolerances.
-
-    Attributes:
-        kind: `within`, `exceeded`, `cannot tell` or `none`.
-        reasons: a sentence for each broken tolerance.
-        to_do: in order.
-    """
-
-    kind: str
-    headline: str
-    reasons: tuple[str, ...]
-    to_do: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class WorstAnswer:
-    """The circle with the largest figure and its U [µm]; None if unknown."""
-
-    test: str
-    direction: str
-    repeat: int
-    um: float
-    expanded_um: float | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class HeldAnswer:
-    """A tolerance against circles.
-
-    Attributes:
-        conformity: `within`, `exceeded` or `cannot tell`, or None.
-        worst: circle with the largest figure, or None.
-    """
-
-    quantity: str
-    largest_um: float
-    conformity: str | None
-    worst: WorstAnswer | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class ToleranceAnswer(HeldAnswer):
-    """A tolerance against circles now and before; None if it did not apply."""
-
-    before: HeldAnswer | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class ToleranceOfTestAnswer(ToleranceAnswer):
-    """A tolerance against the circles of one test."""
-
-    test: str
-
-
-@dataclass(frozen=True)
 class ReportAnswer:
     """Shown facts of a report."""
 
-    verdict: VerdictAnswer
+    verdict: ReportVerdict
 
 
 @dataclass(frozen=True)
 class AcceptanceAnswer(ReportAnswer):
     """Tolerances of two sessions, in total and by test."""
 
-    tolerances: tuple[ToleranceAnswer, ...]
-    tolerances_by_test: tuple[ToleranceOfTestAnswer, ...]
+    tolerances: tuple[ComparedTolerance, ...]
+    tolerances_by_test: tuple[ToleranceOfTest, ...]

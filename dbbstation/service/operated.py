@@ -30,7 +30,7 @@ from dbbstation.service.work import BackgroundWork, WorkProgress
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.service.answers import VerdictAnswer
+    from dbbstation.facts.held import ReportVerdict
     from dbbstation.service.job import SessionJob
 
 
@@ -145,7 +145,7 @@ class JobAnswer:
         self._after.close()
 
 
-def answer_of(verdict: VerdictAnswer, missing: Sequence[str], report: Path | None) -> Answered:
+def answer_of(verdict: ReportVerdict, missing: Sequence[str], report: Path | None) -> Answered:
     """Return the answer of a verdict, which is complete only with every planned run.
 
     A limit is exceeded whatever is missing.

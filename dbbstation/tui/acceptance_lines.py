@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from dbbstation.service.answers import AcceptanceAnswer, HeldAnswer, ToleranceOfTestAnswer, WorstAnswer
+    from dbbstation.facts.held import HeldTolerance, ToleranceOfTest, WorstCircle
+    from dbbstation.service.answers import AcceptanceAnswer
     from dbbstation.service.former_sessions import Former, InForce
 
 _WIDE = 12
@@ -28,7 +29,7 @@ _DIGEST = 8
 """Digits of a SHA-256 that are shown: people compare them, nothing is looked up by them."""
 
 
-def test_line(one: ToleranceOfTestAnswer) -> Content:
+def test_line(one: ToleranceOfTest) -> Content:
     """Return the row of a test and figure: worst circle before and now, limit, U, word."""
     row = _ROW.format(
         test=_short(one.test),
@@ -80,17 +81,17 @@ def way_back_lines(former: Former, kept: tuple[Path, ...]) -> Iterator[str]:
         yield texts.WAY_BACK_PROGRAMS.format(path=in_force.programs)
 
 
-def _circle(worst: WorstAnswer) -> str:
+def _circle(worst: WorstCircle) -> str:
     return texts.WORST_CIRCLE.format(**vars(worst), expanded=_expanded(worst))
 
 
-def _expanded(worst: WorstAnswer | None) -> str:
+def _expanded(worst: WorstCircle | None) -> str:
     """Return U of a circle, or a placeholder."""
     u_um = None if worst is None else worst.expanded_um
     return texts.NOT_BEFORE if u_um is None else f"{u_um:.1f}"
 
 
-def _um(held: HeldAnswer | None) -> str:
+def _um(held: HeldTolerance | None) -> str:
     return texts.NOT_BEFORE if held is None or held.worst is None else f"{held.worst.um:.1f}"
 
 

@@ -10,10 +10,10 @@ import pytest
 from dbbstation.cli.demo import _print
 from dbbstation.cli.figures import G_LOW_PASSED, G_WITH_NOISE
 from dbbstation.demo import _side_by_side
+from dbbstation.facts.held import ReportVerdict
 from dbbstation.facts.serialise import read_plain
 from dbbstation.results.demo import DemoCalibration, DemoCause, DemoDiagnosis, DemoEvaluation, DemoReport, DemoResult
 from dbbstation.results.diagnosis import BeforeAfter
-from dbbstation.results.report import ReportVerdict
 
 NOISE_UM = 0.3
 """Of one reading of the bar in the recorded sessions."""

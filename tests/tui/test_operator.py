@@ -11,13 +11,13 @@ import pytest
 from textual.widgets import Static
 
 from dbbstation.errors import InputError
+from dbbstation.facts.held import ReportVerdict
 from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
-from dbbstation.service.answers import VerdictAnswer
 from dbbstation.service.front import Front
 from dbbstation.service.job import SessionJob
 from dbbstation.service.memory import Memory
@@ -109,7 +109,7 @@ def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path
         ("cannot tell", (), Conformity.UNDECIDED),
         ("none", (), Conformity.UNDECIDED),
     ):
-        told = answer_of(VerdictAnswer(kind, "All within.", (), ()), missing, None)
+        told = answer_of(ReportVerdict(kind, "All within.", (), ()), missing, None)
         assert told.word is word
         assert ("Not measured: high cw." in told.reasons) is bool(missing)
     # Another plan than the session has: a new session is begun.

@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from dbbstation.facts.held import HeldTolerance, WorstCircle
+from dbbstation.facts.serialise import plain
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.reading import Reading
 from dbbstation.service.after import After, Result
@@ -174,8 +176,22 @@ def results(_app: StationApp) -> RowScreen:
 
 
 def held(um: float, u_um: float, largest_um: float, conformity: str, test: str) -> dict[str, object]:
-    worst = {"test": test, "direction": "ccw", "repeat": 1, "um": um, "expanded_um": 2.0 * u_um}
-    return {"quantity": "circular-deviation", "largest_um": largest_um, "conformity": conformity, "worst": worst}
+    worst = WorstCircle(test, "ccw", 1, um, 2.0 * u_um, None)
+    return plain(
+        HeldTolerance(
+            quantity="circular-deviation",
+            filter=None,
+            largest_um=largest_um,
+            tests=(),
+            directions=(),
+            conformity=conformity,
+            within=conformity == "within",
+            exceeded=int(conformity == "exceeded"),
+            undecided=int(conformity == "cannot tell"),
+            circles=1,
+            worst=worst,
+        )
+    )
 
 
 def acceptance(_app: StationApp) -> RowScreen:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import of_residuals
 from dbbstation.computing.threads import with_one_thread
+from dbbstation.facts.run import OfRun
 from dbbstation.facts.serialise import Absent
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import range_uncertainty_mm
@@ -73,7 +74,7 @@ class LowPassedCircularity:
 
 
 @dataclass(frozen=True)
-class EvaluatedRun:
+class EvaluatedRun(OfRun):
     """One run under the nominal machine (before) and the model (after).
 
     Attributes:
@@ -83,9 +84,6 @@ class EvaluatedRun:
         circularity_30_upr_um: without the bar's noise; None if not asked for.
     """
 
-    test: str
-    direction: str
-    repeat: int
     measured: CircleDeviations
     before: CircleDeviations
     after: CircleDeviations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
@@ -13,7 +14,6 @@ from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from pathlib import Path
 
     from dbbstation.files.formats.session import BarSchema, InstrumentSchema, NoteSchema, ProgramSchema, RunSchema

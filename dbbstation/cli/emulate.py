@@ -49,7 +49,7 @@ _LOOK_S = 0.2
 @click.option(
     "--wait",
     is_flag=True,
-    help="Let machine time pass only in runs, as fast as samples are read: for `measure --auto`, the same on any computer.",
+    help="Let machine time pass only in runs, as fast as samples are taken: for `measure --auto`, the same on any computer.",
 )
 @click.option(
     "--noise-um",
@@ -115,8 +115,6 @@ def emulate(
     model = _truth(machine, truth, source_files, seed)
     virtual = VirtualMachine(model, plan, seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))
     virtual.check()
-    if wait and protocol.ask.asked:
-        raise click.UsageError(f"--wait needs an instrument that streams; {protocol.name} is asked for each reading")
     clock = WaitingClock() if wait else ScaledClock(time_scale)
     cell = VirtualCell(virtual, clock)
     commands = CellCommands(cell, None if programs is None else _programs(programs))

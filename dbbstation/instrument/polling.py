@@ -13,6 +13,7 @@ from dbbstation.instrument.latch import latch_of
 from dbbstation.instrument.reading import Reading
 from dbbstation.instrument.reception import INCOMPLETE
 from dbbstation.instrument.sequence import SampleOrder
+from dbbstation.instrument.stamps import MachineTime
 
 if TYPE_CHECKING:
     from dbbstation.instrument.codec import Heard
@@ -73,10 +74,10 @@ class Poller:
             InstrumentError: the line is silent, closed or garbled, or the device restarted; OutputError: the byte log is full.
         """
         rate_hz, clock, stop = self._protocol.timing.rate_hz, self._to.clock, self._to.stop
-        pause_s = 1.0 / rate_hz if rate_hz else 0.0
+        pause_s = 1.0 / rate_hz if rate_hz and not isinstance(clock, MachineTime) else 0.0
         self._until_quiet()
         while not stop.is_set():
-            asked_s = clock()
+            asked_s = clock.stamp(0.0) if isinstance(clock, MachineTime) else clock()
             self._link.write(self._protocol.ask.request)
             answer = self._answer(self._protocol)
             if stop.is_set():
@@ -86,10 +87,17 @@ class Poller:
                 self._fail(answer.heard)
                 continue
             judged = self._doubts.judged(answer.heard, clean=answer.clean)
-            self._take(replace(answer.heard, reading=judged), answer.first_s, asked_s)
+            self._take(replace(answer.heard, reading=judged), self._seen_s(answer, asked_s), asked_s)
             self._refuse_strangers()
             while clock() < asked_s + pause_s and not stop.wait(_PAUSE_TICK_S):
                 pass
+
+    def _seen_s(self, answer: PolledReply, asked_s: float) -> float:
+        """Return when the first byte of a reply came; where time is counted, as soon as it can have come."""
+        if not isinstance(self._to.clock, MachineTime):
+            return answer.first_s
+        characters = len(self._protocol.ask.request) + 1
+        return asked_s + characters * self._to.character_s + self._protocol.timing.reply_latency_s
 
     def _take(self, heard: Piece, first_s: float, asked_s: float) -> None:
         """Stamp a reading, ask for a fault's text, and deliver those in order."""

@@ -183,15 +183,18 @@ class VirtualInstrument:
     def _run(self, end: End) -> None:
         try:
             while not self._stop.is_set():
-                if end.wait(self._pause_s()):
-                    self._hear(self._through_wrong_baud(end.read(), end, to_host=False))
+                raw = end.read() if end.wait(self._pause_s()) else b""
+                self._hear(self._through_wrong_baud(raw, end, to_host=False))
                 with self._lock:
                     now_s = self.clock()
                     if self.protocol.ask.mode == "stream":
                         self._sample(now_s, connected=end.connected)
-                    self._transmit(end, now_s)
-                    if len(self._outgoing) < _UNDER_WAY:
-                        self.clock.advance()
+                        self._transmit(end, now_s)
+                        if len(self._outgoing) < _UNDER_WAY:
+                            self.clock.advance()
+                    else:
+                        self._transmit(end, self.clock.line_s())
+                        self._incoming = self._incoming if end.connected else b""
         except Exception as error:  # noqa: BLE001 (raised again by `stop`, in the thread that can be told)
             self._failure = error
 
@@ -217,10 +220,12 @@ class VirtualInstrument:
         known = {ask.request, follow_up, *(step.send for step in ask.start + ask.stop)} - {b""}
         commands = sorted(known, key=len, reverse=True)
         with self._lock:
-            seen_s = self.clock()
             self._incoming += raw
             while self._incoming:
+                seen_s = self.clock()
                 command = next((one for one in commands if self._incoming.startswith(one)), None)
+                if command == ask.request and not self.clock.exchanges(1.0 / self._rate_hz):
+                    return  # asked again when time goes on
                 if command is not None:
                     self._incoming = self._incoming[len(command) :]
                     # On a real line the command takes this long to arrive.
@@ -299,7 +304,7 @@ class VirtualInstrument:
         """Write due bytes; without listener they are lost."""
         while self._outgoing:
             first = self._outgoing[0]
-            due = min(len(first.raw), int((now_s - first.start_s) / self._character_s + 1e-6))
+            due = int(min(len(first.raw), (now_s - first.start_s) / self._character_s + 1e-6))
             if due > first.sent:
                 raw = first.raw[first.sent : due]
                 if end.connected:

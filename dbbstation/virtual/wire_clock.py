@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
@@ -55,6 +56,15 @@ class ScaledClock:
     def advance(self) -> None:
         """Do nothing: this clock runs by itself."""
 
+    def exchanges(self, period_s: float) -> bool:
+        """Return that a reading may be taken now: this clock runs by itself."""
+        del period_s
+        return True
+
+    def line_s(self) -> float:
+        """Return the time up to which bytes of replies have gone over the line [s]."""
+        return self()
+
     def run_until(self, t_s: float) -> None:
         """Do nothing: this clock runs by itself."""
 
@@ -63,7 +73,7 @@ class ScaledClock:
 
 
 class WaitingClock(ScaledClock):
-    """Machine time that passes only during runs, as fast as samples are read.
+    """Machine time that passes only during runs, as fast as samples are read or asked for.
 
     A busy computer changes nothing in machine time.
     """
@@ -91,6 +101,20 @@ class WaitingClock(ScaledClock):
             self._now_s = min(self._now_s + _STEP_S, self._until_s)
             if self._now_s >= self._until_s:
                 self._stands.notify_all()
+
+    def exchanges(self, period_s: float) -> bool:
+        """Return whether a reading may be taken now; then a period passes behind it, which its exchange fits in."""
+        with self._stands:
+            if self._now_s >= self._until_s:
+                return False
+            self._now_s += period_s
+            if self._now_s >= self._until_s:
+                self._stands.notify_all()
+            return True
+
+    def line_s(self) -> float:
+        """Return infinity: a reply is there as soon as it is asked for, whatever the time."""
+        return math.inf
 
     def run_until(self, t_s: float) -> None:
         """Advance to a time after a run's end [s]."""

@@ -22,7 +22,7 @@ pytest.importorskip("pty", reason="needs a pseudo-terminal")
 
 MACHINE = shipped_folder("fixtures") / "machines" / "reference.yaml"
 PLAN = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"
-WHAT = ["--machine", MACHINE, "--instrument", "streaming-encoder", "--rate-hz", "10"]
+WHAT = ["--machine", MACHINE, "--rate-hz", "10", "--instrument"]
 PROGRAM = [sys.executable, "-m", "dbbstation"]
 BAR = ["--bar-length-mm", "150", "--bar-uncertainty-um", "0.5"]
 TURN_S = 400.0 / 360.0 * 2.0 * np.pi * 150.0 / (1000.0 / 60.0)
@@ -39,14 +39,14 @@ def busy(processes):
         yield
 
 
-def measured(plan, folder):
-    command = [*PROGRAM, "emulate", "--plan", plan, *WHAT, "--seed", "4", "--wait", "--json"]
+def measured(plan, folder, instrument):
+    command = [*PROGRAM, "emulate", "--plan", plan, *WHAT, instrument, "--seed", "4", "--wait", "--json"]
     with subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True) as machine:
         try:
             place = json.loads(machine.stdout.readline())
             for name in ("first", "second"):
                 line = ["--port", place["port"], "--auto", place["control"], *BAR]
-                outcome = call("measure", "--plan", plan, *WHAT, *line, "--out", folder / name)
+                outcome = call("measure", "--plan", plan, *WHAT, instrument, *line, "--out", folder / name)
                 assert outcome.code == 0, outcome.err
             assert VirtualHands(place["control"]).stands_since_s() > 4 * TURN_S
         finally:
@@ -55,7 +55,8 @@ def measured(plan, folder):
 
 
 @pytest.mark.slow
-def test_runs_are_the_same_to_the_byte_beside_a_busy_computer(tmp_path):
+@pytest.mark.parametrize("instrument", ["streaming-encoder", "heidenhain-nd287"])
+def test_runs_are_the_same_to_the_byte_beside_a_busy_computer(tmp_path, instrument):
     text = PLAN.read_text(encoding="utf-8")
     plan = tmp_path / "plan.yaml"
     plan.write_text(
@@ -63,9 +64,9 @@ def test_runs_are_the_same_to_the_byte_beside_a_busy_computer(tmp_path):
             line for line in text.splitlines(keepends=True) if "name: side" not in line and "name: high" not in line
         )
     )
-    quiet = measured(plan, tmp_path / "quiet")
+    quiet = measured(plan, tmp_path / "quiet", instrument)
     with busy(3):
-        loaded = measured(plan, tmp_path / "loaded")
+        loaded = measured(plan, tmp_path / "loaded", instrument)
     assert len(quiet) == 4
     assert loaded == quiet
     assert quiet["first/low-ccw-1.csv"] != quiet["second/low-ccw-1.csv"]  # the machine's noise goes on

@@ -1,6 +1,6 @@
 """Set up and run dbbstation from a checkout, with nothing installed but Python 3.11 to 3.13 and git.
 
-    python3 dev.py demo          the whole job on a simulated machine; --quick measures three tests, not fifteen
+    python3 dev.py demo --quick  the whole job on a simulated machine, with three tests; without --quick with fifteen
     python3 dev.py test          lint, types, import walls, docs and all tests that need no special recordings
     python3 dev.py run ...       any dbbstation command, such as: python3 dev.py run calibrate SESSION
     python3 dev.py shell-line    the line that puts `dbbstation` on the PATH of your shell

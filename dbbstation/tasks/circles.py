@@ -13,7 +13,7 @@ from dbbstation.circles.path import Filter
 from dbbstation.errors import InputError, Problem, TraceError
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.judged import judge_session
-from dbbstation.files.recordings.session import SessionFolder, read_session
+from dbbstation.files.recordings.session import SessionFolder, opened
 from dbbstation.results.circles import Circled, CirclesResult, MeasuredCircle, MeasuredPair, circles_result
 from dbbstation.tasks.load import check_named, paths_of
 from dbbstation.tasks.models import model_of
@@ -82,7 +82,7 @@ def circle_figures(
 
 
 def load_circles(
-    paths: Sequence[Path],
+    paths: Sequence[Path | SessionFolder],
     chosen: Filter,
     tests: Sequence[str] = (),
     exclude: Sequence[str] = (),
@@ -96,7 +96,7 @@ def load_circles(
     Findings compare with all accepted runs, also of excluded tests.
 
     Args:
-        paths: folders or session files.
+        paths: folders or session files, or what was read of them.
         chosen: filter of G, F and H.
         tests: names; empty for all.
         model: gives expected circles; None: the nominal machine.
@@ -104,7 +104,7 @@ def load_circles(
     Raises:
         InputError: every fault of every file; no accepted run; an unknown test.
     """
-    sessions = [read_session(path) for path in paths]
+    sessions = [opened(path) for path in paths]
     every = {test for session in sessions for test in session.plan.tests}
     check_named(sessions, every, exclude, " to exclude")
     check_named(sessions, every, tests)

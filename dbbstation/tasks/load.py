@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.recordings.entries import RunEntry, RunState
-from dbbstation.files.recordings.session import SessionFolder, read_session
+from dbbstation.files.recordings.session import SessionFolder, opened
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.model.observation import Observation
@@ -108,7 +108,7 @@ def paths_of(sessions: Sessions) -> list[Path]:
 
 
 def load_sessions(
-    paths: Sequence[Path],
+    paths: Sequence[Path | SessionFolder],
     exclude: Sequence[str] = (),
     progress: Callable[[int, int], None] = lambda _done, _of: None,
     only: Sequence[str] = (),
@@ -116,13 +116,13 @@ def load_sessions(
     """Read sessions, cut accepted runs to circles and attach commands.
 
     Args:
-        paths: folders or session files.
+        paths: folders or session files, or what was read of them.
         only: tests; empty for all.
 
     Raises:
         InputError: every fault of every file and trace; a session twice; different machines; no accepted run; an unknown test.
     """
-    sessions = _unique_names([read_session(path) for path in paths])
+    sessions = _unique_names([opened(path) for path in paths])
     warnings = _check_one_machine(sessions)
     _check_no_copies(sessions)
     every = {test for session in sessions for test in session.plan.tests}

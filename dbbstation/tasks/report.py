@@ -12,6 +12,7 @@ from dbbstation.diagnosis.thinned import thinned
 from dbbstation.errors import StationError
 from dbbstation.files.atomic import refuse_outputs, write_bytes
 from dbbstation.files.inputs import in_a_book
+from dbbstation.files.recordings.session import read_session
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.report.content import Modelled, Reported, certified_of, content_of, numbers_of
 from dbbstation.report.html import report_html
@@ -21,7 +22,7 @@ from dbbstation.results.ranked import Ranked
 from dbbstation.results.tolerances import TOLERATED
 from dbbstation.tasks.circles import load_circles
 from dbbstation.tasks.evaluate import evaluate
-from dbbstation.tasks.load import loaded, paths_of
+from dbbstation.tasks.load import READING, load_sessions, paths_of
 from dbbstation.tasks.models import model_of
 from dbbstation.tasks.provenance import from_python
 from dbbstation.tasks.telling import StoppedError, Telling, never, silent
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
+    from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.results.report import ReportResult
     from dbbstation.sources.contract import ErrorSource
@@ -97,25 +99,27 @@ def report(
     browser = None if paper is None else chromium()
     telling = Telling(progress, stop)
     identified = None if model is None else model_of(model, known)
-    paths = paths_of(sessions)
+    # Circles, evaluation and ranking need the same recordings: each is read once.
+    now = [read_session(path, keeps=identified is not None) for path in paths_of(sessions)]
+    then = None if before is None else read_session(Path(before), keeps=identified is not None)
     found = load_circles(
-        paths, TOLERATED, tests, exclude, findings=True, model=identified, progress=telling.counted("circles")
+        now, TOLERATED, tests, exclude, findings=True, model=identified, progress=telling.counted("circles")
     )
     former = None
-    if before is not None:
-        former = load_circles([Path(before)], TOLERATED, progress=telling.counted("circles before"))
+    if then is not None:
+        former = load_circles([then], TOLERATED, progress=telling.counted("circles before"))
     modelled = ranked = None
     if identified is not None:
         for session in found.sessions:
             check_model_is_of(session.machine, identified.model.machine)
-        runs = _read(paths, (tests, exclude), telling)
+        runs = _read(now, (tests, exclude), telling)
         modelled = _modelled(runs, identified, telling)
         if lacks_physics(identified.report):
             ranked = Ranked(why_not=_PHYSICS_MISSING)
         else:
-            nominal = paths if before is None else [Path(before)]
-            of_them = runs if before is None else _read(nominal, (tests, exclude), telling)
-            ranked = _ranked(of_them, [path.name for path in nominal], identified, telling)
+            nominal = now if then is None else [then]
+            of_them = runs if then is None else _read(nominal, (tests, exclude), telling)
+            ranked = _ranked(of_them, [session.name for session in nominal], identified, telling)
     reported = Reported(found, TOLERATED, settings, coverage_factor, former, modelled, job, ranked, place)
     lacking = certified_of(reported).lacking
     if certificate and lacking:
@@ -141,15 +145,18 @@ _PHYSICS_MISSING = (
 
 
 def _read(
-    paths: Sequence[Path], chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
+    sessions: Sequence[SessionFolder], chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
 ) -> Recorded | StationError:
-    """Return the runs of sessions, read once for all parts, or why they cannot be read."""
+    """Return the runs of sessions, or why they cannot be used."""
+    tests, exclude = chosen
     try:
-        return loaded(paths, *chosen, telling)
+        found = load_sessions(sessions, exclude, telling.counted(READING), tests)
     except StoppedError:
         raise
     except StationError as error:
         return error
+    telling.note(*found.warnings)
+    return found
 
 
 def _modelled(runs: Recorded | StationError, identified: IdentifiedModel, telling: Telling) -> Modelled:

@@ -9,6 +9,7 @@ import re
 import shutil
 import stat
 import sys
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from scipy.optimize import brentq
 from scipy.stats import rice
 
 from dbbstation.cli import DONE, FAILED
+from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.text.digits import with_uncertainty
 from tests.cli.conftest import call
@@ -265,6 +267,22 @@ def test_a_model_stands_beside(tmp_path):
     assert f"a flatness of {evaluated['flatness_um']:.1f} µm" in page
     assert "What was not visible" in page
     assert f"the model {evaluated['residual_rms_um']:.2f} µm" in page
+
+
+def test_each_recording_is_read_once(tmp_path, monkeypatch):
+    """Circles, evaluation and ranking need them, now and before."""
+    before = shutil.copytree(SMALL, tmp_path / "before")
+    counted = Counter()
+
+    def read(path, *, sha256):
+        counted[path] += 1
+        return read_run(path, sha256=sha256)
+
+    monkeypatch.setattr("dbbstation.files.recordings.session.read_run", read)
+    outcome = call("report", SMALL, "--before", before, "--model", MODEL, "--out", tmp_path / "report.html")
+    assert outcome.code == 0, outcome.err
+    assert len(counted) == 12
+    assert set(counted.values()) == {1}
 
 
 def test_every_file_has_its_hash(session, written):

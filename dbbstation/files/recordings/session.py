@@ -72,6 +72,7 @@ class SessionFolder(SessionDetails):
     Attributes:
         machine: nominal, as the controller had it.
         runs: in starting order, of every state.
+        keeps: recordings that were read stay, for a command that needs them more than once.
     """
 
     name: str
@@ -82,6 +83,7 @@ class SessionFolder(SessionDetails):
     plan_path: Path
     runs: tuple[RunEntry, ...]
     sha256: str
+    keeps: bool = False
 
     @property
     def names(self) -> tuple[str, str]:
@@ -161,11 +163,19 @@ class SessionFolder(SessionDetails):
         Raises:
             InputError: the file was changed, is damaged, or holds another run.
         """
+        if run.path in self._read:
+            return self._read[run.path]
         read = read_run(run.path, sha256=run.sha256)
         faults = [*_header_faults(run, read.header), *self._implausible(run, read.recording)]
         if faults:
             raise InputError(faults)
+        if self.keeps:
+            self._read[run.path] = read
         return read
+
+    @cached_property
+    def _read(self) -> dict[Path, RunFile]:
+        return {}
 
     def load_all(
         self, runs: Sequence[RunEntry], progress: Callable[[int, int], None] = lambda _done, _of: None
@@ -235,10 +245,13 @@ class SessionFolder(SessionDetails):
         return faults
 
 
-def read_session(path: Path) -> SessionFolder:
+def read_session(path: Path, *, keeps: bool = False) -> SessionFolder:
     """Read a session from its folder or session file.
 
     Hashes of all files are checked here; runs when they are loaded.
+
+    Args:
+        keeps: as of `SessionFolder`.
 
     Raises:
         InputError: every fault of session, machine and plan, every missing or changed file.
@@ -247,7 +260,12 @@ def read_session(path: Path) -> SessionFolder:
     session = parse_session(path, faults)
     if session is None or faults:
         raise InputError(faults)
-    return session
+    return replace(session, keeps=keeps)
+
+
+def opened(session: Path | SessionFolder) -> SessionFolder:
+    """Return a session, read where it is not yet; raises as `read_session`."""
+    return session if isinstance(session, SessionFolder) else read_session(session)
 
 
 def no_session(folder: Path) -> Problem:

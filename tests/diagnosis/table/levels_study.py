@@ -245,6 +245,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--seeds", default="11,12,13")
     options.add_argument("--what", default="effect,twin,noise,injected")
+    options.add_argument("--without", default="", help="kinds that are left out")
     options.add_argument("--out", type=Path, required=True)
     chosen = options.parse_args()
     stored = json.loads(chosen.out.read_text(encoding="utf-8")) if chosen.out.exists() else {"tables": []}
@@ -253,7 +254,7 @@ def main() -> None:
     for seed in map(int, chosen.seeds.split(",")):
         for what in chosen.what.split(","):
             for kind in NOISES if what == "noise" else EFFECTS:
-                if (kind, seed, what) in known:
+                if (kind, seed, what) in known or kind in chosen.without.split(","):
                     continue
                 rows.append(answer(kind, seed, what))
                 chosen.out.parent.mkdir(parents=True, exist_ok=True)

@@ -275,6 +275,9 @@ class PartGains(Protocol):
     def of(self, wanted: Collection[str] | None) -> ClassGain:
         """Return the gain of everything over some variables; None: everything."""
 
+    def but_for(self, ignored: Collection[str]) -> PartGains:
+        """Return the same without what follows some variables alone, such as the time."""
+
     def errors_with(self, wanted: Collection[str]) -> list[float]:
         """Return the rms error of each part with what follows some variables alone; none: with everything."""
 
@@ -285,9 +288,11 @@ class ChosenWithoutParts:
 
     Attributes:
         parts: chosen anew without each.
+        ignored: what follows these alone takes no part in predictions.
     """
 
     parts: Sequence[WithoutPart]
+    ignored: frozenset[str] = frozenset()
 
     @property
     def rows(self) -> Sequence[NDArray[np.bool_]]:
@@ -296,7 +301,11 @@ class ChosenWithoutParts:
 
     def of(self, wanted: Collection[str] | None) -> ClassGain:
         """Return the gain of everything over some variables; None: everything."""
-        return gain_of(self.parts, wanted)
+        return gain_of(self.parts, wanted, self.ignored)
+
+    def but_for(self, ignored: Collection[str]) -> ChosenWithoutParts:
+        """Return the same without what follows some variables alone, such as the time."""
+        return replace(self, ignored=frozenset(ignored))
 
     def errors_with(self, wanted: Collection[str]) -> list[float]:
         """Return the rms error of each part with what follows some variables alone; none: with everything."""
@@ -308,18 +317,21 @@ def left_with(one: Settled, wanted: Collection[str]) -> NDArray[np.float64]:
     """Return the residual beside what follows some variables alone, refitted with the base, shape (n,); none: beside everything."""
     follow = _follow(one)
     rest = [name for name in one.best.names if wanted and not follow(name) & set(wanted)]
-    return _left_without(one, rest) if rest else one.channel.residual - one.predicted()
+    return _left_without(one, rest)
 
 
-def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None) -> ClassGain:
-    """Return the gain over some variables in unused parts; None: everything."""
+def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignored: Collection[str] = ()) -> ClassGain:
+    """Return the gain over some variables in unused parts; None: everything.
+
+    What follows ignored variables alone is left out of both predictions.
+    """
     brought, before, after = [], 0.0, 0.0
     for part in parts:
-        one, rows = part.settled, part.rows
-        follow = _follow(one)
-        names = [m.cause.name for m in one.best.members if wanted is None or follow(m.cause.name) & set(wanted)]
-        with_all = one.channel.residual - one.predicted()
-        without = _left_without(one, names) if names else with_all
+        one, rows, follow = part.settled, part.rows, _follow(part.settled)
+        out = [name for name in one.best.names if follow(name) <= set(ignored)]
+        names = [n for n in one.best.names if n not in out and (wanted is None or follow(n) & set(wanted))]
+        with_all = _left_without(one, out)
+        without = _left_without(one, [*out, *names]) if names else with_all
         after += float(np.sum(np.square(with_all[rows])))
         before += float(np.sum(np.square(without[rows])))
         brought.append(log_density(one, rows, with_all) - log_density(one, rows, without) if names else 0.0)
@@ -330,6 +342,8 @@ def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None) -> Cla
 
 def _left_without(one: Settled, names: Collection[str]) -> NDArray[np.float64]:
     """Return the residual without some members, others refitted, shape (n,)."""
+    if not names:
+        return np.asarray(one.channel.residual - one.predicted())
     effect = np.zeros(len(one.channel.residual))
     if rest := one.best.without(*names):
         samples = np.hstack([one.bank.samples(member.columns) for member in rest])

@@ -30,6 +30,24 @@ def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.floa
     return ""
 
 
+BEYOND = 5.0
+"""Prior standard deviations beyond which an effect that is laid out over a variable is impossible: it is so many times the whole difference,
+and most of it would cancel with others."""
+
+
+def beyond_reach(law: Law, values: NDArray[np.float64], plausible: NDArray[np.float64]) -> str:
+    """Return why an effect of a family is too large to be; empty if possible.
+
+    Args:
+        values: amplitudes, shape (p,).
+        plausible: their prior standard deviations, shape (p,).
+    """
+    times = float(np.max(np.abs(values) / plausible, initial=0.0))
+    if law.family is None or law.reach is None or times <= BEYOND:
+        return ""
+    return f"It would have to be {times:.2g} times the difference itself, and cancel with others."
+
+
 def impossibly_negative(name: str, value: float, sigma: float, unit: str) -> str:
     """Return why a non-negative quantity's value is impossible, or an empty text."""
     if value >= -NEGATIVE_SIGMA * sigma:

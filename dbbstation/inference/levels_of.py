@@ -59,7 +59,11 @@ def levels_of(
         worse: without held-out parts: the fitted sum leaves more of all rows than the reference.
     """
     probabilities = VariableProbabilities(settled)
-    found = [_followed(settled, one, probabilities, parts) for one in classes_of(settled, probabilities)]
+    every = classes_of(settled, probabilities)
+    if parts is not None and not any(_in_time(one) and parts.of(one.wanted).predicts for one in every):
+        # What happened, and goes on in no other rows, would fill these with what a curve over time has between its rows.
+        parts = parts.but_for({TIME, RUN})
+    found = [_followed(settled, one, probabilities, parts) for one in every]
     classes = tuple(sorted(found, key=lambda one: (one.consequence, one.may_result)))
     sizes = detectable(settled)
     size = settled.channel.size if matters is None else matters
@@ -121,7 +125,7 @@ def _followed(
 ) -> Followed:
     probability = min(probabilities.of(each) for each in one.each)
     gain = None if parts is None else parts.of(one.wanted)
-    answer = _answer(probability, gain, in_time=set[str]().union(*one.each) <= {TIME, RUN})
+    answer = _answer(probability, gain, in_time=_in_time(one))
     effect = settled.effect(sorted(one.members))[settled.channel.kept]
     variables = settled.channel.variables
     driven = {v.name for v in variables if v.driven}.union(*(law.driven for law in settled.channel.laws))
@@ -148,6 +152,10 @@ def _followed(
         slope=slope,
         straight=straight,
     )
+
+
+def _in_time(one: VariableClass) -> bool:
+    return set[str]().union(*one.each) <= {TIME, RUN}
 
 
 def _straight(settled: Settled, one: VariableClass) -> tuple[Value | None, float]:

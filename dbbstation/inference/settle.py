@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
-from dbbstation.inference.impossible import impossible
+from dbbstation.inference.impossible import beyond_reach, impossible
 from dbbstation.inference.model_comparison import amplitude_size
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import MOVED, places_anew, seen
@@ -221,8 +221,8 @@ def _settled(
             laid_out |= {member.cause.name for member in rough}
             _lay_out(bank, beside, posterior.best, rough)
             continue
-        if negative := _negative(settled):
-            refused |= negative
+        if cannot := _impossible(settled):
+            refused |= cannot
             continue
         if times_placed < MOST_PLACED and (moved := _placed(bank, best)):
             times_placed += 1
@@ -456,8 +456,8 @@ STEPS = 3
 """Times that the nonlinear parameters of a law are improved, and amplitudes to which its effect is not proportional."""
 
 
-def _negative(settled: Settled) -> dict[str, str]:
-    """Return significantly negative laws that cannot be."""
+def _impossible(settled: Settled) -> dict[str, str]:
+    """Return laws whose values cannot be: significantly negative, or many times the difference."""
     members = settled.best.members
     if not members:
         return {}
@@ -467,7 +467,13 @@ def _negative(settled: Settled) -> dict[str, str]:
     for member in members:
         law = settled.bank.laws.get(member.cause.name)
         own = slice(first, first + len(member.variant.columns))
-        if law is not None and (why := impossible(law, estimates.values[own], np.diag(estimates.covariance)[own])):
-            found[law.name] = why
+        values, variances = estimates.values[own], np.diag(estimates.covariance)[own]
+        why = (
+            ""
+            if law is None
+            else impossible(law, values, variances) or beyond_reach(law, values, member.variant.plausible)
+        )
+        if why:
+            found[member.cause.name] = why
         first += len(member.columns)
     return found

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.bent import bent_laws, integral_of
+from dbbstation.inference.impossible import beyond_reach
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.memory import memory_laws
@@ -96,3 +97,12 @@ def test_a_table_that_lacks_one_names_it_with_its_numbers(name):
     values = named_values(settled, member, estimates.values[:width], estimates.covariance[:width, :width])
     for number, true in numbers.items():
         assert abs(values[number].value - true) < 4.0 * values[number].uncertainty + 0.02 * abs(true)
+
+
+def test_an_effect_many_times_the_difference_is_refused():
+    """An integral, and a wave over time that cancels it but for a lag: what is left of a thousandfold is no law."""
+    law = laws_of(table(1, rows=300))["integral of q"]
+    plausible = law.plausible_of(law.columns(()))
+    assert not beyond_reach(law, 4.0 * plausible, plausible)
+    assert "14 times the difference" in beyond_reach(law, -14.0 * plausible, plausible)
+    assert not beyond_reach(replace(law, family=None), 14.0 * plausible, plausible)

@@ -79,6 +79,10 @@ class PredictedGains:
         gains = DensityGains(tuple(gain for gain, _ in every), tuple(part.rows for part in self.parts))
         return ClassGain(gains, over_all([error for _, error in every]), over_all([part.after for part in self.parts]))
 
+    def but_for(self, _ignored: Collection[str]) -> PredictedGains:
+        """Return the same: no term follows the time."""
+        return self
+
     def errors_with(self, _wanted: Collection[str]) -> list[float]:
         """Return the rms error of each part with all terms, which are put in together."""
         return [part.after for part in self.parts]

@@ -19,11 +19,13 @@ from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.perturbed_forms import GradualBacklash
 from tests.plant.mechanisms.reversal_forms import StickSlip
 from tests.plant.noise import Noise
+from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 RINGS = RingingStrut(strut=6, height_um=1.5, period_s=0.5, decay_s=1.2)
 WINDS_UP = GradualBacklash((2.0, 1.0, 2.5, 1.5, 2.0, 1.0), (150.0, 80.0, 200.0, 120.0, 250.0, 100.0))
+ALL = "abcdefghijklmno"
 REMEMBERING = Noise(white_um=0.3, correlated_um=0.24, correlation=0.6)
 
 
@@ -55,7 +57,13 @@ def test_noise_alone_follows_no_reversal(tmp_path):
 
 @pytest.mark.slow
 def test_nothing_is_left_is_not_said_of_a_strut_that_rings(tmp_path):
-    record(tmp_path / "s", seed=33, mechanisms=[KINEMATICS, RingingStrut(strut=2)], rate_hz=10.0)
+    record(
+        tmp_path / "s",
+        seed=33,
+        plan=subset(table_ii_plan(33), EIGHT),
+        mechanisms=[KINEMATICS, RingingStrut(strut=2)],
+        rate_hz=10.0,
+    )
     gc.disable()
     summary = diagnose_sessions([tmp_path / "s"], ["gravity"], (), lambda _: None).summary()
     # Hundreds of megabytes of columns must not wait for the collector of rings.
@@ -72,17 +80,19 @@ def test_nothing_is_left_is_not_said_of_a_strut_that_rings(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("law", "name", "rate_hz"),
+    ("law", "name", "tests", "rate_hz"),
     [
-        (RINGS, None, 10.0),
-        pytest.param(RINGS, None, 20.0, marks=pytest.mark.nightly),
+        (RINGS, None, EIGHT, 10.0),
+        pytest.param(RINGS, None, ALL, 20.0, marks=pytest.mark.nightly),
         # That it settles with its length in its range is in CI: tests/diagnosis/test_at_limit.py.
-        pytest.param(WINDS_UP, "backlash", 20.0, marks=pytest.mark.nightly),
+        pytest.param(WINDS_UP, "backlash", ALL, 20.0, marks=pytest.mark.nightly),
     ],
     ids=["rings", "rings, read twice as often", "winds up"],
 )
-def test_what_comes_after_reversals_is_no_spike(tmp_path, law, name, rate_hz):
-    record(tmp_path / "s", seed=34, mechanisms=[KINEMATICS, law], rate_hz=rate_hz)
+def test_what_comes_after_reversals_is_no_spike(tmp_path, law, name, tests, rate_hz):
+    record(
+        tmp_path / "s", seed=34, plan=subset(table_ii_plan(34), tests), mechanisms=[KINEMATICS, law], rate_hz=rate_hz
+    )
     summary = diagnose_sessions([tmp_path / "s"], ["backlash", "play", "reversal-spike"], (), lambda _: None).summary()
     named = {s["name"] for s in summary["sources"] if s["verdict"] in {"identified", "ambiguous", "does-not-predict"}}
     assert named == ({name} if name else set())
@@ -95,7 +105,13 @@ def test_what_comes_after_reversals_is_no_spike(tmp_path, law, name, rate_hz):
 
 @pytest.mark.slow
 def test_a_bump_between_tests_that_balls_hide_is_not_ruled_out(tmp_path):
-    record(tmp_path / "s", seed=1510, mechanisms=[KINEMATICS, BumpedJig(from_run=14)], rate_hz=10.0)
+    record(
+        tmp_path / "s",
+        seed=1510,
+        plan=subset(table_ii_plan(1510), EIGHT),
+        mechanisms=[KINEMATICS, BumpedJig(from_run=8)],
+        rate_hz=10.0,
+    )
     summary = diagnose_sessions([tmp_path / "s"], ["jig-bump"], (), lambda _: None).summary()
     (bump,) = summary["sources"]
     assert bump["verdict"] == "not-testable"

@@ -24,12 +24,21 @@ from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import Verdict
 from dbbstation.results.of_mismatch import mismatch_result
 from dbbstation.tasks.tables import TableOptions, load_tables
+from tests.diagnosis.table import plant
 from tests.diagnosis.table.plant import PULSE_S, Truth, record
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 ASKED = TableOptions("measured_mm", "simulated_mm")
+
+
+@pytest.fixture(autouse=True, params=[10.0, pytest.param(20.0, marks=pytest.mark.nightly)], ids=["10 Hz", "20 Hz"])
+def rate_hz(request, monkeypatch):
+    """Readings a second."""
+    monkeypatch.setattr(plant, "RATE_HZ", request.param)
+    return request.param
+
 
 FOUND = {
     "play": (Truth(play_um=8.0), {"hysteresis of place_mm", "hysteresis of simulated_mm"}, ("half width", 4e-3)),
@@ -107,7 +116,8 @@ def test_what_is_measured_late_has_a_delay_that_is_positive(rng):
     assert finding.values["delay"].value == pytest.approx(0.03, rel=0.05)
 
 
-def test_a_step_and_a_pulse_are_placed_in_time(tmp_path):
+def test_a_step_and_a_pulse_are_placed_in_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(plant, "RATE_HZ", 20.0)  # edges to a third of a second
     found = found_in(tmp_path, Truth(step_um=6.0, pulse_um=12.0))
     stretches = sorted(rows for finding in found.there for rows in finding.rows)
     times = found.table.clock.values
@@ -194,8 +204,8 @@ def test_held_out_error_is_that_of_the_noise(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_robot_measured_by_a_laser_tracker(recordings, tmp_path):
-    """Every fourth of 2,773 poses of a UR10 [christianlandgraf/ipa-robot-accuracy, Series C], over three of its joints.
+def test_a_robot_measured_by_a_laser_tracker(recordings, tmp_path, rate_hz):
+    """Every eighth, at night every fourth, of 2,773 poses of a UR10 [christianlandgraf/ipa-robot-accuracy, Series C], over three of its joints.
 
     It must predict better than once and twice q1, which are known to be there, do by least squares.
     """
@@ -204,7 +214,7 @@ def test_a_robot_measured_by_a_laser_tracker(recordings, tmp_path):
         pytest.skip(f"{path} is not there")
     names, *lines = path.read_text(encoding="utf-8").splitlines()
     fewer = tmp_path / "ur10.csv"
-    fewer.write_text("\n".join([names, *lines[::4]]) + "\n", encoding="utf-8")
+    fewer.write_text("\n".join([names, *lines[:: 8 if rate_hz == 10.0 else 4]]) + "\n", encoding="utf-8")
     asked = TableOptions("measured_mm", "model_mm", {"q1": None, "q2": None, "q3": None})
     found = find_mismatch(load_tables([fewer], asked).table)
     q1 = np.radians(found.table.columns["q1"])

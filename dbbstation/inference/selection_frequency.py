@@ -60,10 +60,11 @@ def selection_frequency(
     )
     names = np.array(sorted(set(groups)))
     kept_groups = max(int(np.ceil(SHARE * len(names))), min(len(names), 2))
-    rows = spread(blocks, columns)
-    every, target = CauseColumns(rows[:, :base]), rows[:, -1]
-    every.add(rows[:, base:-1])
     group_of = np.repeat(groups, [len(block.target) for block in blocks])
+    rows = spread(blocks, columns)
+    every, target = CauseColumns(rows[:, :base].copy(), room=columns - base - 1), rows[:, -1].copy()
+    every.add(rows[:, base:-1])
+    del rows, blocks  # each fills as much memory as all causes
     parts = {name: every.part(group_of == name) for name in names.tolist()}
     times = dict.fromkeys((cause.name for cause in causes), 0)
     for _ in range(DRAWS):

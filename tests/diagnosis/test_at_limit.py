@@ -21,6 +21,8 @@ from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.disturbances import WALK_STEP_S, WanderingBar
 from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.mechanisms.perturbed import ByDirection
+from tests.plant.mechanisms.servo import ServoLag
 from tests.plant.session import record
 
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
@@ -214,3 +216,17 @@ def test_a_parameter_at_an_end_and_a_fit_that_moves_are_said(tmp_path):
         assert (at_end.what, at_end.name) == ("parameter", "backlash wind_up_length_mm")
         assert f"{end} end of its range, {value:.4g} mm" in at_end.text
         assert moves.what == "fit"
+
+
+@pytest.mark.slow
+def test_a_lag_that_is_another_in_each_direction_is_a_lag(tmp_path):
+    """A tenth more while a strut grows, less while it shrinks: up to 4 µm, which called for six effects without a name."""
+    lag = ByDirection(ServoLag((3.0, 1.0, 5.0, 2.0, 4.0, 1.0)), (0.1, -0.1, 0.1, 0.1, -0.1, 0.1))
+    record(tmp_path / "s", seed=5, mechanisms=[KINEMATICS, lag], rate_hz=10.0)
+    found = diagnose_sessions([tmp_path / "s"], None, (), lambda _: None).diagnosis
+    named = {
+        s.name for s in found.sources if str(s.verdict) in {"identified", "happened", "ambiguous", "does-not-predict"}
+    }
+    assert named == {"servo-lag"}
+    assert found.limits == ()
+    assert found.unexplained.variable is None

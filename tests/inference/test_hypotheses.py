@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 
-from dbbstation.inference.hypotheses import CLOSE, LIKELY, NEGLIGIBLE, search
-from dbbstation.inference.model_comparison import FLEXIBLE, Member
+from dbbstation.inference.hypotheses import CLOSE, LIKELY, MOST_REPLACED, NEGLIGIBLE, search
+from dbbstation.inference.model_comparison import FLEXIBLE, Around, Member
 from tests.inference.dense import Dense, cause, variant
 from tests.inference.subsets import inclusion, log_posteriors
 
@@ -168,3 +170,27 @@ def test_scores_that_count_for_nothing_are_not_kept(rng):
     assert posterior.best.names == {"c4"}
     assert scored
     assert min(scored.values()) > top - NEGLIGIBLE
+
+
+def test_pairs_that_are_replaced_are_counted(rng, monkeypatch):
+    """Twelve causes are there, of rising size: one cause is tried in the place of the 28 least pairs of 66; among parts of none."""
+    columns, sizes = rng.normal(size=(40, 14)), np.append(np.geomspace(0.5, 3.0, 12), [0.0, 0.0])
+    problem = Dense(BASE, columns, columns @ sizes + rng.normal(0, 0.02, 40), 0.02)
+    replaced, without = [], Around.without
+
+    def counted(around, names):
+        replaced.extend([tuple(names)] if len(names) == 2 else [])
+        return without(around, names)
+
+    monkeypatch.setattr(Around, "without", counted)
+    causes = one_column_each(14)
+    whole = search(problem.comparison(), causes).best
+    assert whole.names == {f"c{k}" for k in range(12)}
+    assert len(replaced) == MOST_REPLACED < 66
+    worth = dict(zip((m.cause.name for m in whole.members), whole.log_factors, strict=True))
+    sums = sorted(worth[a] + worth[b] for a, b in combinations(worth, 2))
+    assert max(worth[a] + worth[b] for a, b in replaced) <= sums[MOST_REPLACED - 1] + 1e-6
+    replaced.clear()
+    again = search(problem.comparison(), causes, [whole.members], thorough=False)
+    assert again.best.names == whole.names
+    assert replaced == []

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import main
-from tests.once import OF_SESSIONS, computed_once, made_once
+from tests.once import OF_SESSIONS, OF_TABLES, computed_once, made_once
 from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import elevated, subset, table_ii_plan
 from tests.plant.session import record
@@ -52,7 +52,7 @@ def run() -> Callable[..., Outcome]:
 def answers_kept(tmp_path_factory):
     """Commands that print, write and draw one answer compute it once; for modules that ask for it."""
     with pytest.MonkeyPatch.context() as patch:
-        computed_once(tmp_path_factory, patch, *OF_SESSIONS)
+        computed_once(tmp_path_factory, patch, *OF_SESSIONS, *OF_TABLES)
         yield
 
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import shutil
 
 import numpy as np
 import pytest
 
 from dbbstation.cli import DONE, FAILED
 from dbbstation.files.shipped import shipped_folder
+from tests.diagnosis.table import plant
 from tests.diagnosis.table.plant import Truth, record
+
+pytestmark = pytest.mark.usefixtures("answers_kept")
 
 COLUMNS = ("--measured", "measured_mm", "--simulated", "simulated_mm")
 QUICK = (*COLUMNS, "--no-held-out")
@@ -19,7 +23,9 @@ QUICK = (*COLUMNS, "--no-held-out")
 
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory):
-    return record(Truth(expansion_um_k=1.5)).write(tmp_path_factory.mktemp("table") / "warm.csv")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plant, "RATE_HZ", 10.0)
+        return record(Truth(expansion_um_k=1.5)).write(tmp_path_factory.mktemp("table") / "warm.csv")
 
 
 def rows_of(text):
@@ -261,7 +267,7 @@ def test_what_cannot_be_used_is_left_out_and_said(run, warm, tmp_path):
     path.write_text("\n".join(text) + "\n")
     outcome = run("mismatch", path, *QUICK, "--json")
     assert outcome.code == DONE
-    assert "1 of 1500 rows lack a number and are left out" in outcome.err
+    assert "1 of 750 rows lack a number and are left out" in outcome.err
     assert "`constant` is the same in all rows and is left out" in outcome.err
     assert "`word` has no numbers and is left out" in outcome.err
     assert "`copy` is measured and simulated value over again, and is left out" in outcome.err
@@ -282,7 +288,8 @@ def test_a_table_with_decimal_commas_says_the_same(run, warm, tmp_path):
 
 def test_the_table_says_where_it_comes_from(run, warm, tmp_path):
     out = tmp_path / "out.csv"
-    assert run("mismatch", warm, *QUICK, "--out", out).code == DONE
+    table = shutil.copy(warm, tmp_path / "another.csv")  # that nobody has read yet
+    assert run("mismatch", table, *QUICK, "--out", out).code == DONE
     told = json.loads((tmp_path / "out.csv.provenance.json").read_text())
     assert list(told["inputs"].values()) == [hashlib.sha256(warm.read_bytes()).hexdigest()]
     assert told["command"].startswith("dbbstation mismatch")

@@ -29,7 +29,12 @@ MOST_CANDIDATES = 12
 SURELY = float(np.log(SURE / ABSENT))
 
 
-def law_form(settled: Settled, one: VariableClass, parts: Sequence[NDArray[np.bool_]] | None) -> LawForm:
+def law_form(
+    settled: Settled,
+    one: VariableClass,
+    parts: Sequence[NDArray[np.bool_]] | None,
+    found_anew: Collection[str] | None = None,
+) -> LawForm:
     """Score single causes over the variables of a class, and the best set's own sum, in the place of what follows it.
 
     The score of a part is the log evidence of all rows less that of the rows without the part, in the noise of all rows. A law is named
@@ -44,16 +49,27 @@ def law_form(settled: Settled, one: VariableClass, parts: Sequence[NDArray[np.bo
         settled: what the comparison came to.
         one: the class.
         parts: rows of each part, shape (n,); None: nothing was held back, and the evidence of all rows decides.
+        found_anew: causes at picked places that parts gain by though each part took no part in picking; others are not named. None: not tested.
     """
-    whole = _place(settled, one.members, one.wanted, parts)
+    barred = frozenset[str]() if found_anew is None else _picked(settled) - set(found_anew)
+    whole = _place(settled, one.members, one.wanted, parts, barred)
     if whole.name is not None or len(one.members) == 1:
         return whole
-    each = {name: _place(settled, {name}, one.wanted, parts) for name in sorted(one.members)}
+    each = {name: _place(settled, {name}, one.wanted, parts, barred) for name in sorted(one.members)}
     return replace(whole, together=tuple(name for name, form in each.items() if form.name == name))
 
 
+def _picked(settled: Settled) -> frozenset[str]:
+    """Return causes at places that these rows picked."""
+    return frozenset(name for name, one in settled.bank.patterns.items() if one.family in LOOKED_FOR)
+
+
 def _place(
-    settled: Settled, names: Collection[str], wanted: Collection[str], parts: Sequence[NDArray[np.bool_]] | None
+    settled: Settled,
+    names: Collection[str],
+    wanted: Collection[str],
+    parts: Sequence[NDArray[np.bool_]] | None,
+    barred: Collection[str],
 ) -> LawForm:
     """Law in the place of some members, the others kept."""
     others = _sure(settled, names)
@@ -77,9 +93,7 @@ def _place(
             (same if contains else not_worse).append(name)
         elif contains and _contains(settled, candidates[best], candidates[name], others):
             same.append(name)
-    pattern = settled.bank.patterns.get(best)
-    picked = pattern is not None and pattern.family in LOOKED_FOR
-    single = len(candidates[best]) == 1 and not picked
+    single = len(candidates[best]) == 1 and best not in barred
     named = single and not not_worse and _is_worse(scores[best], np.zeros(len(scores[best])), parts)
     return LawForm(
         best if named else None,

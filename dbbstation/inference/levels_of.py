@@ -63,7 +63,7 @@ def levels_of(
     if parts is not None and not any(_in_time(one) and parts.of(one.wanted).predicts for one in every):
         # What happened, and goes on in no other rows, would fill these with what a curve over time has between its rows.
         parts = parts.but_for({TIME, RUN})
-    found = [_followed(settled, one, probabilities, parts) for one in every]
+    found = [_followed(settled, one, probabilities, parts, held_out) for one in every]
     classes = tuple(sorted(found, key=lambda one: (one.consequence, one.may_result)))
     sizes = detectable(settled)
     size = settled.channel.size if matters is None else matters
@@ -121,7 +121,11 @@ def slow_chance(settled: Settled) -> float:
 
 
 def _followed(
-    settled: Settled, one: VariableClass, probabilities: VariableProbabilities, parts: PartGains | None
+    settled: Settled,
+    one: VariableClass,
+    probabilities: VariableProbabilities,
+    parts: PartGains | None,
+    held_out: HeldOutError | None,
 ) -> Followed:
     probability = min(probabilities.of(each) for each in one.each)
     gain = None if parts is None else parts.of(one.wanted)
@@ -132,7 +136,8 @@ def _followed(
     carries = {v.name for v in variables if v.name in set[str]().union(*one.each) and may_result(v, settled.channel)}
     form, (slope, straight) = None, _straight(settled, one)
     if answer in (FollowsAnswer.FOLLOWS, FollowsAnswer.NOT_TESTED):
-        form = law_form(settled, one, None if parts is None else parts.rows)
+        rows = None if parts is None else parts.rows
+        form = law_form(settled, one, rows, None if held_out is None else _found_anew(settled, one, held_out))
     return Followed(
         variables=one.each,
         or_variables=one.others,
@@ -152,6 +157,11 @@ def _followed(
         slope=slope,
         straight=straight,
     )
+
+
+def _found_anew(settled: Settled, one: VariableClass, held_out: HeldOutError) -> list[str]:
+    """Return members whose kind held-out parts gain by, found anew without each."""
+    return [name for name in one.members if held_out.gains_of({settled.bank.kind_of(name)}).predicts]
 
 
 def _in_time(one: VariableClass) -> bool:

@@ -93,17 +93,18 @@ SAME = {"simulated_um": "stroke_mm"}
 
 LAWS = {
     "bend": ("curve over force_kn",),
-    "growth": ("product of stroke_mm and room_c", "linear in room_c"),
+    "growth": ("product of stroke_mm and room_c", "linear in room_c", "linear in stroke_mm"),
     "play": ("hysteresis of stroke_mm", "hysteresis of simulated_um"),
     "saturation": ("saturation of force_kn", "curve over force_kn"),
     "creep": ("memory of force_kn",),
     "warming": ("memory of pump_bar",),
     "tank": ("integral of pump_bar",),
     "sag": ("curve over stroke_mm", "curve over simulated_um"),
-    "column": ("product of stroke_mm and room_c", "linear in room_c"),
+    "column": ("product of stroke_mm and room_c", "linear in room_c", "linear in stroke_mm"),
     "load-path": ("curve over force_kn", "dead zone of force_kn"),
 }
-"""Names that are right of each: the law itself, and what contains it. A growth about a temperature beyond the range has a straight line."""
+"""Names that are right of each: the law itself, and what contains it. A product about zeros that are neither ends nor middles has straight
+lines beside it."""
 
 
 def pink(rng: np.random.Generator, axis: Moving) -> NDArray[np.float64]:

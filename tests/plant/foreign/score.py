@@ -35,7 +35,7 @@ def scored(
     shared = [name for name in sessions if all(name in of for of in rows.values())]
     return {
         "question": "Do causes whose laws are not the textbook's keep their names, beside what is on no list?",
-        "command": "python -m tests.plant.foreign make|run|score FOLDER",
+        "command": "python -m tests.plant.foreign make|run|score FOLDER, and --former of commit 0c608670",
         "seed": seed,
         "date": datetime.now(UTC).date().isoformat(),
         "commits": {commit: _figures(of) for commit, of in rows.items()},

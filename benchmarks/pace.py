@@ -171,6 +171,7 @@ def keep(file: Path, commit: str, found: dict[str, list[tuple[float, float]]]) -
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "seed": SEED,
         "load": f"{os.getloadavg()[0]:.1f}",
+        "limits": "Other work on the two cores makes processor time longer, on both sides alike; a single figure moves by a tenth.",
         "columns": columns,
         "figures": {name: [*row, *["-"] * (len(columns) - len(row))] for name, row in figures.items()},
     }

@@ -24,8 +24,9 @@ POWER = 0.9
 """Share of the effects of a size that must be found."""
 
 MARGIN = 1.25
-"""Factor on the size that is found so often: the noise and the odds of the whole search are known about so well. In a trial 27
-of 28 effects injected at the size with the margin were found."""
+"""Factor on the size that is found so often: the noise and the odds of the whole search are known about so well. Of 20
+effects injected at the size with the margin the whole answer was "yes" to 17; their probability alone was sure of 9, 10 and 10 of ten at 1,
+1.25 and 1.5."""
 
 DRAWS = 100
 """Random effects that are asked about: the share found is known to 3 %."""

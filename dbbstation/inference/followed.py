@@ -36,7 +36,7 @@ LEAST_ADDED = 0.02
 
 INTERCHANGEABLE = 0.9
 """Share of the squares of a fitted effect that one cause over another variable must make for both to be named: what it leaves is less
-than a third of the effect. How much depends on it was not measured."""
+than a third of the effect. With 0.8 and 0.95 none of ten tables named a further variable, as with this."""
 
 WAYS = {
     **dict.fromkeys((Family.HYSTERESIS, Family.FRICTION, Family.SCALED), "direction"),

@@ -1,6 +1,6 @@
 """How much depends on three constants of the levels: margin of a size, share of interchangeable effects, odds of a driven column.
 
-    python -m tests.diagnosis.table.levels_constants --seeds 31,32 --out docs/validation/levels-constants.json
+    python -m tests.diagnosis.table.levels_constants --seeds 31,32 --out docs/validation/constants-of-levels.json
 
 Tables are those of `levels_study`, one beginning of the noise, no parts held back. Each constant is halved and doubled, or about so. Results are
 kept in the file, and rows that are there are not run again.
@@ -124,7 +124,7 @@ def _stored(rows: list[dict[str, object]]) -> dict[str, object]:
     return {
         "question": "How much depends on the margin of a size, the share of interchangeable effects and the odds of a driven column?",
         "data": "Tables of a simulated press, one beginning of the noise, no parts held back.",
-        "command": "python -m tests.diagnosis.table.levels_constants --seeds 31,32 --out docs/validation/levels-constants.json",
+        "command": "python -m tests.diagnosis.table.levels_constants --seeds 31,32 --out docs/validation/constants-of-levels.json",
         "commit": subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip(),
         "date": datetime.now(UTC).date().isoformat(),
         "seed": ",".join(sorted({str(row["seed"]) for row in rows}, key=int)),

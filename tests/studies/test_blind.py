@@ -277,13 +277,15 @@ def test_a_diagnosis_that_breaks_is_the_worst_failure():
     assert [failure["said"] for failure in found["failures"]] == ["LinAlgError: singular", "play"]
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory):
+@pytest.fixture(scope="module", params=[8.0, pytest.param(25.0, marks=pytest.mark.nightly)])
+def study(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("blind")
     answers = []
     for name, hidden in (("0001", []), ("0002", [Gravity()])):
         plan = subset(table_ii_plan(int(name)), "abhimo")
-        truth = record(folder / name, plan=plan, seed=int(name), mechanisms=[RandomKinematics(), *hidden], rate_hz=8.0)
+        truth = record(
+            folder / name, plan=plan, seed=int(name), mechanisms=[RandomKinematics(), *hidden], rate_hz=request.param
+        )
         effects = [effect("gravity", 90.0, amplitudes={"strut_compliance_um_kn": 9.68})] if hidden else []
         told = answer(name, "single" if hidden else "clean", *effects)
         answers.append(told | {"truth": {k: np.asarray(v).tolist() for k, v in _machine_of(truth).items()}})

@@ -160,8 +160,9 @@ def test_without_drive_friction_currents_change_nothing(small):
 
 
 @pytest.mark.slow
-def test_long_runs_say_as_much_as_their_means(tmp_path, fitted):
-    recorded = session(tmp_path / "s", 21, tests="ab", rate_hz=125.0)
+@pytest.mark.parametrize("rate_hz", [125.0, pytest.param(250.0, marks=pytest.mark.nightly)])
+def test_long_runs_say_as_much_as_their_means(tmp_path, fitted, rate_hz):
+    recorded = session(tmp_path / "s", 21, tests="ab", rate_hz=rate_hz)
     more = session(tmp_path / "t", 21, tests="cde", rate_hz=5.0)
     calibration = calibrate(recorded.machine, recorded.observations + more.observations, sources())
     names, values, covariance = numbers(calibration, ("cog-shift",))

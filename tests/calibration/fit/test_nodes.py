@@ -22,11 +22,15 @@ ERRORS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.1)
 USUAL = ("strut-reference-length", "base-joints", "mounting", "ball-coordinate", "bar-offset")
 
 
-@pytest.fixture(scope="module")
-def long_runs(tmp_path_factory):
+@pytest.fixture(scope="module", params=[EIGHT, pytest.param("abcdefghijklmno", marks=pytest.mark.nightly)])
+def long_runs(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("plant") / "long"
     record(
-        folder, seed=7, plan=elevated(subset(table_ii_plan(7), EIGHT), 5.0, "abd"), mechanisms=[ERRORS], rate_hz=200.0
+        folder,
+        seed=7,
+        plan=elevated(subset(table_ii_plan(7), request.param), 5.0, "abcde"),
+        mechanisms=[ERRORS],
+        rate_hz=200.0,
     )
     return load_sessions([folder])
 

@@ -24,10 +24,10 @@ from tests.plant.plan import elevated, table_ii_plan
 from tests.plant.session import record
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+@pytest.fixture(scope="module", params=[10.0, pytest.param(20.0, marks=pytest.mark.nightly)])
+def recorded(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("doubt") / "s"
-    record(folder, seed=9, mechanisms=[RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)], rate_hz=10.0)
+    record(folder, seed=9, mechanisms=[RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)], rate_hz=request.param)
     return load_sessions([folder])
 
 

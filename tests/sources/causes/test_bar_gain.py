@@ -52,20 +52,21 @@ def read(folder, *mechanisms):
 
 
 @pytest.mark.slow
-def test_circles_of_two_sizes_find_it_and_circles_of_one_say_that_they_cannot(tmp_path):
+@pytest.mark.parametrize("rate_hz", [4.0, pytest.param(10.0, marks=pytest.mark.nightly)])
+def test_circles_of_two_sizes_find_it_and_circles_of_one_say_that_they_cannot(tmp_path, rate_hz):
     plan = subset(table_ii_plan(1), "abdfhjkn")
     smaller = Path(radius_mm=147.0)
     two = replace(plan, tests=tuple(replace(t, path=smaller) if k % 2 else t for k, t in enumerate(plan.tests)))
     scale = BarScale(linear_um=0.3, curved_um=0.0, set_at_mm=150.0)
-    found = gain_of(tmp_path / "two", two, scale)
+    found = gain_of(tmp_path / "two", two, scale, rate_hz)
     assert found.verdict is Verdict.IDENTIFIED
     value = found.parameters["gain_um_mm"]
     assert value.value == pytest.approx(3.0, abs=4.0 * value.uncertainty)
     assert value.uncertainty < 0.5
-    assert gain_of(tmp_path / "one", plan, scale).verdict is Verdict.NOT_TESTABLE
+    assert gain_of(tmp_path / "one", plan, scale, rate_hz).verdict is Verdict.NOT_TESTABLE
 
 
-def gain_of(folder, plan, scale):
-    record(folder, seed=1512, plan=plan, mechanisms=[KINEMATICS, scale], rate_hz=4.0)
+def gain_of(folder, plan, scale, rate_hz):
+    record(folder, seed=1512, plan=plan, mechanisms=[KINEMATICS, scale], rate_hz=rate_hz)
     found = diagnose_sessions([folder], ("bar-gain", "bar-scale"), (), lambda _: None).diagnosis
     return next(f for f in found.sources if f.name == "bar-gain")

@@ -31,21 +31,19 @@ def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.floa
 
 
 BEYOND = 5.0
-"""Prior standard deviations beyond which an effect that is laid out over a variable is impossible: it is so many times the whole difference,
-and most of it would cancel with others."""
+"""Root mean square of an effect over a variable, over that of the whole difference, beyond which it is impossible: most of it would cancel with
+others."""
 
 
-def beyond_reach(law: Law, values: NDArray[np.float64], plausible: NDArray[np.float64]) -> str:
+def beyond_reach(law: Law, rms: float) -> str:
     """Return why an effect of a family is too large to be; empty if possible.
 
     Args:
-        values: amplitudes, shape (p,).
-        plausible: their prior standard deviations, shape (p,).
+        rms: of the effect about its mean, in the residual's unit.
     """
-    times = float(np.max(np.abs(values) / plausible, initial=0.0))
-    if law.family is None or law.reach is None or times <= BEYOND:
+    if law.family is None or law.reach is None or rms <= BEYOND * law.reach:
         return ""
-    return f"It would have to be {times:.2g} times the difference itself, and cancel with others."
+    return f"It would have to be {rms / law.reach:.2g} times the difference itself, and cancel with others."
 
 
 def impossibly_negative(name: str, value: float, sigma: float, unit: str) -> str:

@@ -467,12 +467,10 @@ def _impossible(settled: Settled) -> dict[str, str]:
     for member in members:
         law = settled.bank.laws.get(member.cause.name)
         own = slice(first, first + len(member.variant.columns))
-        values, variances = estimates.values[own], np.diag(estimates.covariance)[own]
-        why = (
-            ""
-            if law is None
-            else impossible(law, values, variances) or beyond_reach(law, values, member.variant.plausible)
-        )
+        values, variances, why = estimates.values[own], np.diag(estimates.covariance)[own], ""
+        if law is not None:
+            effect = settled.bank.samples(member.variant.columns) @ values
+            why = impossible(law, values, variances) or beyond_reach(law, float(np.std(effect)))
         if why:
             found[member.cause.name] = why
         first += len(member.columns)

@@ -287,11 +287,12 @@ def _product(one: Variable, other: Variable) -> Pattern:
         named = (f"{v.name} {place:.4g} {v.unit}".strip() for v, place in zip((one, other), at, strict=True))
         labels.append(f"about {' and '.join(named)}")
     width, weight = len(labels), -float(np.log(len(labels)))
-    units = " ".join(f"({v.unit})" if "/" in v.unit or " " in v.unit else v.unit or v.name for v in (one, other))
+    first, second = (f"({v.unit})" if "/" in v.unit or " " in v.unit else v.unit or v.name for v in (one, other))
+    unit = f"/{first}²" if first == second else f"/({first} {second})"
     choices = tuple(((k,), weight, label) for k, label in enumerate(labels))
     per = (one.half_range * other.half_range,) * width
     return Pattern(
-        Family.PRODUCT, (one, other), np.column_stack(columns), None, (f"/({units})",) * width, per, choices=choices
+        Family.PRODUCT, (one, other), np.column_stack(columns), None, (unit,) * width, per, choices=choices
     )
 
 

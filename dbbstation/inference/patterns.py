@@ -291,9 +291,7 @@ def _product(one: Variable, other: Variable) -> Pattern:
     unit = f"/{first}²" if first == second else f"/({first} {second})"
     choices = tuple(((k,), weight, label) for k, label in enumerate(labels))
     per = (one.half_range * other.half_range,) * width
-    return Pattern(
-        Family.PRODUCT, (one, other), np.column_stack(columns), None, (unit,) * width, per, choices=choices
-    )
+    return Pattern(Family.PRODUCT, (one, other), np.column_stack(columns), None, (unit,) * width, per, choices=choices)
 
 
 ZEROS = (-1.0, 0.0, 1.0)

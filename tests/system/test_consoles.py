@@ -1,0 +1,30 @@
+"""Consoles that do not have every letter: what they have is printed, nothing fails, and a pipe of the same encoding likewise."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from dbbstation.files.shipped import shipped_folder
+
+SMALL = shipped_folder("fixtures") / "sessions" / "small"
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
+@pytest.mark.parametrize("words", [("circles",), ("session", "list")])
+def test_every_console_gets_the_table(encoding, words):
+    """Python writes to a Windows console in Unicode, to a pipe or file in the code page of the system."""
+    environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
+    command = [sys.executable, "-m", "dbbstation", *words, str(SMALL)]
+    done = subprocess.run(command, env=environment, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert b"Traceback" not in done.stderr
+    plain = subprocess.run(command, env={**environment, "PYTHONIOENCODING": "utf-8"}, capture_output=True, check=False)
+    shown, wanted = done.stdout.decode("utf-8" if encoding == "ascii" else encoding), plain.stdout.decode("utf-8")
+    assert len(shown.splitlines()) == len(wanted.splitlines())
+    assert [letter for letter in wanted if letter.isascii()] == [letter for letter in shown if letter.isascii() and letter != "?"]
+    if encoding != "ascii":
+        assert ("µ" in shown) == ("µ" in wanted)

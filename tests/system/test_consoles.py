@@ -25,6 +25,8 @@ def test_every_console_gets_the_table(encoding, words):
     plain = subprocess.run(command, env={**environment, "PYTHONIOENCODING": "utf-8"}, capture_output=True, check=False)
     shown, wanted = done.stdout.decode("utf-8" if encoding == "ascii" else encoding), plain.stdout.decode("utf-8")
     assert len(shown.splitlines()) == len(wanted.splitlines())
-    assert [letter for letter in wanted if letter.isascii()] == [letter for letter in shown if letter.isascii() and letter != "?"]
+    assert [letter for letter in wanted if letter.isascii()] == [
+        letter for letter in shown if letter.isascii() and letter != "?"
+    ]
     if encoding != "ascii":
         assert ("µ" in shown) == ("µ" in wanted)

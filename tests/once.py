@@ -70,6 +70,8 @@ _HERE: dict[Path, tuple[list[str], object]] = {}
 
 
 def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
+    if hasattr(task, "kept_in"):  # by another fixture: a lock in a lock of the same name would wait for ever
+        return task
     tells = "say" in inspect.signature(task).parameters
 
     @functools.wraps(task)
@@ -92,6 +94,7 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
         told, answer = pickle.loads(place.read_bytes())  # noqa: S301 - written above
         return _told(told, more, answer)
 
+    ask.kept_in = folder
     return ask
 
 

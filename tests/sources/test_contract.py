@@ -56,9 +56,11 @@ def test_derivative_is_that_of_the_effect(source, machine, rng):
                 after, before = (ends[0][name] - here[name]) / step[k], (here[name] - ends[1][name]) / step[k]
                 # A source with play has kinks, where the derivatives to either side differ; the rest must agree.
                 scale = np.abs(exact[..., k]).max(initial=0) + 1e-300
-                smooth = np.abs(after - before) < 1e-3 * scale
+                # A play that is hardly shaken does not depend on the shaking: the differences are those of rounding.
+                rounding = 8.0 * np.finfo(float).eps * np.abs(here[name]).max(initial=0) / step[k]
+                smooth = np.abs(after - before) < 1e-3 * scale + rounding
                 assert smooth.mean() > 0.98
-                assert np.abs((after + before) / 2 - exact[..., k])[smooth].max(initial=0) < 1e-4 * scale
+                assert np.abs((after + before) / 2 - exact[..., k])[smooth].max(initial=0) < 1e-4 * scale + rounding
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.name)

@@ -1,6 +1,6 @@
 """How much the answers of sessions hang on constants of the comparison: each is moved, and the sets that are found are compared.
 
-python -m tests.plant.foreign.constants FOLDER --out docs/validation/limit-constants.json
+python -m tests.diagnosis.limit_constants FOLDER --out docs/validation/limit-constants.json
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def found(folder: Path) -> tuple[str, float, float]:
 def main() -> None:
     """Read the command line and do what it says."""
     parser = argparse.ArgumentParser(
-        prog="python -m tests.plant.foreign.constants", description=__doc__.splitlines()[0]
+        prog="python -m tests.diagnosis.limit_constants", description=__doc__.splitlines()[0]
     )
     parser.add_argument("folder", type=Path, help="that `python -m tests.plant.foreign make` wrote")
     parser.add_argument("--out", type=Path, required=True)
@@ -64,7 +64,7 @@ def main() -> None:
     kept = {
         "question": "Do answers hang on the constants of the comparison?",
         "data": "Two sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5 and 6.",
-        "command": "python -m tests.plant.foreign.constants FOLDER",
+        "command": "python -m tests.diagnosis.limit_constants FOLDER",
         "date": datetime.now(UTC).date().isoformat(),
         "seed": 48,
         "limits": "One session for each constant, without held-out tests.",

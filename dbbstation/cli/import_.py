@@ -338,7 +338,7 @@ def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> lis
     """Refuse centred circles unless somebody confirms that they are raw.
 
     Raises:
-        InputError: nobody can confirm.
+        InputError: the input is no terminal, so no person can confirm.
     """
     from dbbstation.errors import InputError, Problem
     from dbbstation.tasks.importing.plausible import CHANCE

@@ -1,4 +1,4 @@
-"""Who is told when loops are compiled, once on a computer, for seconds."""
+"""Tells listeners that numerical loops are compiled: once on a computer, for some seconds."""
 
 from __future__ import annotations
 

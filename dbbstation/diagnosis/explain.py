@@ -238,7 +238,7 @@ def _listed(
     refused: Collection[str],
     given_up: Collection[tuple[str, str]],
 ) -> tuple[Cause, ...]:
-    """Return compared causes: named, set-up faults, and unmodelled effects without a name, without abandoned laws."""
+    """Return the compared causes: named causes, faults of the set-up and effects without a name. Abandoned laws are left out."""
     forms = [variant for cause in unmodelled.causes for variant in cause.variants]
     known = dict(zip(map(id, forms), named_already(comparison, forms, channel.forms(but_for=refused)), strict=True))
     nameless = [cause for cause in map(partial(_but_for, known=known), unmodelled.causes) if cause.variants]

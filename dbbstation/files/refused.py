@@ -20,7 +20,7 @@ _OTHERWISE = "check that the folder exists, its permissions and the disk"
 
 
 LONGEST_ON_WINDOWS = 259
-"""Characters of a path, unless Windows is told otherwise (Microsoft, "Maximum Path Length Limitation")."""
+"""Longest path that Windows takes by default, in characters (Microsoft, "Maximum Path Length Limitation")."""
 
 
 def refusal(error: OSError) -> tuple[str, str]:

@@ -20,7 +20,7 @@ DETERMINED = 0.9
 itself, as a torque is: of a column that only goes along with it, such as a temperature, they make less."""
 
 CARRIES = 0.5
-"""Share of what is left of it that the difference, with its derivatives, makes: more than all else together."""
+"""Share of the column's other squares that the difference makes with its derivatives: more than all other variables together."""
 
 BY_CHANCE = 1e-3
 """Probability of that by chance, as that of `left_over`."""

@@ -323,7 +323,7 @@ def left_with(one: Settled, wanted: Collection[str]) -> NDArray[np.float64]:
 def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignored: Collection[str] = ()) -> ClassGain:
     """Return the gain over some variables in unused parts; None: everything.
 
-    What follows ignored variables alone is left out of both predictions.
+    Both predictions leave out effects that follow ignored variables alone.
     """
     brought, before, after = [], 0.0, 0.0
     for part in parts:

@@ -270,7 +270,7 @@ def _speed(
 
 
 def _product(one: Variable, other: Variable) -> Pattern:
-    """Product of two variables, each about a zero at an end or in the middle of its range: where the zero is nobody knows.
+    """Product of two variables. Their zeros are unknown: each is tried at both ends and in the middle of its range.
 
     Of angles, products of their cosines and sines: waves of their sum and difference.
     """

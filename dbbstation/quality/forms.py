@@ -166,7 +166,7 @@ class Forms:
 class FormsBesides:
     """Forms of some of the runs that are held, for each of SIZES, and what they say of the runs left out.
 
-    What overlaps show of a drift is one cause more of all of them: a change of rank one [Golub and Van Loan, 2.1.4].
+    A drift that overlaps show changes all runs together: a change of rank one [Golub and Van Loan, 2.1.4].
 
     Args:
         forms: of all runs.

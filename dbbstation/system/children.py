@@ -150,7 +150,7 @@ class _Output:
                     self.full.set()
 
     def close(self) -> None:
-        """Take what is left; a process that escaped the group may hold the other end open."""
+        """Read the rest. If a process has left the group and holds the pipe open, the reader is given up."""
         self._reader.join(_PATIENCE_S)
         if not self._reader.is_alive():
             self._stream.close()
@@ -163,7 +163,8 @@ def is_root() -> bool:
 
 def end_tree(process: subprocess.Popen[Any]) -> None:
     """End a process that was started here and all that it started; does nothing if they have ended."""
-    tree = list(_tree(process.pid))
+    # The number of a process that has ended may belong to somebody else's by now.
+    tree = list(_tree(process.pid)) if process.poll() is None else []
     if hasattr(os, "killpg"):
         with suppress(OSError):  # the group is gone, or the process has none of its own
             if process.returncode is not None or os.getpgid(process.pid) == process.pid:

@@ -28,7 +28,7 @@ class PtyEnd:
         self._master, slave = os.openpty()
         tty.setraw(slave)
         self.port = os.ttyname(slave)
-        # Not held open here: so a program that opens and closes it can be told from nobody at all.
+        # Closed here, so that `wait` sees whether a program has it open.
         os.close(slave)
         os.set_blocking(self._master, False)
         self.connected = False

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from concurrent.futures import BrokenExecutor, CancelledError, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from dbbstation.computing.background import Background
 from dbbstation.computing.processes import processes
 from dbbstation.errors import StationError
 from dbbstation.files.program_identity import differences_of, program_identity
@@ -151,23 +151,11 @@ def _within(limit_s: float, act: Callable[[], Any]) -> Any:  # noqa: ANN401 - wh
     Raises:
         TimeoutError: it takes longer; it goes on in a thread that does not hold up the end of the program.
     """
-    ended: list[tuple[Any, BaseException | None]] = []
-
-    def run() -> None:
-        try:
-            ended.append((act(), None))
-        except BaseException as error:  # noqa: BLE001 - raised below, in the thread that waits
-            ended.append((None, error))
-
-    thread = threading.Thread(target=run, name="scheduler", daemon=True)
-    thread.start()
-    thread.join(limit_s)
-    if not ended:
+    work = Background(act)
+    work.wait(limit_s)
+    if not work.done:
         raise TimeoutError(f"nothing within {limit_s:g} s")
-    result, error = ended[0]
-    if error is not None:
-        raise error
-    return result
+    return work.outcome()
 
 
 def _check_workers(client: Any, address: str) -> None:  # noqa: ANN401 - distributed ships no types

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.content import Content
 
+from dbbstation.computing.background import Background
 from dbbstation.errors import StationError
 from dbbstation.facts.serialise import read_plain
 from dbbstation.service.answers import AcceptanceAnswer, ReportAnswer
-from dbbstation.service.background import Background
 from dbbstation.service.former_sessions import before_and_now
 from dbbstation.service.job import SessionTask
 from dbbstation.service.work import WorkProgress

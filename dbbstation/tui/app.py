@@ -11,9 +11,9 @@ from textual.binding import Binding
 from textual.events import InputEvent, Paste
 from textual.screen import ModalScreen
 
+from dbbstation.computing.background import Background
 from dbbstation.errors import StationError
 from dbbstation.service.after import After
-from dbbstation.service.background import Background
 from dbbstation.service.board import Board
 from dbbstation.service.last_session import last_traces
 from dbbstation.service.messages import Message, Weight

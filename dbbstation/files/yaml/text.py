@@ -111,7 +111,7 @@ def _parsed(text: str) -> tuple[YamlDocument | None, tuple[Problem, ...]]:
     return _composed(text, "", faults), tuple(faults)
 
 
-# Whoever looks which format a file has reads it again at once; plans, machines and instruments are read for every run and program.
+# A file is read twice at once: for its format and for its content. Every run and program reads its plan, machine and instrument.
 _of_the_last = functools.lru_cache(maxsize=1)(_parsed)
 _of_many = functools.lru_cache(maxsize=64)(_parsed)
 

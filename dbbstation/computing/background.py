@@ -33,9 +33,9 @@ class Background(Generic[_Outcome]):
             raise self._error
         return self._found[0]
 
-    def wait(self) -> None:
-        """Wait for any end."""
-        self._thread.join()
+    def wait(self, limit_s: float | None = None) -> None:
+        """Wait for any end, or so long at most."""
+        self._thread.join(limit_s)
 
     def _run(self) -> None:
         try:

@@ -38,7 +38,7 @@ def commanded_poses(text: str, file: str, observation: Observation) -> NDArray[n
         InputError: the program cannot be read, or does not run this circle.
         StationError: no dialect has that extension, or several have it.
     """
-    toolpath = dialect_of_file(file, text).read(text, file)
+    toolpath = dialect_of_file(file, text).toolpath(text, file)
     phi_deg = np.concatenate([observation.lead_in_deg, observation.raw.phi_deg])
     return poses_at_progress(toolpath, observation.raw.circle, phi_deg)
 

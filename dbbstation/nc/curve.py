@@ -11,6 +11,8 @@ from dbbstation.model.compensation import begun, compensated_on
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from dbbstation.model.compensation import Passed
@@ -156,6 +158,11 @@ def felt_mm(off: NDArray[np.float64]) -> NDArray[np.float64]:
     moved, tilted = np.linalg.norm(lengths[:, :3], axis=1), np.linalg.norm(lengths[:, 3:], axis=1)
     felt: NDArray[np.float64] = np.nan_to_num(np.maximum(moved, tilted))
     return felt
+
+
+def rounding_mm(decimals: Sequence[int]) -> float:
+    """Return what rounding to these decimals of X to C costs at most, at the tip or at the lever [mm]."""
+    return float(felt_mm(0.5 / 10.0 ** np.array([decimals]))[0])
 
 
 def in_mm(poses: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
+from dbbstation.errors import InputError, Problem
+from dbbstation.nc.toolpath import DECIMALS
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -35,14 +38,21 @@ class Dialect(ABC):
     what: ClassVar[str]
     """The control, in one line."""
     look_ahead: ClassVar[LookAhead | None] = None
-    """How far the control looks ahead in moves that turn A, B or C; None: as far as the feed needs."""
+    """How far the control looks ahead in moves that turn A, B or C; None: not known, and feeds are not checked."""
+    decimals: ClassVar[Sequence[int]] = DECIMALS
+    """Of the numbers of X, Y, Z [mm], A, B, C [deg]: what compensated programs are marked and checked by."""
 
     @abstractmethod
     def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
         """Return the program, with the header's lines as comments first.
 
-        The same toolpath and header give the same text. `numbers` go to the first and last line that are no comment.
+        The same toolpath and header give the same text. `numbers` go to the first line that is no comment. `toolpath.name` and
+        `toolpath.run` say which program it is, where a control wants a name or number in it.
         """
+
+    def file_name(self, stem: str, run: int) -> str:  # noqa: ARG002
+        """Return the name of a program's file; `run` counts those that are written together, from 1."""
+        return stem if stem.endswith(self.extension) else stem + self.extension
 
     def is_in(self, text: str) -> bool:  # noqa: ARG002
         """Return whether a program may be in this language; asked if several dialects share an ending."""
@@ -58,3 +68,14 @@ class Dialect(ABC):
         Raises:
             InputError: faults with line and column.
         """
+
+    def toolpath(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
+        """Return what `read` does of a program that moves something.
+
+        Raises:
+            InputError: as `read`, or nothing moves.
+        """
+        path = self.read(text, name, start=start)
+        if not path.is_move.any():
+            raise InputError([Problem(name, 0, 0, "this program moves nothing", "check that it is the file you mean")])
+        return path

@@ -14,6 +14,7 @@ from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import CHORD_MM, Prefer, Slow, compensate_toolpath
+from dbbstation.nc.curve import felt_mm, rounding_mm
 from dbbstation.nc.kept import (
     MergedMovesError,
     TooSlowError,
@@ -24,7 +25,7 @@ from dbbstation.nc.kept import (
     slower_rapids,
 )
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
-from dbbstation.nc.mark import marked
+from dbbstation.nc.mark import is_marked, marked
 from dbbstation.nc.merging import queued
 from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
 from dbbstation.nc.planner import Planner
@@ -148,17 +149,20 @@ def circle_programs(
         raise StationError(f"the plan has no test {', '.join(unknown)}", where=plan.name, remedy=f"it has {known}")
     runs = [(name, direction) for name in tests or plan.tests for direction in plan.tests[name].directions]
     programs: list[Program] = []
-    for name, direction in runs:
+    for number, (name, direction) in enumerate(runs, 1):
         progress(len(programs), len(runs))
         circle = plan.tests[name].run(direction)
         title = f"test {name} {direction}"
 
-        def written(circle: Circle, *, title: str = title, stem: str = f"{name}-{direction}") -> Program:
+        def written(
+            circle: Circle, *, title: str = title, stem: str = f"{name}-{direction}", run: int = number
+        ) -> Program:
             step = step_deg
             if inverse is not None:
                 step = _step_deg(circle, title, step_deg, chord_mm, inverse.prefer, machine, dialect)
-            path = circle_toolpath(circle, title, step_deg=step, approach=approach)
-            header = _circle_header(title, circle, step, {"plan": plan.name, "machine": machine.name})
+            path = replace(circle_toolpath(circle, title, step_deg=step, approach=approach), run=run)
+            rounding_um = 1e3 * rounding_mm(dialect.decimals)
+            header = _circle_header(title, circle, step, {"plan": plan.name, "machine": machine.name}, rounding_um)
             return _program(path, machine, dialect, stem, inverse, chord_mm, header + _said(origin or {}), split=False)
 
         def slower(mm_min: float, *, circle: Circle = circle) -> Circle:
@@ -304,7 +308,7 @@ def _program(
     *,
     split: bool,
 ) -> Program:
-    name = stem if stem.endswith(dialect.extension) else stem + dialect.extension
+    name = dialect.file_name(stem, path.run)
     check_reach(machine, path)
     check_feeds(machine, path)
     if inverse is None:
@@ -321,6 +325,11 @@ def _program(
         planner=planner_of(machine, dialect),
         prefer=prefer,
     )
+    exact = in_systems(done.toolpath)
+    finished = marked(exact, dialect.decimals)
+    # What rounding and mark move a pose by is part of how far the tool leaves the path.
+    coarse_mm = felt_mm(finished.poses - exact.poses).max(initial=0.0)
+    done = replace(done, toolpath=finished, chord_um=done.chord_um + 1e3 * float(coarse_mm))
     check_reach(machine, done.toolpath)
     check_chord(path.name, done, asked_um, inverse.accepted_um, prefer)
     check_feed(path.name, done, asked_um, machine, prefer)
@@ -328,6 +337,7 @@ def _program(
     header = [*header, *_said(inverse.origin), f"{COMPENSATED} {done.greatest_um:.3f} um"]
     header.append(f"chord error asked for {asked_um:g} um, reached {done.chord_um:.3f} um")
     header += [spent] if spent else []
+    header += [] if is_marked(finished) else ["its poses are too few to carry a mark: keep this header"]
     together_um, by_axis_um, why = _uncertainty_um(path, inverse)
     if together_um is not None:
         header.append(f"standard uncertainty of the model along the path {together_um:.3f} um at most")
@@ -340,8 +350,7 @@ def _program(
             f"standard uncertainty of the model along the path at most: {', '.join(each)}",
             f"not known because {why}",
         ]
-    finished = marked(in_systems(done.toolpath))
-    number = checksum(finished)
+    number = checksum(finished, dialect.decimals)
     return Program(
         name,
         dialect.write(replace(finished, numbers=(number, number)), header),
@@ -425,14 +434,16 @@ def _uncertainty_um(path: Toolpath, inverse: Inverse) -> tuple[float | None, tup
     return together_um, by_axis_um, ""
 
 
-def _circle_header(name: str, circle: Circle, step_deg: float, names: Mapping[str, str]) -> list[str]:
+def _circle_header(
+    name: str, circle: Circle, step_deg: float, names: Mapping[str, str], rounding_um: float
+) -> list[str]:
     chord_um = 1e3 * chord_error_mm(circle, step_deg)
     return [
         f"ball-bar run: {name}",
         *_said(names),
         f"bar {circle.bar_mm:g} mm, circle of radius {circle.radius_mm:.6f} mm about "
         + " ".join(f"{axis}{value:.6f}" for axis, value in zip("XYZ", circle.centre_mm, strict=True)),
-        f"a point every {step_deg:g} deg: chord error {chord_um:.3f} um, rounding below 0.001 um",
+        f"a point every {step_deg:g} deg: chord error {chord_um:.3f} um, rounding at most {rounding_um:.2g} um",
         "coordinates are the machine's: work offsets and tool length must be zero",
     ]
 

@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import bdtrc
 
-from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM
+from dbbstation.nc.toolpath import DECIMALS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from numpy.typing import NDArray
 
     from dbbstation.nc.toolpath import Toolpath
@@ -33,6 +35,17 @@ LEAST_WAY_MM, LEAST_TURN_DEG, LEAST_ONLY_TURN_DEG = 1e-3, 1e-6, 1e-3
 """An axis is moved by the mark only where it moves itself by more than this, before and after the pose: what stands still must go
 on standing still (an axis that a rapid leaves in another coordinate system, too), and F, which counts along the way, must go on taking its time within half a percent."""
 
+STEPS_APART, STEPS_TURNED, STEPS_ONLY_TURNED = 200.0, 1.0, 2000.0
+"""The same in last decimals, for dialects with few of them: one step of X, Y or Z, or nine of angles, are half a percent then."""
+
+COARSER = range(2, 8)
+"""Decimals of other dialects, which may have marked a program as well."""
+
+_SAME = 1e-9
+"""Numbers that differ by less are one: poses have fifteen digits."""
+
+_GROUPS = ((slice(0, 3), DECIMALS[0]), (slice(3, 6), DECIMALS[5]))
+
 FARTHEST_PLACE, FARTHEST_ANGLE, FARTHEST_ANGLE_OF_FEW = 1, 3, 9
 """Greatest steps of the last decimals of X, Y, Z and of A, B, C: a nanometre; half a nanometre, or three, at a point 100 mm from the
 tip. Where A, B and C stand still one pose in five has the mark; thirty poses are enough then."""
@@ -40,7 +53,6 @@ tip. Where A, B and C stand still one pose in five has the mark; thirty poses ar
 TRIED_AT_ONCE = 16_384
 """Steps that are tried together, of all poses: enough for arrays to be quick, and half a megabyte."""
 
-_SCALE = np.repeat([10.0**DECIMALS_MM, 10.0**DECIMALS_DEG], 3)
 _FELT_NM = np.array([1.0, 1.0, 1.0, 0.17, 0.17, 0.17])
 """What the last decimal is worth, of an angle at a point 100 mm from the tip [nm]."""
 
@@ -59,13 +71,13 @@ _ODD = np.array(
 known by: never change them."""
 
 
-def marked(toolpath: Toolpath) -> Toolpath:
+def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
     """Return a compensated toolpath with marked poses, rounded as they will be written."""
     moves = np.flatnonzero(toolpath.is_move)
     if not len(moves):
         return toolpath
-    numbers = _numbers(toolpath.poses[moves])
-    free = _free(toolpath, moves)
+    numbers = _numbers(toolpath.poses[moves], decimals)
+    free = _free(toolpath, moves, decimals)
     can = np.flatnonzero(free.any(axis=1))
     bits = BITS[min(max(len(np.unique(_sums(numbers[can]))), 2), 4)]  # a pose that comes again counts once
     if bits == BITS[4]:
@@ -73,7 +85,7 @@ def marked(toolpath: Toolpath) -> Toolpath:
     else:
         _mark_few(numbers, free, can, bits)
     poses = toolpath.poses.copy()
-    poses[moves] = numbers / _SCALE
+    poses[moves] = numbers / 10.0 ** np.array(decimals)
     # Rows between moves stand where the move before them ended.
     before = np.searchsorted(moves, np.arange(len(poses)), side="right") - 1
     stands = ~toolpath.is_move & (before >= 0)
@@ -83,12 +95,28 @@ def marked(toolpath: Toolpath) -> Toolpath:
 
 def is_marked(toolpath: Toolpath) -> bool:
     """Return whether more poses are marked than chance gives."""
-    sums = np.unique(_sums(_numbers(toolpath.poses[toolpath.is_move])))
-    for bits in BITS.values():
-        hits = int(np.count_nonzero(_has_mark(sums, bits)))
-        if hits > 0 and float(bdtrc(hits - 1, len(sums), 0.5**bits)) < BY_CHANCE:
-            return True
+    poses = toolpath.poses[toolpath.is_move]
+    for decimals in decimals_of(poses):
+        sums = np.unique(_sums(_numbers(poses, decimals)))
+        for bits in BITS.values():
+            hits = int(np.count_nonzero(_has_mark(sums, bits)))
+            if hits > 0 and float(bdtrc(hits - 1, len(sums), 0.5**bits)) < BY_CHANCE:
+                return True
     return False
+
+
+def decimals_of(poses: NDArray[np.float64]) -> Iterator[tuple[int, ...]]:
+    """Yield the decimals in which a dialect may have written poses, shape (n, 6): those of this program first.
+
+    Fewer are possible only if no pose has more.
+    """
+    yield DECIMALS
+    enough = [[n for n in COARSER if n <= most and _off(poses[:, axes], n) < _SAME] for axes, most in _GROUPS]
+    yield from (found for mm in enough[0] for deg in enough[1] if (found := (mm,) * 3 + (deg,) * 3) != DECIMALS)
+
+
+def _off(numbers: NDArray[np.float64], decimals: int) -> float:
+    return float(np.abs(numbers - np.round(numbers, decimals)).max(initial=0.0))
 
 
 def _mark_many(numbers: NDArray[np.int64], free: NDArray[np.bool_], missing: NDArray[np.int64]) -> None:
@@ -124,8 +152,8 @@ def _mark_few(numbers: NDArray[np.int64], free: NDArray[np.bool_], rows: NDArray
             numbers[row] += steps[found[0]]
 
 
-def _numbers(poses: NDArray[np.float64]) -> NDArray[np.int64]:
-    numbers: NDArray[np.int64] = np.rint(poses * _SCALE).astype(np.int64)
+def _numbers(poses: NDArray[np.float64], decimals: Sequence[int]) -> NDArray[np.int64]:
+    numbers: NDArray[np.int64] = np.rint(poses * 10.0 ** np.array(decimals)).astype(np.int64)
     return numbers
 
 
@@ -145,13 +173,14 @@ def _has_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.bool_]:
     return marked_ones
 
 
-def _free(toolpath: Toolpath, moves: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _free(toolpath: Toolpath, moves: NDArray[np.int64], decimals: Sequence[int]) -> NDArray[np.bool_]:
     """Return which axes each move may shift by a few last decimals, shape (m, 6)."""
     poses = toolpath.poses[moves]
     way = np.abs(np.diff(poses, axis=0))
     tips = way[:, :3].max(axis=1) > 0.0
     least = np.where(tips[:, None], [LEAST_WAY_MM] * 3 + [LEAST_TURN_DEG] * 3, [np.inf] * 3 + [LEAST_ONLY_TURN_DEG] * 3)
-    moving: NDArray[np.bool_] = way > least
+    steps = np.where(tips[:, None], [STEPS_APART] * 3 + [STEPS_TURNED] * 3, STEPS_ONLY_TURNED)
+    moving: NDArray[np.bool_] = way > np.maximum(least, 0.99 * steps / 10.0 ** np.array(decimals))
     free = np.ones(poses.shape, dtype=np.bool_)
     free[:-1] &= moving
     free[1:] &= moving

@@ -10,11 +10,11 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.nc.dialect import plain
-from dbbstation.nc.mark import is_marked
-from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, RowKind
+from dbbstation.nc.mark import decimals_of, is_marked
+from dbbstation.nc.toolpath import DECIMALS, RowKind
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.nc.toolpath import Toolpath
@@ -28,14 +28,13 @@ CHECKSUMS = 99_999_999
 _MACHINE = re.compile(r"machine\s*[:=]\s*(?P<name>.*\S)\s*", re.IGNORECASE)
 
 
-def checksum(toolpath: Toolpath) -> int:
+def checksum(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> int:
     """Return a checksum of moves, dwells and stops in order, with written decimals.
 
     Comments, feeds, line numbers and units do not count.
     """
     told = np.isin(toolpath.kind, [RowKind.RAPID, RowKind.FEED, RowKind.DWELL, RowKind.PAUSE])
-    decimals = np.repeat([10.0**DECIMALS_MM, 10.0**DECIMALS_DEG], 3)
-    poses = np.where(toolpath.is_move[:, None], np.rint(toolpath.poses * decimals), 0.0)
+    poses = np.where(toolpath.is_move[:, None], np.rint(toolpath.poses * 10.0 ** np.array(decimals)), 0.0)
     digest = hashlib.sha256()
     digest.update(toolpath.kind[told].astype("<i1").tobytes())
     digest.update(poses[told].astype("<i8").tobytes())
@@ -46,14 +45,19 @@ def checksum(toolpath: Toolpath) -> int:
 def check_nominal(toolpath: Toolpath) -> None:
     """Refuse a compensated program.
 
-    Three signs show one: a comment, the mark in its poses, and the checksum as first and last line number.
+    Three signs show one: a comment, the mark in its poses, and the checksum as line number.
 
     Raises:
         StationError: it is compensated already.
     """
     said = any(text.startswith(COMPENSATED) for text in toolpath.text.values())
     how = "says its header" if said else ""
-    if not how and toolpath.numbers and checksum(toolpath) in toolpath.numbers:
+    moved = toolpath.poses[toolpath.is_move]
+    if (
+        not how
+        and toolpath.numbers
+        and any(checksum(toolpath, each) in toolpath.numbers for each in decimals_of(moved))
+    ):
         how = "says the checksum in its line numbers"
     if not how and is_marked(toolpath):
         how = "say the last decimals of its poses"

@@ -15,11 +15,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-DECIMALS_MM = 6
-"""Decimals of a millimetre in programs: rounding costs at most 0.0005 µm per axis, 0.0009 µm in space."""
-
-DECIMALS_DEG = 7
-"""Decimals of a degree: at most 9e-10 rad, 0.0009 µm at a point one metre from the tool tip, nothing at the tip."""
+DECIMALS = (6, 6, 6, 7, 7, 7)
+"""Decimals of X, Y, Z [mm], A, B, C [deg] in programs: rounding costs at most 0.0009 µm in space, and as much a metre from the tip."""
 
 LEAST_MM = LEAST_DEG = 1e-8
 """An axis that moves by less stands still: LinuxCNC's limit, per axis [CART_FUZZ in libnml/posemath/posemath.h, applied by
@@ -93,7 +90,8 @@ class Toolpath:
         frame: system in which each axis was named last, shape (n, 6): as `system`, or `BY_INCREMENTS`.
         guard: not None if the program ends before it moves when one of these systems, G92 or a tool length is not zero.
         units_said: whether the program states its unit of length.
-        numbers: first and last line number; a compensated program carries its checksum there.
+        numbers: first and last line number; a compensated program carries its checksum in the first.
+        run: number of the program among those that are written together, from 1.
         merges_mm: distance within which the control merges short moves, shape (n,); 0 if it does not.
         arc: centre X, Y [mm] and spanned angle of a chord [rad], counter-clockwise positive, shape (n, 3); angle 0 in straight
             rows. None: no arcs.
@@ -117,6 +115,7 @@ class Toolpath:
     units_said: bool = True
     numbers: tuple[int, ...] = ()
     arc: NDArray[np.float64] | None = None
+    run: int = 1
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -463,9 +462,9 @@ def in_pieces(pieces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.
     return row, number / pieces[row]
 
 
-def rounded(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def rounded(poses: NDArray[np.float64], decimals: Sequence[int] = DECIMALS) -> NDArray[np.float64]:
     """Return poses, shape (n, 6), as programs write them, without -0."""
-    return np.hstack([np.round(poses[:, :3], DECIMALS_MM), np.round(poses[:, 3:], DECIMALS_DEG)]) + 0.0
+    return np.column_stack([np.round(poses[:, axis], places) for axis, places in enumerate(decimals)]) + 0.0
 
 
 def _norm(vectors: NDArray[np.float64], least: float) -> NDArray[np.float64]:

@@ -6,11 +6,13 @@ faults. An error for missing words is none.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dbbstation.errors import StationError
+from dbbstation.nc.mark import is_marked, marked
 from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, RowKind, ToolpathBuilder
 
 if TYPE_CHECKING:
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
 FIRST = np.array([10.0, -20.0, -1000.0, 1.0, -2.0, 3.0])
 SECOND = np.array([10.5, -20.0, -1000.0, 1.0, -2.0, 3.5])
+
+SHOWN = "MSG, "
 
 POSE_WITHIN = 1e-3
 """How far a pose may be read from where it was written: decimals are the dialect's own affair [mm, deg]."""
@@ -60,7 +64,25 @@ def faults_of(dialect: Dialect) -> list[str]:
     if not faults:
         wrote = _built(has_words)
         faults = _differences(wrote, _read(dialect, wrote), "all in one program")
-    return faults
+    return faults or _faults_of_mark(dialect)
+
+
+def _faults_of_mark(dialect: Dialect) -> list[str]:
+    """Return whether a compensated program is not known again once its header is gone."""
+    path = _built([_curve])
+    if is_marked(_read(dialect, marked(path, dialect.decimals))):
+        return []
+    return [
+        f"it cannot be marked: what it writes with {' '.join(map(str, dialect.decimals))} decimals is read otherwise"
+    ]
+
+
+def _curve(path: ToolpathBuilder) -> None:
+    """Forty moves of all axes, enough for a mark."""
+    turns = np.linspace(0.0, 6.0, 41)[:, None] + np.arange(3.0)
+    poses = FIRST + np.hstack([20.0 * np.sin(turns), 3.0 * np.cos(turns)])
+    path.rapid(poses[0])
+    path.feed(poses[1:], 600.0)
 
 
 def _from_first(by: list[float]) -> NDArray[np.float64]:
@@ -183,13 +205,24 @@ def _differences(wrote: Toolpath, read: Toolpath, tried: str) -> list[str]:
     return []
 
 
+def _with_messages(path: Toolpath) -> dict[int, str | None]:
+    """Return texts by row, a message before a stop as the stop's own: they may be one row or two; None: it is no row then."""
+    texts: dict[int, str | None] = dict(path.text)
+    told = np.flatnonzero(path.kind != RowKind.COMMENT)
+    for row, after in pairwise(told.tolist()):
+        said = path.text.get(row, "")
+        if path.kind[row] == RowKind.MESSAGE and said.startswith(SHOWN) and path.kind[after] == RowKind.PAUSE:
+            texts |= {row: None, after: texts.get(after) or said.removeprefix(SHOWN)}
+    return texts
+
+
 def _rows(path: Toolpath) -> Iterator[_Row]:
     """Return rows that act on a machine, with modal changes."""
     if path.guard is not None:
         yield _Row(" ".join(["a guard against offsets", *path.guard]))
-    feeds, corner = path.feed, np.nan
+    feeds, corner, texts = path.feed, np.nan, _with_messages(path)
     for row, kind in enumerate(path.kind.tolist()):
-        text = path.text.get(row, "")
+        text = texts.get(row, "")
         if kind in {RowKind.RAPID, RowKind.FEED}:
             if not np.array_equal(path.corners_mm[row], corner, equal_nan=True):
                 corner = float(path.corners_mm[row])
@@ -203,7 +236,7 @@ def _rows(path: Toolpath) -> Iterator[_Row]:
         elif kind == RowKind.DWELL:
             yield _Row("dwell in s", (path.dwell_s[row],), (SHARE_WITHIN * path.dwell_s[row],))
         elif kind == RowKind.FUNCTION:
-            yield from (_Row(word) for word in text.split())
-        elif kind != RowKind.COMMENT:
+            yield from (_Row(word) for word in str(text).split())
+        elif kind != RowKind.COMMENT and text is not None:
             yield _Row(f"{RowKind(kind).name.lower().replace('_', ' ')} {text}".strip())
     yield _Row(f"end by {path.ending.value}")

@@ -14,7 +14,7 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.nc.dialect import Dialect
-from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, MACHINE_SYSTEM, Ending, RowKind, rounded
+from dbbstation.nc.toolpath import MACHINE_SYSTEM, RowKind, rounded
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -62,11 +62,8 @@ class WordDialect(Dialect):
     Each method returns one line. It raises `CannotSayError` if not overridden.
     """
 
-    axis_forms: ClassVar[Sequence[str]] = tuple(
-        f"{axis}%.{decimals}f"
-        for axis, decimals in zip("XYZABC", (DECIMALS_MM,) * 3 + (DECIMALS_DEG,) * 3, strict=True)
-    )
-    """How a number is written for each axis, X, Y, Z [mm], A, B, C [deg], as for the operator `%`."""
+    axis_words: ClassVar[Sequence[str]] = tuple("XYZABC")
+    """What is written before the number of each axis, X, Y, Z [mm], A, B, C [deg]."""
 
     def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
         """Return the program.
@@ -83,7 +80,7 @@ class WordDialect(Dialect):
             CannotSayError: the dialect has no words for something in it.
         """
         # What does not move by the decimals that are written does not move.
-        toolpath = replace(toolpath, poses=rounded(toolpath.poses))
+        toolpath = replace(toolpath, poses=rounded(toolpath.poses, self.decimals))
         yield from self.before_header(toolpath)
         for text in header:
             yield self.comment(text)
@@ -95,10 +92,7 @@ class WordDialect(Dialect):
             around[0] = f"{self.line_number(toolpath.numbers[0])}{around[0]}"
         yield from around
         yield from self._body(toolpath)
-        around = list(self.end(toolpath))
-        if toolpath.numbers and around and toolpath.ending is not Ending.TEXT:
-            around[-1] = f"{self.line_number(toolpath.numbers[-1])}{around[-1]}"
-        yield from around
+        yield from self.end(toolpath)
 
     def before_header(self, toolpath: Toolpath) -> Iterable[str]:  # noqa: ARG002
         """Return lines before the header's comments."""
@@ -223,7 +217,7 @@ class WordDialect(Dialect):
                 continue
             alike = np.flatnonzero(which == one)
             axes = np.flatnonzero(changed[alike[0]])
-            form = " ".join(self.axis_forms[axis] for axis in axes.tolist())
+            form = " ".join(f"{self.axis_words[axis]}%.{self.decimals[axis]}f" for axis in axes.tolist())
             for row, values in zip(alike.tolist(), poses[np.ix_(alike, axes)].tolist(), strict=True):
                 texts[row] = form % tuple(values)
         return texts

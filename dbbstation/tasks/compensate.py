@@ -93,7 +93,7 @@ def compensate(
     writer = dialect_given(dialect)
     text = program_text(source)
     reader = dialect_of_file(str(source), text) if written_in is None else dialect_given(written_in)
-    path = reader.read(text, str(source), start=pose)
+    path = reader.toolpath(text, str(source), start=pose)
     inverse = inverse_of(
         model,
         known,

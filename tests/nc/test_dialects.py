@@ -201,6 +201,10 @@ SABOTAGE = {
     "no messages": (editing("re.sub(r'\\(MSG, hello\\)', '', text)"), r"it loses `message MSG, hello`"),
     "no work system": (editing("text.replace('G55\\n', '')"), r"it loses `system G55`"),
     "no machine coordinates": (editing("text.replace('G53 ', '')"), r"wrote `rapid in machine coordinates to"),
+    "its decimals": (
+        "decimals = (3, 3, 3, 3, 3, 3)\n\ndef read(self, text, name, *, start=None):\n    return super().read(re.sub(r'([XYZABC]-?\\d+\\.\\d\\d)\\d', r'\\1', text), name, start=start)",
+        r"it cannot be marked: what it writes with 3 3 3 3 3 3 decimals is read otherwise",
+    ),
     "no exact stop": (editing("text.replace('G61\\n', '')"), r"path control"),
     "no guard": ("def guard(self, systems):\n    return ''", r"it loses `a guard against offsets`"),
     "M2 for M30": (editing("text.replace('M30', 'M2')"), r"wrote `end by M30` and reads `end by M2`"),
@@ -227,6 +231,38 @@ def test_a_dialect_that_says_what_it_has_no_words_for_is_taken(tmp_path, crooked
     path = read_program("G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X1 F100\nM1\nM2\n", "part.ngc")
     with pytest.raises(CannotSayError, match=r"part\.ngc:4: the dialect own has no words for an optional stop \(M1\)"):
         compensated_program(path, dialect, Inverse(crooked))
+
+
+def test_a_stop_with_its_message_may_be_read_as_two_rows(tmp_path):
+    body = """
+        def read(self, text, name, *, start=None):
+            return super().read(text.replace("M0", "(note)\\nM0"), name, start=start)
+    """
+    assert dialect_given(own(tmp_path, body)).name == "own"
+
+
+def test_a_dialect_learns_which_of_the_programs_it_writes(tmp_path, table2, reference):
+    body = """
+        def file_name(self, stem, run):
+            return f"O{run:04}{self.extension}"
+
+        def before_header(self, toolpath):
+            return [f"(O{toolpath.run:04} {toolpath.name[:24]})"]
+
+        def end(self, toolpath):
+            if toolpath.ending.value == "%":
+                raise self.cannot_say("an end without M2")
+            return [toolpath.ending.value]
+    """
+    dialect = dialect_given(own(tmp_path, body))
+    programs = circle_programs(table2, reference, dialect, tests=["a", "b"])
+    assert [each.name for each in programs] == ["O0001.own", "O0002.own", "O0003.own", "O0004.own"]
+    assert programs[2].text.startswith("(O0003 test b ")
+
+
+def test_a_program_that_moves_nothing_is_refused_whatever_reads_it():
+    with pytest.raises(InputError, match="this program moves nothing"):
+        dialect_given(str(EXAMPLE)).toolpath("M30\n", "empty.mpf")
 
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "sinumerik.py"

@@ -9,9 +9,11 @@ import pytest
 
 from dbbstation.errors import StationError
 from dbbstation.nc.compensate import compensate_toolpath
+from dbbstation.nc.dialects.linuxcnc import LinuxCNC
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.mark import BITS, BY_CHANCE, _has_mark, _numbers, _sums, is_marked, marked
 from dbbstation.nc.rs274.reader import read_program
+from dbbstation.nc.toolpath import DECIMALS
 
 PART = "G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X20 F500\nG4 P0.5\nG1 Y5 A2\nX7 Y7\nX0 Y9\nX3 Y0\nM0\nG0 Z-950\nM2\n"
 
@@ -74,6 +76,33 @@ def test_a_compensated_circle_is_known_without_numbers(linuxcnc, crooked, table2
         compensated_program(linuxcnc.read(bare(without_numbers(program.text)), "a.ngc"), linuxcnc, Inverse(crooked))
 
 
+class Coarse(LinuxCNC):
+    """A control that takes four decimals."""
+
+    decimals = (4, 4, 4, 4, 4, 4)
+
+
+@pytest.mark.parametrize("change", [lambda text: text, lambda text: bare(without_numbers(text))])
+def test_a_program_with_four_decimals_is_known_and_its_rounding_is_part_of_what_is_reached(linuxcnc, crooked, change):
+    path = read_program(PART.replace("M2", "G1 X40 Y0 A0\nG3 I-40 P2 A9 B3 C-3\nM2"), "part.ngc")
+    fine, coarse = (
+        compensated_program(path, dialect, Inverse(crooked, accepted_um=3.0)) for dialect in (linuxcnc, Coarse())
+    )
+    assert re.search(r"X\d+\.\d{4} ", coarse.text)
+    # Half a last decimal in each of three angles, 100 mm from the tip: 0.15 µm; the mark adds three decimals at most.
+    assert 0.01 < coarse.chord_um - fine.chord_um < 7.0 * 0.5e-4 * np.radians(100.0) * np.sqrt(3.0) * 1e3 + 0.01
+    with pytest.raises(StationError, match="compensated already"):
+        compensated_program(Coarse().read(change(coarse.text), "again.ngc"), linuxcnc, Inverse(crooked))
+
+
+def test_a_program_too_short_for_its_mark_says_so(crooked):
+    path = read_program(PART, "part.ngc")
+    assert (
+        "; its poses are too few to carry a mark"
+        in compensated_program(path, Coarse(), Inverse(crooked, accepted_um=3.0)).text
+    )
+
+
 def test_nominal_programs_are_not_taken_for_compensated_ones():
     draw = np.random.default_rng(7)
     for count in (1, 2, 5, 6, 7, 20, 300):
@@ -90,7 +119,7 @@ def test_a_pattern_that_is_run_many_times_is_one_pattern():
         pose = np.round(draw.uniform(-50.0, 50.0, 6), 3)
         line = " ".join(f"{a}{v:.3f}" for a, v in zip("XYZABC", pose, strict=True))
         path = read_program(f"G21 G90\nG0 {line}\nG1 X0 F100\n" + f"{line}\nX0\n" * 50 + "M2\n", "x.ngc")
-        if _has_mark(_sums(_numbers(path.poses[:1])), BITS[4])[0]:
+        if _has_mark(_sums(_numbers(path.poses[:1], DECIMALS)), BITS[4])[0]:
             break
     assert not is_marked(path)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Nobody's settings hold in tests, and sessions that are only read get no log beside them.
 os.environ["XDG_CONFIG_HOME"] = str(Path(__file__).parent / "no-such-folder")
+os.environ["XDG_DATA_HOME"] = os.devnull
 os.environ["DBBSTATION_LOG"] = "off"
 
 import numpy as np

@@ -50,6 +50,11 @@ if TYPE_CHECKING:
     "folder and not run again otherwise.",
 )
 @click.option(
+    "--allow",
+    is_flag=True,
+    help="With --simulator: run this simulator from now on, until one of its files changes. A simulator file runs a program.",
+)
+@click.option(
     "--corrected",
     type=click.Path(path_type=Path, dir_okay=False),
     help="With --simulator: write measured, simulated, refitted and corrected values here.",
@@ -107,6 +112,7 @@ def mismatch(
     simulator: Path | None,
     most_runs: int | None,
     anew: bool,
+    allow: bool,
     corrected: Path | None,
     variables: str | None,
     run: str | None,
@@ -157,12 +163,13 @@ def mismatch(
         simulator,
         {"--measured": measured, "--simulated": simulated, "--variables": variables, "--run": run, "--time": time}
         | {"--known": known, "--free": free, "--no-offset": no_offset or None},
-        {"--most-runs": most_runs, "--corrected": corrected, "--anew": anew or None},
+        {"--most-runs": most_runs, "--corrected": corrected, "--anew": anew or None, "--allow": allow or None},
     )
     require_size(matters)
     if simulator is not None:
-        from dbbstation.cli.mismatch_simulator import mismatch_with_simulator
+        from dbbstation.cli.mismatch_simulator import mismatch_with_simulator, refuse_unallowed
 
+        refuse_unallowed(simulator, allow=allow)
         mismatch_with_simulator(
             data,
             simulator,

@@ -17,6 +17,18 @@ if TYPE_CHECKING:
     from dbbstation.results.simulator import PortTerm, SimulatorParameterResult, SimulatorResult
 
 
+def refuse_unallowed(simulator: Path, *, allow: bool) -> None:
+    """Refuse to run a simulator that neither the user nor the user's settings have allowed."""
+    from dbbstation.cli.output import say
+    from dbbstation.cli.shop import shop_settings
+    from dbbstation.simulators.allowed import require_allowed
+
+    setting = shop_settings().values.get("simulators")
+    problem = require_allowed(simulator, setting.value if setting else (), allow=allow)
+    if problem:
+        say(f"note: {problem}")
+
+
 def mismatch_with_simulator(
     recordings: Sequence[Path],
     simulator: Path,

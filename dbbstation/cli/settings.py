@@ -63,7 +63,7 @@ def built_in() -> dict[str, str | int | float | None]:
     from dbbstation.station.bar_known import USUAL_AGE_H
 
     return {
-        **dict.fromkeys(("instrument", "profile", "port", "baud", "serial_number")),
+        **dict.fromkeys(("instrument", "profile", "port", "baud", "serial_number", "simulators")),
         **{
             f"bar.{key}": None
             for key in ("serial_number", "calibrated_length_mm", "calibrator_uncertainty_mm", "temp_c")
@@ -90,7 +90,8 @@ def _result(found: Settings) -> SettingsResult:
         if setting is None:
             values[key] = ShownSetting(own, None if own is None else PROGRAM)
         else:
-            values[key] = ShownSetting(setting.value, setting.origin)
+            value = ", ".join(setting.value) if isinstance(setting.value, tuple) else setting.value
+            values[key] = ShownSetting(value, setting.origin)
     return SettingsResult(
         files=tuple(str(path) for path in found.files),
         values=values,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,8 +23,9 @@ from dbbstation.files.keys import digests_of, key_of
 from dbbstation.files.own_classes import classes_in_files, module_name, own_instances
 from dbbstation.files.places import real_path
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
+from dbbstation.simulators.allowed import files_of_simulator
 from dbbstation.simulators.fmu import FmuSimulator
-from dbbstation.simulators.program import ProgramSimulator, files_of, whole_command
+from dbbstation.simulators.program import ProgramSimulator, whole_command
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -64,23 +66,15 @@ class LoadedSimulator:
 
     @property
     def _files(self) -> list[Path]:
+        found = files_of_simulator(self.path, self.file)
         if self.file.program is not None:
-            command = whole_command(self.file.program, self.path.parent)
-            return files_of(command)
-        if self.file.fmu is not None:
-            return [self.path.parent / self.file.fmu]
-        python = self.path.parent / str(self.file.python)
-        folder = real_path(python).parent
+            program = shutil.which(whole_command(self.file.program, self.path.parent)[0])
+            return [*found, *([Path(program)] if program else [])]
+        if self.file.python is None:
+            return found
+        folder = real_path(self.path.parent / self.file.python).parent
         imported = {Path(file) for module in list(sys.modules.values()) if (file := getattr(module, "__file__", None))}
-        # What is imported late, too: of the simulator's folder and the packages in it.
-        beside = {
-            *folder.glob("*.py"),
-            *(one for package in folder.glob("*/__init__.py") for one in package.parent.rglob("*.py")),
-        }
-        return [
-            python,
-            *sorted({*beside, *(one for one in imported if one.is_relative_to(folder) and one.suffix == ".py")}),
-        ]
+        return [*found, *sorted(one for one in imported if one.is_relative_to(folder) and one.suffix == ".py")]
 
 
 def load_simulator(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import shutil
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -112,10 +111,3 @@ def _read(path: Path) -> dict[str, NDArray[np.float64]]:
 def whole_command(words: tuple[str, ...], folder: Path) -> tuple[str, ...]:
     """Return a command with whole paths of files beside the model file."""
     return tuple(str((folder / word).absolute()) if (folder / word).is_file() else word for word in words)
-
-
-def files_of(command: tuple[str, ...]) -> list[Path]:
-    """Return the files of a command, which are its content."""
-    found = [Path(word) for word in command if Path(word).is_file()]
-    program = shutil.which(command[0])
-    return sorted({*found, *([Path(program)] if program else [])})

@@ -59,7 +59,7 @@ def decay(tmp_path):
         levels = 2.0 * np.exp(-0.5 * t) + 0.001 * np.random.default_rng(1).standard_normal(100)
         rows = "\n".join(f"{a:.3f},{b:.6f}" for a, b in zip(t, levels, strict=True))
         (tmp_path / "run.csv").write_text(f"t_s,level_m\n{rows}\n")
-        return ("mismatch", tmp_path / "run.csv", "--simulator", tmp_path / "model.yaml", "--no-held-out")
+        return ("mismatch", tmp_path / "run.csv", "--simulator", tmp_path / "model.yaml", "--no-held-out", "--allow")
 
     return make
 

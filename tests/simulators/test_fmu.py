@@ -134,7 +134,7 @@ def test_a_variable_that_an_fmu_lacks_is_refused_with_its_name(folder):
 
 @pytest.mark.nightly
 def test_what_an_fmu_lacks_is_found_end_to_end(folder):
-    asked = ("mismatch", folder / "run.csv", "--simulator", folder / "model.yaml", "--no-held-out", "--json")
+    asked = ("mismatch", folder / "run.csv", "--simulator", folder / "model.yaml", "--no-held-out", "--json", "--allow")
     outcome = call(*asked)
     assert outcome.code == 0, outcome.err
     data = json.loads(outcome.out)

@@ -123,7 +123,7 @@ def _flat(file: SettingsFile, path: Path) -> Iterable[tuple[str, Any]]:
             yield from ((f"{key}.{inner}", each) for inner, each in value.items())
         elif key == "instrument" and value.endswith(_PROTOCOL_ENDINGS):
             yield key, str(path.parent / value)
-        else:
+        elif key != "simulators" or path.name != BESIDE:  # a folder that was handed over allows nothing by itself
             yield key, value
 
 

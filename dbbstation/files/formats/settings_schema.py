@@ -1,4 +1,4 @@
-"""`dbb-settings/3`, which has all of `/1` and `/2`: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
+"""`dbb-settings/4`, which has all of its former versions: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
 
 from typing import Annotated, Literal
 
@@ -109,7 +109,7 @@ class ToleranceSettings(Schema):
 class SettingsFile(Schema):
     """What holds in a shop where the command line says nothing else; every key but the format may be absent."""
 
-    format: Literal["dbb-settings/1", "dbb-settings/2", "dbb-settings/3"]
+    format: Literal["dbb-settings/1", "dbb-settings/2", "dbb-settings/3", "dbb-settings/4"]
     """Name and version of this format."""
     instrument: _Word | None = None
     """Name of an instrument, or path of a protocol file from this file's folder."""
@@ -129,6 +129,8 @@ class SettingsFile(Schema):
     """What is refused."""
     numbers: NumberSettings | None = None
     """How numbers are written in tables from elsewhere."""
+    simulators: tuple[Annotated[str, Field(pattern="^[0-9a-f]{64}$")], ...] | None = None
+    """Simulators that `mismatch` may run, by the SHA-256 that it names; not taken from a file beside sessions, which others may write."""
     tolerances: tuple[ToleranceSettings, ...] | None = None
     """What circles may have."""
 

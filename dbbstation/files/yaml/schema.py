@@ -68,7 +68,7 @@ SINCE: dict[str, dict[str, int]] = {
         **dict.fromkeys(_OF_BARS, 3),
     },
     "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},
-    "dbb-settings": {"largest_bar_age_h": 2, "profile": 2, "filter": 3},
+    "dbb-settings": {"largest_bar_age_h": 2, "profile": 2, "filter": 3, "simulators": 4},
     "dbb-job": {"filter": 2},
     "dbb-mapping": {"split": 2, "zone": 2},
     "dbb-machine": {**_OF_MACHINES, "acceleration_mm_s2": 3},

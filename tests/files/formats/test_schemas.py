@@ -21,7 +21,7 @@ EXAMPLES = {
     "dbb-jig/1": [FIXTURES / "jigs" / "reference-plate.yaml"],
     "dbb-job/2": [FIXTURES / "jobs" / name for name in ("daily-check.yaml", "virtual.yaml")],
     "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
-    "dbb-settings/3": [FIXTURES / "settings" / "every-key.yaml"],
+    "dbb-settings/4": [FIXTURES / "settings" / "every-key.yaml"],
     "dbb-mapping/2": [FIXTURES / "mappings" / "every-key.yaml"],
     "dbb-simulator/1": [
         *(FIXTURES / "simulators" / name for name in ("pendulum.yaml", "tank.yaml")),

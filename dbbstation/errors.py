@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.text.counting import natural
+from dbbstation.text.printable import on_one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -91,7 +92,8 @@ class StationError(Exception):
         return _as_it_was, (type(self), self.args, self.__dict__)
 
     def __str__(self) -> str:
-        text = f"{self.where}: {self.what}" if self.where else self.what
+        where = on_one_line(self.where)
+        text = f"{where}: {self.what}" if where else self.what
         return f"{text}; {self.remedy}" if self.remedy else text
 
 

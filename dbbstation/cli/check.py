@@ -10,7 +10,7 @@ import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.circle_options import approach_of, circle_options
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, echo_line
 from dbbstation.cli.source_files import source_file_option
 from dbbstation.tasks.chosen import chosen_of
 
@@ -176,10 +176,10 @@ def _print(results: Sequence[Checked], runs: Sequence[DryRunResult]) -> None:
         for warning in result.warnings:
             say(f"note: {warning}")
         if not result.problems:
-            echo(f"ok  {result.path}  {result.summary}")
+            echo_line(f"ok  {result.path}  {result.summary}")
     for run in runs:
         if not run.problems:
-            echo(f"ok  {run.plan} on {run.machine}  dry run: {run.programs} programs within travel and feeds")
+            echo_line(f"ok  {run.plan} on {run.machine}  dry run: {run.programs} programs within travel and feeds")
 
 
 def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[SampledPlanResult]:

@@ -10,7 +10,7 @@ import click
 from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.effects import cancelling_text, parts_with_gain
 from dbbstation.cli.figure_option import figure_option, format_of
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, echo_line
 
 if TYPE_CHECKING:
     from dbbstation.results.comparison import ComparisonResult
@@ -81,16 +81,16 @@ def _print(result: ComparisonResult) -> None:
         echo("Held-out tests are predicted worse than by the first session alone. Nothing is identified.\n")
     echo(result.text)
     for note in result.unlike:
-        echo(f"- {note}")
+        echo_line(f"- {note}")
     for title, names in (
         ("only in A", result.only_in_a),
         ("only in B", result.only_in_b),
         ("averaged", result.averaged),
     ):
         if names:
-            echo(f"- {title}: {', '.join(names)}")
+            echo_line(f"- {title}: {', '.join(names)}")
     for one in result.not_comparable:
-        echo(f"- not comparable: test {one.test}: {one.text}")
+        echo_line(f"- not comparable: test {one.test}: {one.text}")
     echo()
     _print_runs(result)
     _print_causes(result)

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo_line
 
 STATES = ("accepted", "complete", "rejected", "recording")
 
@@ -70,4 +70,4 @@ def export(
     if as_json:
         print_result(result)
     else:
-        echo(f"{result.rows} rows of {result.runs} runs written to {out}")
+        echo_line(f"{result.rows} rows of {result.runs} runs written to {out}")

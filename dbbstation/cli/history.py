@@ -9,7 +9,7 @@ import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.number_types import Finite
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, echo_line
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def _print(machine: MachineHistoryResult, found: HistoryResult) -> None:
 
     sessions = machine.sessions
     count = f"{len(sessions)} session{'s' if len(sessions) > 1 else ''}"
-    echo(f"machine {machine.machine}: {count}, {sessions[0].date} to {sessions[-1].date}")
+    echo_line(f"machine {machine.machine}: {count}, {sessions[0].date} to {sessions[-1].date}")
     if machine.watched_quantities:
         echo(
             f"{machine.watched_quantities} quantities are watched; all together they give {found.false_alarms_per_session:g} false alarms "

@@ -10,7 +10,7 @@ import click
 
 from dbbstation.cli.mapping_options import MappingOptions, mapping_options
 from dbbstation.cli.option_object import taken_from
-from dbbstation.cli.output import echo, print_result
+from dbbstation.cli.output import echo, echo_line, print_result
 from dbbstation.cli.session_options import SessionOptions, noted_options
 from dbbstation.text.printable import printable
 
@@ -129,7 +129,7 @@ def import_(
         echo("nothing was written (--dry-run)")
     else:
         kept = "" if remembered is None else f", the mapping to {remembered}"
-        echo(f"{len(found.runs)} runs written to {out}{kept}")
+        echo_line(f"{len(found.runs)} runs written to {out}{kept}")
 
 
 @dataclass(frozen=True)
@@ -424,4 +424,4 @@ def _show(found: _Import) -> None:
     people = f"operator {details.operator or 'not known'}, job {details.job or 'not known'}"
     echo(f"\n{people}, temperature {temp}, bar {bar}")
     for text in found.statements:
-        echo(f"- {text}")
+        echo_line(f"- {text}")

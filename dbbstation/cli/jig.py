@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.number_types import Finite
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, echo_line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -136,7 +136,7 @@ def sheet(
         echo(f"not in the sheet, and not in the new file: {', '.join(lost)}")
     if cmm_temp_c is None:
         echo("the file does not say how warm the plate was on the CMM: give --cmm-temp-c")
-    echo(f"{len(balls)} balls written to {out}")
+    echo_line(f"{len(balls)} balls written to {out}")
 
 
 @jig.command()
@@ -207,7 +207,7 @@ def holders(
         return
     _print_holders(found)
     if out is not None:
-        echo(f"holders written to {out}")
+        echo_line(f"holders written to {out}")
 
 
 def _write_holders(found: Mapping[str, HolderResult], before: Path, out: Path, sheet: Path, *, force: bool) -> None:

@@ -15,12 +15,13 @@ import sys
 import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from dbbstation.cli.provenance import PROGRAM, command_of
 from dbbstation.files.recorded_ground import session_around
+from dbbstation.system.handles import open_private
 from dbbstation.text.printable import printable
 
 if TYPE_CHECKING:
@@ -171,6 +172,10 @@ def _undisturbing(kind: type[_Kind]) -> type[_Kind]:
     class Undisturbing(kind):  # type: ignore[misc, valid-type]  # a kind that is known here only
         def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802, ARG002 - called so by the library
             self.addFilter(lambda _record: False)
+
+        def _open(self) -> IO[str]:  # called so by the library
+            # Command lines hold operators' names.
+            return open(self.baseFilename, self.mode, encoding=self.encoding, opener=open_private)
 
         def close(self) -> None:
             with suppress(OSError):

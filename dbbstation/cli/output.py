@@ -73,9 +73,14 @@ def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None
 
 
 def say(text: str) -> None:
-    """Tell user and log something beside the result."""
+    """Tell user and log something beside the result, on one line: names in it may hold line ends."""
     log_said(text)
-    echo(text, err=True)
+    echo(on_one_line(text), err=True)
+
+
+def echo_line(text: str) -> None:
+    """Print text on one line, whatever names in it hold."""
+    echo(on_one_line(text))
 
 
 def log_said(text: str) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, echo_line
 from dbbstation.cli.source_files import source_file_option
 
 
@@ -109,4 +109,4 @@ def report(
         echo(written.certificate.title)
         echo(verdict.headline)
         for text in (*verdict.reasons, *verdict.to_do):
-            echo(f"- {text}")
+            echo_line(f"- {text}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, echo_line
 
 if TYPE_CHECKING:
     from dbbstation.files.formats.settings import Settings
@@ -63,7 +63,7 @@ def built_in() -> dict[str, str | int | float | None]:
     from dbbstation.station.bar_known import USUAL_AGE_H
 
     return {
-        **dict.fromkeys(("instrument", "profile", "port", "baud", "serial_number", "simulators")),
+        **dict.fromkeys(("instrument", "profile", "port", "baud", "serial_number")),
         **{
             f"bar.{key}": None
             for key in ("serial_number", "calibrated_length_mm", "calibrator_uncertainty_mm", "temp_c")
@@ -77,6 +77,7 @@ def built_in() -> dict[str, str | int | float | None]:
         "limits.largest_bar_age_h": USUAL_AGE_H,
         "numbers.decimal": PLAIN.decimal,
         "numbers.separator": PLAIN.separator,
+        "simulators": None,
     }
 
 
@@ -117,13 +118,14 @@ def _print(found: Settings) -> None:
     rows = []
     for key, one in result.values.items():
         value = NOT_SET if one.value is None else str(one.value).replace("\t", "tab")
+        value = re.sub(r"\b[0-9a-f]{64}\b", lambda hashed: f"{hashed[0][:12]}…", value)
         rows.append([key, value, one.origin or ""])
     print_table(["setting", "value", "from"], rows)
     for held in result.tolerances:
         circles = which_circles(held.tests, held.directions)
-        echo(f"tolerance: {held.quantity}{_filtered(held.filter)} at most {held.largest_um:g} µm, {circles}")
+        echo_line(f"tolerance: {held.quantity}{_filtered(held.filter)} at most {held.largest_um:g} µm, {circles}")
     if found.tolerances_from:
-        echo(f"tolerances from {found.tolerances_from}")
+        echo_line(f"tolerances from {found.tolerances_from}")
     if not found.files:
         echo("no settings file was found; `dbbstation settings --template` prints one", err=True)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import re
 import stat
 import tempfile
 from pathlib import Path
@@ -18,6 +19,7 @@ from dbbstation.files.inputs import was_read
 from dbbstation.files.places import real_path
 from dbbstation.files.recorded_ground import refuse_recorded
 from dbbstation.files.refused import refusal
+from dbbstation.system.handles import open_private
 from dbbstation.system.replacing import remove, remove_tree, rename, replace, sync_folder
 
 if TYPE_CHECKING:
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 _MARK = ".new"
+
+_WITH_NAMES = re.compile(r"(session|events|station)(-\w+)?\.(yaml|log|json)")
+"""Names of files that hold operators' names. Only their owner may read them; rights that the owner changes are kept."""
 
 
 def write_text(path: Path, text: str, *, force: bool = False, rewrites: bool = False) -> None:
@@ -266,7 +271,7 @@ def _temporary(path: Path) -> Path:
     os.close(handle)
     temporary = Path(name)
     # mkstemp makes files that only their owner can read.
-    temporary.chmod(path.stat().st_mode & 0o777 if path.exists() else _usual_mode(0o666))
+    temporary.chmod(path.stat().st_mode & 0o777 if path.exists() else _usual_mode(_wanted_mode(path)))
     return temporary
 
 
@@ -276,8 +281,13 @@ def _usual_mode(wanted: int) -> int:
     return wanted & ~mask
 
 
+def _wanted_mode(path: Path) -> int:
+    return 0o600 if _WITH_NAMES.fullmatch(path.name) else 0o666
+
+
 def _write_synced(path: Path, data: bytes) -> None:
-    with path.open("wb") as file:
+    opener = open_private if _WITH_NAMES.fullmatch(path.name) else None
+    with open(path, "wb", opener=opener) as file:
         file.write(data)
         file.flush()
         os.fsync(file.fileno())

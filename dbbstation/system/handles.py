@@ -29,19 +29,25 @@ def open_to_read(path: Path) -> int:
     return os.open(path, _READING)
 
 
-def open_to_change(path: Path, *, create: bool = False) -> int:
+def open_private(path: str, flags: int) -> int:
+    """Open a file as `open` asks for it; if it is made, only its owner may read it."""
+    return os.open(path, flags, 0o600)
+
+
+def open_to_change(path: Path, *, create: bool = False, private: bool = False) -> int:
     """Return the number of a file that is open for reading and writing; a link is refused.
 
     Args:
         path: of the file.
         create: make the file if it is missing.
+        private: only its owner may read a file that is made.
 
     Raises:
         OSError: the system refuses it, or it is a link.
     """
     if not hasattr(os, "O_NOFOLLOW") and path.is_symlink():
         raise OSError(errno.ELOOP, "this is a link", str(path))
-    return os.open(path, _CHANGING | (os.O_CREAT if create else 0), 0o666)
+    return os.open(path, _CHANGING | (os.O_CREAT if create else 0), 0o600 if private else 0o666)
 
 
 def read_at(handle: int, count: int, at: int) -> bytes:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import csv
 import io
+import os
+import re
 import shutil
 from pathlib import Path
 
@@ -16,6 +19,8 @@ from dbbstation.files.csv_rows import csv_text
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.text.printable import on_one_line, printable
 from tests.cli.conftest import call
+from tests.fuzz.seeds import SEEDS
+from tests.fuzz.worker import place
 
 PACKAGE = Path(dbbstation.__file__).parent
 TITLE = "\x1b]0;owned\x07"
@@ -172,3 +177,65 @@ def test_no_table_holds_a_formula(session, tmp_path, line):
     assert "HYPERLINK" in text
     cells = [cell for row in csv.reader(io.StringIO(text, newline="")) for cell in row]
     assert not [cell for cell in cells if cell.startswith(("=", "+", "@"))]
+
+
+FORGED = "no fault at all"
+"""What a line begins with that a name has forged."""
+
+_TEXT_OF_A_KEY = re.compile(
+    r"(?m)^\s*(?:- )?(?:name|serial_number|operator|job|ball|test): ([^\s#\[{|>\d][^#\n]*?)\s*$"
+)
+
+
+def forged(run_words, folder, files, renamed=()):
+    """Lines of both streams that begin with what a name holds behind a line feed."""
+    place(files, folder)
+    for old, new in renamed:
+        (folder / old).rename(folder / new)
+    with contextlib.chdir(folder):
+        done = call(*run_words)
+    return [line for line in (done.out + "\n" + done.err).splitlines() if line.lstrip().startswith(FORGED)]
+
+
+@pytest.mark.parametrize(
+    "kind", ["plan ten-minute-check", "machine reference", "model small", "bar zerodur", "session small"]
+)
+def test_no_name_in_a_file_makes_a_line_of_its_own(tmp_path, kind):
+    seed = next(one for one in SEEDS if one.kind == kind)
+    commands = ["check s", "session list s", "history .", "circles s"] if "session" in kind else list(seed.commands)
+    tried = 0
+    for target in (name for name in seed.targets if name.endswith(".yaml")):
+        text = seed.files[target].decode()
+        spots = {found[0].split(":")[0]: found for found in _TEXT_OF_A_KEY.finditer(text)}
+        for found in spots.values():
+            spoilt = f'{text[: found.start(1)]}"x\\n{FORGED}"{text[found.end(1) :]}'
+            for line in commands:
+                tried += 1
+                assert not forged(line.split(), tmp_path / "here", seed.files | {target: spoilt.encode()}), (
+                    line,
+                    found,
+                )
+    assert tried
+
+
+@pytest.mark.parametrize(
+    ("kind", "line", "name"),
+    [
+        ("plan with a machine", "program --plan plan.yaml --machine machine.yaml --out NAME", None),
+        ("settings in force", "--settings NAME settings", "file.yaml"),
+        ("CMM sheet", "jig sheet s.csv --jig sound/jig.yaml --u-um 0.8 --out NAME", None),
+        ("mountings", "jig holders s.csv --jig sound/jig.yaml --out NAME", None),
+        ("session small", "export NAME --out NAME.csv", "s"),
+        ("session begun", "check NAME", "s"),
+        ("session begun", "report NAME --out NAME.html", "s"),
+        ("session begun", "evaluate NAME --model sound/model.yaml", "s"),
+        ("byte log", "replay NAME", "log.txt"),
+        ("table", "mismatch NAME --measured a --simulated b", "t.csv"),
+    ],
+)
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such names")
+def test_no_name_of_a_file_makes_a_line_of_its_own(tmp_path, kind, line, name):
+    seed = next(one for one in SEEDS if one.kind == kind)
+    new = f"x\n{FORGED}{Path(name).suffix if name else '.yaml'}"
+    words = [word.replace("NAME", new) for word in line.split()]
+    assert not forged(words, tmp_path / "here", seed.files, [(name, new)] if name else ())

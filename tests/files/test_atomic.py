@@ -139,3 +139,20 @@ def test_a_pipe_is_never_replaced(tmp_path):
     with pytest.raises(OutputError, match="a device or a pipe"):
         write_text(pipe, "new", force=True)
     assert pipe.is_fifo()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other rights")
+def test_what_holds_operators_names_is_for_its_owner_until_the_owner_says_otherwise(tmp_path):
+    write_folder(tmp_path / "s", {"session.yaml": "operator: a", "runs/a.csv": "", "events.log": ""})
+    folder, mask = tmp_path / "s", os.umask(0)
+    os.umask(mask)
+    assert {name: (folder / name).stat().st_mode & 0o777 for name in ("session.yaml", "events.log", "runs/a.csv")} == {
+        "session.yaml": 0o600,
+        "events.log": 0o600,
+        "runs/a.csv": 0o666 & ~mask,
+    }
+    write_folder(folder, {"sealed/session-0f.yaml": "operator: a"}, own=True)
+    assert (folder / "sealed" / "session-0f.yaml").stat().st_mode & 0o777 == 0o600
+    (folder / "session.yaml").chmod(0o640)
+    write_text(folder / "session.yaml", "operator: b", force=True, rewrites=True)
+    assert (folder / "session.yaml").stat().st_mode & 0o777 == 0o640

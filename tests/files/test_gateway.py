@@ -22,6 +22,7 @@ from tests.cli.conftest import call
 PACKAGE = Path(dbbstation.__file__).parent
 
 ROUND_IT = {
+    "cli/log.py": "writes the log, opened for its owner alone",
     "files/gateway.py": "is the gateway",
     "files/atomic.py": "opens its own files to write them",
     "system/handles.py": "opens files for those who ask the gateway, and those that are changed in place",

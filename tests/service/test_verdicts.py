@@ -52,12 +52,14 @@ def test_a_verdict_is_given_to_a_session_that_nobody_measures(session: Path) -> 
         give_verdict(session, Judge("a", Direction.CW, 7, accepted=True))
 
 
-def test_what_was_worked_out_stands_there_again_until_other_runs_count(session: Path) -> None:
+@pytest.mark.parametrize("name", ["session", "s[1]", "s*?"])
+def test_what_was_worked_out_stands_there_again_until_other_runs_count(session: Path, name: str) -> None:
+    session = session.rename(session.parent / name)
     first = After(session, start=Done)
     assert first.results[SessionTask.CALIBRATE].progress is None
     first.do(SessionTask.CALIBRATE)
     first.look()
-    assert first.folder.name == "session-results"
+    assert first.folder.name == f"{name}-results"
     again = After(session, start=Done)
     found = again.results[SessionTask.CALIBRATE]
     assert (found.progress, found.answer, found.passed_s) == (WorkProgress.DONE, {"parameters": 42}, 2.5)
@@ -68,7 +70,7 @@ def test_what_was_worked_out_stands_there_again_until_other_runs_count(session: 
     give_verdict(session, Judge("a", Direction.CW, 1, accepted=False, reason="the bar slipped"))
     assert again.outdated
     other = After(session, start=Done)
-    assert (other.results[SessionTask.CALIBRATE].progress, other.folder.name) == (None, "session-results-2")
+    assert (other.results[SessionTask.CALIBRATE].progress, other.folder.name) == (None, f"{name}-results-2")
     give_verdict(session, Judge("a", Direction.CW, 1, accepted=True))
     (first.folder / "model.yaml").unlink()  # a file that is gone was not worked out
     assert After(session, start=Done).results[SessionTask.CALIBRATE].progress is None

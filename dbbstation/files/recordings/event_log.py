@@ -187,7 +187,7 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
         raise ValueError(f"{members} is no change of a session file")
     # A log that was read is not begun anew where it has gone.
     try:
-        handle = open_to_change(log.path, create=not log.size)
+        handle = open_to_change(log.path, create=not log.size, private=True)
     except FileNotFoundError as error:
         raise OutputError(
             "the event log is gone: the session was moved or deleted while it was written into",

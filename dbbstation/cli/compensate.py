@@ -58,8 +58,8 @@ def compensate(
     out: Path,
     start: str | None,
     chord_um: float,
-    prefer: str | None,
-    accepted_um: float | None,
+    prefer: str,
+    strict: bool,
     time_s: float | None,
     largest_mm: float,
     force: bool,
@@ -67,8 +67,8 @@ def compensate(
 ) -> None:
     r"""Compensate an NC program: what it writes takes the real machine where PROGRAM means to go.
 
-    Moves at feed are split into the longest pieces that keep the chord error. Where the control cannot keep the feed in
-    such pieces, the program is refused with the feed that it reaches, unless --prefer decides.
+    Moves at feed are split into the longest pieces that keep the chord error. If the control is slower in such pieces, the
+    output states about how much. --strict refuses the program instead.
 
     The program must be in machine coordinates and name all six axes in its first move, or --start says where the machine
     stands. It must be whole (M2, M30 or percent signs), not compensated yet, and of no other machine. Travel, feeds and the
@@ -78,7 +78,7 @@ def compensate(
     Examples:
       dbbstation compensate part.ngc --model model.yaml --out part-compensated.ngc
       dbbstation compensate part.nc --from linuxcnc --model model.yaml --out true.ngc --start 0,0,-1000,0,0,0
-      dbbstation compensate part.ngc --model model.yaml --out fast.ngc --prefer feed
+      dbbstation compensate part.ngc --model model.yaml --out true.ngc --strict
     """
     from dbbstation.cli.output import say
     from dbbstation.cli.programs import parsed_pose, print_programs
@@ -97,7 +97,7 @@ def compensate(
         start=pose,
         chord_um=chord_um,
         prefer=prefer,
-        accept_chord_um=accepted_um,
+        strict=strict,
         time_s=time_s,
         largest_correction_mm=largest_mm,
         force=force,

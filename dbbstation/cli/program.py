@@ -65,8 +65,8 @@ def program(
     clearance_mm: float,
     bar_stays_on: bool,
     chord_um: float,
-    prefer: str | None,
-    accepted_um: float | None,
+    prefer: str,
+    strict: bool,
     time_s: float | None,
     largest_mm: float,
     force: bool,
@@ -78,8 +78,8 @@ def program(
     are written or none. A program goes above its first point, comes down to it, waits for the bar to be put on, runs
     the path of a run and waits for the bar to be taken off.
 
-    Points of compensated programs are as far apart as the control needs for the feed, within --chord-um; where that is not
-    far enough, the program is refused with the feed that is reached, unless --prefer decides.
+    Points of compensated programs are as far apart as the control needs for the feed, within --chord-um. If that is not
+    far enough, the output states about how much slower the control is. --strict refuses the program instead.
 
     \b
     Examples:
@@ -107,7 +107,7 @@ def program(
             clearance_mm=None if bar_stays_on else clearance_mm,
             chord_um=chord_um,
             prefer=prefer,
-            accept_chord_um=accepted_um,
+            strict=strict,
             time_s=time_s,
             largest_correction_mm=largest_mm,
             force=force,

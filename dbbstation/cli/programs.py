@@ -53,10 +53,10 @@ def print_programs(result: ProgramsResult, *, as_json: bool) -> None:
     correction = ["greatest correction / µm", "model's u along the path / µm"]
     print_table(["program", "points", *correction, "chord error / µm", "time at feed / s", "nominal / s"], rows)
     for each in result.programs:
-        for told in filter(None, (each.cost, each.slower_rapids, each.merged)):
+        for told in each.remarks:
             say(f"{each.file}: {told}")
     if result.acceleration_mm_s2 is not None:
-        say(f"pieces are chosen for {result.dialect} at {result.acceleration_in_words}")
+        say(f"pieces are chosen for {result.dialect} with {result.acceleration_in_words}")
     _say_uncertainty(result.programs)
 
 

@@ -10,11 +10,10 @@ import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import StationError
-from dbbstation.nc import rapids
 from dbbstation.nc.curve import CommandCurve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
-from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, PLANNED_WITHIN, cuts, move_mm
-from dbbstation.nc.splitting import SHORTEST_MM, Pieces, looked_at, moves_of, parts_of, rows_as_pieces, runs_of, split
+from dbbstation.nc.planner import LOOKS_AHEAD, cuts
+from dbbstation.nc.splitting import Pieces, looked_at, moves_of, parts_of, rows_as_pieces, runs_of, split
 from dbbstation.nc.toolpath import RowKind, rounded
 
 if TYPE_CHECKING:
@@ -34,42 +33,17 @@ DENSELY = np.arange(1, 14) / 13.0
 """Shares of a piece at which its distance from the curve is reported: a prime number of parts, so that no wave with some
 periods in a piece is met at its zeros."""
 
-SURELY_KEPT = KEPT - PLANNED_WITHIN
-"""Share of the time that a program may take by what is reckoned of the planner here, so that it keeps its feed on the planner."""
-
-NAMED = 1.0 + 0.9 * (SURELY_KEPT - 1.0)
-"""The same of a feed that is named in a refusal: pieces for that feed are somewhat shorter than those it was found with, and must
-keep it as well."""
-
 FEED_KEPT = 1e-3
 """A feed stays as it is while the compensated move is as long as the wanted one within this share."""
 
 
 class Prefer(StrEnum):
-    """What to keep if chord and feed cannot both be kept."""
+    """What is corrected."""
 
     ACCURACY = "accuracy"
-    """The chord: F is lowered to what the pieces let the control reach."""
-    FEED = "feed"
-    """The feed: pieces as long as it needs, as near to the path as such pieces can be."""
+    """All six axes. In short pieces a control may be slower than F."""
     POSITION_ONLY = "position-only"
-    """Both, at the tool tip: A, B and C stay as they are programmed, and their correction is left out."""
-
-
-@dataclass(frozen=True)
-class Slow:
-    """The move that loses most of its feed.
-
-    Attributes:
-        line: 0 if there is none.
-        reached_mm_min: F at which nothing is lost.
-        chord_um: chord error of pieces long enough for F.
-    """
-
-    line: int
-    asked_mm_min: float
-    reached_mm_min: float
-    chord_um: float
+    """The tool tip: A, B and C stay as they are programmed, and their correction is left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +55,9 @@ class Compensation:
         chord_um: largest distance between a commanded move and its curve, at `DENSELY` places of each piece [µm].
         chord_line: 0 if there is none.
         tilt_um: largest correction of the tilt that was left out, felt at `LEVER_MM` [µm].
-        seconds: time in moves at feed, by the planner's rule.
-        rapid_seconds: by the same rule; 0 if the control looks ahead.
-        slow: None if the feed is kept.
+        seconds: time in moves at feed, as the planner reckons it.
+        slowest_mm_min: F at which no piece is too short for it; infinite if all keep theirs.
+        slowest_line: of the piece that needs this F; 0 if there is none.
     """
 
     toolpath: Toolpath
@@ -93,9 +67,8 @@ class Compensation:
     tilt_um: float
     seconds: float
     nominal_seconds: float
-    rapid_seconds: float
-    nominal_rapid_seconds: float
-    slow: Slow | None
+    slowest_mm_min: float
+    slowest_line: int
 
 
 @with_one_thread
@@ -108,7 +81,7 @@ def compensate_toolpath(
     started_s: float | None = None,
     largest_mm: float = LARGEST_CORRECTION_MM,
     planner: Planner = LOOKS_AHEAD,
-    prefer: Prefer | None = None,
+    prefer: Prefer = Prefer.ACCURACY,
 ) -> Compensation:
     """Return the toolpath that takes the actual machine along the given one.
 
@@ -121,20 +94,18 @@ def compensate_toolpath(
         keep_arcs: keep the chords of arcs, which were chosen for the feed before.
         started_s: start of the program on the time scale of the model's sessions; None: not known.
         largest_mm: greatest correction of the tip, and of a point `LEVER_MM` from it by the tilt.
-        prefer: None: the chord, with F as it is.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
         StationError: a correction is larger than that, or the path has too many pieces.
         ModelError: a source needs what a program does not give, such as temperatures, or the time where it is None.
     """
-    needed_mm = _needed_mm(toolpath, planner, prefer)
+    needed_mm = _needed_mm(toolpath, planner)
     runs = moves_of(toolpath) if chord_mm is None else runs_of(toolpath, needed_mm)
     whole = np.zeros(len(toolpath), dtype=np.bool_)
     if keep_arcs and toolpath.arc is not None:
         whole = toolpath.arc[:, 2] != 0.0
     before: SpanBehind | None = None
-    short: dict[int, float] = {}
     tilt_left_mm = 0.0
     parts = []
     for rows in parts_of(toolpath, runs):
@@ -146,17 +117,7 @@ def compensate_toolpath(
         if chord_mm is None:
             pieces = rows_as_pieces(path)
         else:
-            pieces, lacking = split(
-                curve,
-                model,
-                chord_mm,
-                needed_mm[rows],
-                runs[rows],
-                for_feed=prefer is Prefer.FEED,
-                whole=whole[rows],
-                how_near=prefer is None,
-            )
-            short |= {run: max(mm, short.get(run, mm)) for run, mm in lacking.items()}
+            pieces = split(curve, model, chord_mm, runs[rows], whole=whole[rows])
         at = looked_at(curve, pieces, DENSELY)
         shift_mm = felt_mm(at[:, -1] - path.between(*row_and_share(pieces.end)))
         _check_corrections(path, pieces, shift_mm, largest_mm)
@@ -171,24 +132,21 @@ def compensate_toolpath(
     corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
     written = _written(toolpath, pieces)
     done = _assembled(toolpath, pieces, written, commanded, runs, model.machine, corner_mm)
-    turned = toolpath.turn_deg[pieces.row[written]] > 0.0
-    fastest = model.machine.feed_limit_mm_min
-    done = replace(done, corners_mm=rapids.corners_mm(done, turned, planner, fastest))
-    slow = _slowest(toolpath, done, _Of(runs, runs[pieces.row[written]]), planner, short)
-    if slow is not None and prefer is Prefer.ACCURACY:
-        done = _slowed(done, planner)
     worst = int(np.argmax(off_mm)) if len(off_mm) else 0
+    too_short = planner.row_mm_s(done) * 60.0
+    too_short = np.where(too_short < (1.0 - FEED_KEPT) * done.feed, too_short, np.inf)
+    at_slowest = int(np.argmin(too_short)) if len(done) else 0
+    slowest = float(too_short.min(initial=np.inf))
     return Compensation(
         toolpath=done,
         greatest_um=1e3 * float(shift_mm.max(initial=0.0)),
         chord_um=1e3 * float(off_mm.max(initial=0.0)),
         chord_line=int(toolpath.line[pieces.row[worst]]) if len(off_mm) else 0,
         tilt_um=1e3 * tilt_left_mm,
-        seconds=float(_seconds(done, planner, in_chords=True).sum()),
-        nominal_seconds=float(_seconds(toolpath, planner).sum()),
-        rapid_seconds=rapids.seconds(done, planner, fastest),
-        nominal_rapid_seconds=rapids.seconds(toolpath, planner, fastest),
-        slow=slow,
+        seconds=planner.seconds(done),
+        nominal_seconds=planner.seconds(toolpath),
+        slowest_mm_min=slowest,
+        slowest_line=int(done.line[at_slowest]) if np.isfinite(slowest) else 0,
     )
 
 
@@ -228,99 +186,10 @@ def _off_mm(toolpath: Toolpath, pieces: Pieces, at: NDArray[np.float64]) -> NDAr
     return np.where(toolpath.kind[pieces.row] == RowKind.FEED, off.max(axis=0, initial=0.0), 0.0)
 
 
-def _needed_mm(toolpath: Toolpath, planner: Planner, prefer: Prefer | None) -> NDArray[np.float64]:
-    """Return the length of a piece that keeps the feed of each row, shape (n,) [mm]; 0 if any length does.
-
-    Every compensated move turns A, B and C, unless they are held.
-    """
-    limited = planner.limited(toolpath)
-    mm_s = np.where(toolpath.kind == RowKind.FEED, np.nan_to_num(toolpath.feed) / 60.0, 0.0)
-    mm_s = np.minimum(mm_s, planner.turning_mm_s(toolpath))
-    mm_s = np.where(limited, np.minimum(mm_s, planner.reached_mm_s(move_mm(toolpath))), mm_s)
-    turns = limited if prefer is Prefer.POSITION_ONLY else cuts(toolpath)
-    return np.where(turns, planner.needed_mm(mm_s), 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class _Of:
-    """Run of each row of the toolpath, shape (n,), and of the compensated one, (k,)."""
-
-    before: NDArray[np.int64]
-    after: NDArray[np.int64]
-
-    def lost(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return each run's sum before and after, shape (2, runs)."""
-        count = int(self.before[-1]) + 1
-        pairs = ((self.after, after), (self.before, before))
-        return np.array([np.bincount(number, weights=each, minlength=count) for number, each in pairs])
-
-
-def _slowest(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner, short: dict[int, float]) -> Slow | None:
-    """Return the move that loses most of its feed, or None, and all together with their ramps.
-
-    Args:
-        short: distance of the pieces that the feed needs from the curve, by run [mm].
-    """
-    cutting = cuts(done)
-    if not cutting.any():
-        return None
-    reached = planner.speed_mm_s(done)
-    # A move that turns A, B and C is as slow as its length lets it be, an arc as one move.
-    own = np.where(planner.limited(toolpath), planner.reached_mm_s(move_mm(toolpath)), np.inf)
-    asked = np.minimum(planner.speed_mm_s(replace(toolpath, poses=_tilt_held(toolpath))), own)
-    at_feed = np.where(cuts(toolpath), toolpath.tip_mm / asked, 0.0)
-    takes, took = of.lost(at_feed, np.where(cutting, done.tip_mm / reached, 0.0))
-    # What a ramp costs is no loss of a move by itself: there may be many of them.
-    ramp_s = np.zeros(len(took))
-    np.maximum.at(ramp_s, of.before, asked / planner.acceleration_mm_s2)
-    lost = np.where((takes - took > ramp_s) & (took > 0.0), takes / np.where(took > 0.0, took, 1.0), 1.0)
-    worst = int(np.argmax(lost))
-    if lost[worst] <= KEPT:
-        return _lost_in_ramps(toolpath, done, of, planner)
-    row = int(np.argmin(np.where(cutting & (of.after == worst), reached, np.inf)))
-    chord_um = 1e3 * short.get(worst, np.nan)
-    return Slow(int(done.line[row]), float(done.feed[row]), 60.0 * float(reached[row]), chord_um)
-
-
-def _tilt_held(toolpath: Toolpath) -> NDArray[np.float64]:
-    """Return poses, shape (n, 6), with A, B and C at zero."""
-    return np.where(np.arange(6) < 3, toolpath.poses, 0.0)  # noqa: PLR2004 - X, Y and Z
-
-
-def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner) -> Slow | None:
-    """Return the move that loses most in its ramps, with the feed at which all lose little enough."""
-
-    def share(of_feed: float) -> float:
-        slower = [
-            replace(path, feed_mm_min=of_feed * path.feed_mm_min, feed_deg_min=of_feed * path.feed_deg_min)
-            for path in (toolpath, done)
-        ]
-        nominal, own = (
-            _seconds(path, planner, in_chords=chords).sum() for path, chords in zip(slower, (False, True), strict=True)
-        )
-        return float(own / nominal)
-
-    if share(1.0) <= SURELY_KEPT:
-        return None
-    low, high = 0.0, 1.0
-    for _ in range(20):
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if share(middle) <= NAMED else (low, middle)
-    takes, took = of.lost(_seconds(toolpath, planner), _seconds(done, planner, in_chords=True))
-    row = int(np.argmax((of.before == int(np.argmax(takes - took))) & (toolpath.kind == RowKind.FEED)))
-    feed = float(toolpath.feed[row])
-    return Slow(int(toolpath.line[row]), feed, low * feed, np.nan)
-
-
-def _seconds(path: Toolpath, planner: Planner, *, in_chords: bool = False) -> NDArray[np.float64]:
-    """Return the time of each row at feed, zero in others, shape (n,) [s]."""
-    return np.where(path.kind == RowKind.FEED, planner.seconds(path, in_chords=in_chords), 0.0)
-
-
-def _slowed(done: Toolpath, planner: Planner) -> Toolpath:
-    mm_min = np.floor(60.0 * planner.reached_mm_s(np.maximum(done.tip_mm, SHORTEST_MM)))
-    slower = planner.limited(done) & (done.feed_mm_min > mm_min)
-    return replace(done, feed_mm_min=np.where(slower, mm_min, done.feed_mm_min))
+def _needed_mm(toolpath: Toolpath, planner: Planner) -> NDArray[np.float64]:
+    """Return the length of a piece that keeps the feed of each row, shape (n,) [mm]; 0 if any does."""
+    mm_s = np.where(cuts(toolpath), np.nan_to_num(toolpath.feed) / 60.0, 0.0)
+    return np.where(cuts(toolpath), planner.needed_mm(mm_s), 0.0)
 
 
 def _assembled(
@@ -356,7 +225,7 @@ def _assembled(
 def _written(toolpath: Toolpath, pieces: Pieces) -> NDArray[np.bool_]:
     row = pieces.row
     last = np.append(row[1:] != row[:-1], True)[: len(row)]
-    return np.asarray((last & ~rapids.go_on(toolpath)[row]) | (toolpath.kind[row] == RowKind.FEED))
+    return np.asarray(last | (toolpath.kind[row] == RowKind.FEED))
 
 
 def _until(toolpath: Toolpath, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

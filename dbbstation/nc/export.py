@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,25 +12,16 @@ from dbbstation.machine.difference import check_model_is_of
 from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
-from dbbstation.nc.compensate import CHORD_MM, Prefer, Slow, compensate_toolpath
+from dbbstation.nc.compensate import CHORD_MM, Prefer, compensate_toolpath
 from dbbstation.nc.curve import felt_mm, rounding_mm
-from dbbstation.nc.kept import (
-    MergedMovesError,
-    TooSlowError,
-    check_chord,
-    check_feed,
-    cost,
-    merged_moves,
-    slower_rapids,
-)
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.mark import is_marked, marked
-from dbbstation.nc.merging import queued
 from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
 from dbbstation.nc.planner import Planner
 from dbbstation.nc.reach import STEP_DEG as REACH_DEG
 from dbbstation.nc.reach import STEP_MM as REACH_MM
 from dbbstation.nc.reach import check_feeds, check_reach
+from dbbstation.nc.remarks import check_kept, remarks_on
 from dbbstation.nc.systems import in_systems
 from dbbstation.sources.contract import Motion
 
@@ -47,8 +37,6 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Plan
 
-What = TypeVar("What")
-
 
 @dataclass(frozen=True)
 class Inverse:
@@ -59,8 +47,7 @@ class Inverse:
         started_s: start of each program on the time scale of the model's sessions; None if not known.
         identified: the model with its covariance; None if not known.
         largest_mm: greatest correction that is applied [mm].
-        prefer: None: refuse a program that cannot keep chord and feed.
-        accepted_um: chord error accepted if the requested one is missed; None: none.
+        strict: refuse a program that misses the chord error, or in which the control would not keep a feed.
     """
 
     model: MachineModel
@@ -68,8 +55,8 @@ class Inverse:
     started_s: float | None = None
     identified: IdentifiedModel | None = None
     largest_mm: float = LARGEST_CORRECTION_MM
-    prefer: Prefer | None = None
-    accepted_um: float | None = None
+    prefer: Prefer = Prefer.ACCURACY
+    strict: bool = False
 
 
 @dataclass(frozen=True)
@@ -85,13 +72,8 @@ class Program:
         uncertainty_by_axis_um: of X, Y and Z; None if not known, empty without a model.
         why_unknown: empty if all are known.
         tilt_left_um: correction of the tilt that was left out, felt 100 mm from the tip; None in a nominal program.
-        feed_s: time at feed as the control plans it; None in a nominal program.
-        nominal_feed_s: None in a nominal program.
-        rapid_s: time of rapids at the machine's greatest feed; None in a nominal program.
-        cost: cost of a preference in words; empty without one.
-        slower_rapids: loss in words; empty if negligible.
-        merged_um: distance of left-out points from merged lines.
-        merged: the same in words; empty if none.
+        feed_s: time at feed as reckoned; None in a nominal program, or if the control's look-ahead is not known.
+        remarks: what is not as asked for, in words.
     """
 
     name: str
@@ -106,12 +88,7 @@ class Program:
     tilt_left_um: float | None = None
     feed_s: float | None = None
     nominal_feed_s: float | None = None
-    rapid_s: float | None = None
-    nominal_rapid_s: float | None = None
-    cost: str = ""
-    slower_rapids: str = ""
-    merged_um: float | None = None
-    merged: str = ""
+    remarks: tuple[str, ...] = ()
 
 
 def circle_programs(
@@ -139,7 +116,7 @@ def circle_programs(
     Raises:
         TravelError: a program leaves the travel; none is returned then.
         ModelError: the model is of another nominal machine, or has a source that needs what a program lacks.
-        StationError: a test that the plan does not have, or a circle whose chord and feed cannot both be kept.
+        StationError: a test that the plan does not have, or a circle that `strict` refuses.
     """
     if inverse is not None:
         check_model_is_of(machine, inverse.model.machine)
@@ -154,21 +131,14 @@ def circle_programs(
         circle = plan.tests[name].run(direction)
         title = f"test {name} {direction}"
 
-        def written(
-            circle: Circle, *, title: str = title, stem: str = f"{name}-{direction}", run: int = number
-        ) -> Program:
-            step = step_deg
-            if inverse is not None:
-                step = _step_deg(circle, title, step_deg, chord_mm, inverse.prefer, machine, dialect)
-            path = replace(circle_toolpath(circle, title, step_deg=step, approach=approach), run=run)
-            rounding_um = 1e3 * rounding_mm(dialect.decimals)
-            header = _circle_header(title, circle, step, {"plan": plan.name, "machine": machine.name}, rounding_um)
-            return _program(path, machine, dialect, stem, inverse, chord_mm, header + _said(origin or {}), split=False)
-
-        def slower(mm_min: float, *, circle: Circle = circle) -> Circle:
-            return replace(circle, feed_mm_min=mm_min)
-
-        programs.append(_or_the_feed_that_is_kept(written, circle, slower, inverse))
+        step = step_deg
+        if inverse is not None and inverse.prefer is Prefer.ACCURACY:
+            step = _step_deg(circle, step_deg, chord_mm, planner_of(machine, dialect))
+        path = replace(circle_toolpath(circle, title, step_deg=step, approach=approach), run=number)
+        rounding_um = 1e3 * rounding_mm(dialect.decimals)
+        header = _circle_header(title, circle, step, {"plan": plan.name, "machine": machine.name}, rounding_um)
+        header += _said(origin or {})
+        programs.append(_program(path, machine, dialect, f"{name}-{direction}", inverse, chord_mm, header, split=False))
     progress(len(programs), len(runs))
     return programs
 
@@ -221,80 +191,15 @@ def compensated_program(
         KinematicsError: a pose that the machine cannot take.
         ModelError: the model has a source that needs what a program lacks.
         MachineError: a feed that the machine does not reach.
-        StationError: the program is compensated already or for another machine, its corrections are too large, or chord and feed
-            cannot both be kept.
-        MergedMovesError: they are, but for short moves that the control makes one in the nominal program.
+        StationError: the program is compensated already or for another machine, its corrections are too large, or `strict`
+            refuses it.
     """
     machine = inverse.model.machine
     check_nominal(path)
     check_machine(path, machine)
     header = [f"machine: {machine.name}", *_said(origin or {})]
 
-    def written(path: Toolpath) -> Program:
-        return _program(path, machine, dialect, path.name, inverse, chord_mm, header, split=True)
-
-    def slower(mm_min: float) -> Toolpath:
-        return replace(path, feed_mm_min=np.minimum(path.feed_mm_min, mm_min))
-
-    one = queued(path)
-    if one is None or inverse.prefer is Prefer.ACCURACY:
-        return _or_the_feed_that_is_kept(written, path, slower, inverse)
-    try:
-        return written(path)
-    except TooSlowError as refused:
-        each_move = refused
-    # The control is faster through the nominal program, whose short moves it makes one.
-    path, merged_um = one.path, 1e3 * one.off_mm
-    if inverse.prefer is None:
-        try:
-            written(path)
-        except TooSlowError:
-            raise each_move from None
-        raise MergedMovesError(each_move, merged_um)
-    told = merged_moves(merged_um)
-    header.append(told)
-    done = _or_the_feed_that_is_kept(written, path, slower, inverse)
-    return replace(done, merged_um=merged_um, merged=told)
-
-
-MOST_FEEDS, LESS = 12, 0.97
-"""How often a slower feed is tried, each by this share slower than the last at least: down to two thirds of the first that was
-named. A refusal takes that many times as long as a program at most."""
-
-
-def _or_the_feed_that_is_kept(
-    written: Callable[[What], Program],
-    what: What,
-    slower: Callable[[float], What],
-    inverse: Inverse | None,
-) -> Program:
-    """Return a program, or refuse it and name a feed at which it can be written.
-
-    Args:
-        slower: the program with F limited to this [mm/min].
-
-    Raises:
-        TooSlowError: names that feed.
-        StationError: as `written` does.
-    """
-    try:
-        return written(what)
-    except TooSlowError as refused:
-        if inverse is None or inverse.prefer is not Prefer.FEED:
-            raise
-        first, reached = refused, math.floor(refused.reached_mm_min)
-    for _ in range(MOST_FEEDS):
-        if reached < 1:
-            break
-        try:
-            written(slower(reached))
-        except TooSlowError as refused:
-            reached = math.floor(min(refused.reached_mm_min, reached * LESS))
-        except StationError:
-            reached = math.floor(reached * LESS)
-        else:
-            break
-    raise first.reaching(reached)
+    return _program(path, machine, dialect, path.name, inverse, chord_mm, header, split=True)
 
 
 def _program(
@@ -331,12 +236,12 @@ def _program(
     coarse_mm = felt_mm(finished.poses - exact.poses).max(initial=0.0)
     done = replace(done, toolpath=finished, chord_um=done.chord_um + 1e3 * float(coarse_mm))
     check_reach(machine, done.toolpath)
-    check_chord(path.name, done, asked_um, inverse.accepted_um, prefer)
-    check_feed(path.name, done, asked_um, machine, prefer)
-    spent = "" if prefer is None else cost(done, asked_um, prefer)
+    remarks = remarks_on(done, asked_um, machine, dialect, prefer)
+    if inverse.strict:
+        check_kept(path.name, done, asked_um, machine)
     header = [*header, *_said(inverse.origin), f"{COMPENSATED} {done.greatest_um:.3f} um"]
     header.append(f"chord error asked for {asked_um:g} um, reached {done.chord_um:.3f} um")
-    header += [spent] if spent else []
+    header += remarks
     header += [] if is_marked(finished) else ["its poses are too few to carry a mark: keep this header"]
     together_um, by_axis_um, why = _uncertainty_um(path, inverse)
     if together_um is not None:
@@ -362,12 +267,9 @@ def _program(
         by_axis_um,
         why,
         done.tilt_um,
-        done.seconds,
-        done.nominal_seconds,
-        done.rapid_seconds,
-        done.nominal_rapid_seconds,
-        spent,
-        slower_rapids(done),
+        None if dialect.look_ahead is None else done.seconds,
+        None if dialect.look_ahead is None else done.nominal_seconds,
+        remarks,
     )
 
 
@@ -376,37 +278,12 @@ def planner_of(machine: Machine, dialect: Dialect) -> Planner:
     return Planner(machine.planned_acceleration_mm_s2, dialect.look_ahead)
 
 
-def _step_deg(
-    circle: Circle,
-    name: str,
-    step_deg: float,
-    chord_mm: float,
-    prefer: Prefer | None,
-    machine: Machine,
-    dialect: Dialect,
-) -> float:
-    """Return the angle between points of a compensated circle [deg]: what the feed needs, at least `step_deg`.
-
-    If the chord error is preferred, it limits the angle.
-
-    Raises:
-        StationError: a chord as long as the feed needs leaves the circle by more than `chord_mm`.
-    """
-    if prefer is Prefer.POSITION_ONLY:
-        return step_deg
-    planner = planner_of(machine, dialect)
+def _step_deg(circle: Circle, step_deg: float, chord_mm: float, planner: Planner) -> float:
+    """Return the angle between points of a compensated circle [deg]: what the feed needs within the chord, at least `step_deg`."""
     # The arc is divided evenly: its steps may be smaller by a part in its number of points.
     needed_mm = 1.01 * float(planner.needed_mm(np.array(circle.feed_mm_min / 60.0)))
-    step = max(step_deg, float(np.degrees(needed_mm / circle.radius_mm)))
-    error_mm = chord_error_mm(circle, step)
-    if step == step_deg or error_mm <= chord_mm or prefer is Prefer.FEED:
-        return step
     longest_mm = float(np.sqrt(8.0 * circle.radius_mm * chord_mm)) / 1.01
-    if prefer is Prefer.ACCURACY:
-        return max(step_deg, float(np.degrees(longest_mm / circle.radius_mm)))
-    reached = 60.0 * float(planner.reached_mm_s(np.array(longest_mm)))
-    slow = Slow(0, circle.feed_mm_min, reached, 1e3 * error_mm)
-    raise TooSlowError(name, slow, 1e3 * chord_mm, machine, None)
+    return max(step_deg, float(np.degrees(min(needed_mm, longest_mm) / circle.radius_mm)))
 
 
 UNCERTAIN_AT = 2000

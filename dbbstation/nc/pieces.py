@@ -1,8 +1,4 @@
-"""Choose the places of a curve to join by straight pieces.
-
-Both ways are paths through a graph with places as nodes and pieces as edges. `longest` maximises the shortest piece,
-which decides the feed, then minimises their number. `truest` minimises the greatest distance from the curve.
-"""
+"""Choose the places of a curve to join by straight pieces: a path through a graph with places as nodes and pieces as edges."""
 
 from __future__ import annotations
 
@@ -15,9 +11,6 @@ from dbbstation.machine.compiled import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-OF_LEAST = 16.0
-"""Places to choose from in each least length of a piece."""
-
 
 def longest(
     way: NDArray[np.float64],
@@ -25,7 +18,7 @@ def longest(
     may_end: NDArray[np.bool_],
     tolerance_mm: float,
 ) -> NDArray[np.int64]:
-    """Return where pieces end, with the shortest as long as the tolerance allows.
+    """Return where pieces end: the shortest, which decides the feed, as long as the tolerance allows, then as few as possible.
 
     A piece to the next allowed end is always possible, even across a step.
 
@@ -38,37 +31,10 @@ def longest(
     Returns:
         Numbers of places, rising, the last one among them and the first one not.
     """
-    arrays = _arrays(way, curve, may_end)
-    return _traced(_fewest(*arrays, tolerance_mm, _longest(*arrays, tolerance_mm)))
-
-
-def truest(
-    way: NDArray[np.float64],
-    curve: NDArray[np.float64],
-    may_end: NDArray[np.bool_],
-    least: float,
-) -> NDArray[np.int64]:
-    """Return where pieces end that are at least `least` long and nearest to the curve.
-
-    A shorter curve is one piece. See `longest`.
-    """
-    way, curve, ends = _arrays(way, curve, may_end)
-    # Some places for each length are enough to choose from.
-    if least > 0.0:
-        some = np.flatnonzero(ends)
-        part = np.floor(OF_LEAST * (way[some] - way[0]) / least)
-        ends[some[1:-1]] = part[1:-1] != part[:-2]
-    return _traced(_truest(way, curve, ends, least))
-
-
-def _arrays(
-    way: NDArray[np.float64],
-    curve: NDArray[np.float64],
-    may_end: NDArray[np.bool_],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     ends = may_end.copy()
     ends[-1] = True
-    return np.ascontiguousarray(way), np.ascontiguousarray(curve), ends
+    way, curve = np.ascontiguousarray(way), np.ascontiguousarray(curve)
+    return _traced(_fewest(way, curve, ends, tolerance_mm, _longest(way, curve, ends, tolerance_mm)))
 
 
 def _traced(before: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -145,35 +111,5 @@ def _fewest(
             first = False
             if way[end] - way[start] >= least and pieces[start] + 1 < pieces[end]:
                 pieces[end] = pieces[start] + 1
-                before[end] = start
-    return before
-
-
-@compiled
-def _truest(
-    way: NDArray[np.float64],
-    curve: NDArray[np.float64],
-    may_end: NDArray[np.bool_],
-    least: float,
-) -> NDArray[np.int64]:
-    count = len(way)
-    best = np.full(count, np.inf)
-    before = np.zeros(count, np.int64)
-    best[0] = 0.0
-    for start in range(count - 1):
-        if best[start] == np.inf:
-            continue
-        first = True
-        for end in range(start + 1, count):
-            length = way[end] - way[start]
-            if not may_end[end] or length < least:
-                continue
-            # A piece of twice the least length can be two; the third is for what is left at the end.
-            if not first and length > 3.0 * least:
-                break
-            first = False
-            distance_mm = max(best[start], _distance_mm(way, curve, start, end))
-            if distance_mm < best[end]:
-                best[end] = distance_mm
                 before[end] = start
     return before

@@ -11,7 +11,7 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.nc.curve import felt_mm, in_mm, row_and_share
-from dbbstation.nc.pieces import longest, truest
+from dbbstation.nc.pieces import longest
 from dbbstation.nc.toolpath import RowKind, in_pieces
 
 if TYPE_CHECKING:
@@ -45,9 +45,6 @@ OF_THE_TOLERANCE = 0.95
 SHORTEST_MM, SHORTEST_DEG = 0.05, 0.01
 """Cells are not halved below this: a step of the correction (backlash at a strut's reversal) has no chord that fits,
 and is placed within this distance."""
-
-SHORTEST_OF_NEEDED = 8.0
-"""Where the feed decides, cells are not halved below this part of the length that it needs."""
 
 HISTORY_MM, HISTORY_DEG = 5.0, 1.0
 """Steps in which rapids are followed for the sake of backlash and friction; they are written as one move all the same,
@@ -152,32 +149,22 @@ def split(
     curve: CommandCurve,
     model: MachineModel,
     tolerance_mm: float,
-    needed_mm: NDArray[np.float64],
     runs: NDArray[np.int64],
     *,
-    for_feed: bool,
     whole: NDArray[np.bool_],
-    how_near: bool = True,
-) -> tuple[Pieces, dict[int, float]]:
-    """Return the pieces in which a toolpath is written.
+) -> Pieces:
+    """Return the longest pieces in which a toolpath keeps the tolerance.
 
     Args:
         model: its shortest period decides how closely to look.
         tolerance_mm: greatest distance of a piece from the curve.
-        needed_mm: length of a piece that keeps the feed, shape (n,); 0 if any does.
         runs: run of each row, within which pieces may end anywhere, shape (n,).
-        for_feed: prefer the feed to the tolerance.
         whole: rows of one piece each, shape (n,).
-        how_near: also compute the distance of pieces of the needed length, which doubles the time.
-
-    Returns:
-        The pieces, and for each run whose longest pieces are shorter than needed: its number, and how near to the curve
-        pieces of the needed length are, NaN where that was not looked for [mm].
 
     Raises:
         StationError: the path has too many cells.
     """
-    cells, at = _cells(curve, model, tolerance_mm, needed_mm / SHORTEST_OF_NEEDED if for_feed else None, whole)
+    cells, at = _cells(curve, model, tolerance_mm, whole)
     off_mm = cell_off_mm(at)
     toolpath, row = curve.toolpath, cells.row
     # What needs no choice: what is no move at feed, and moves that are one cell near the curve.
@@ -186,23 +173,15 @@ def split(
     alone = np.bincount(number)[number] == 1
     chosen &= ~alone | (off_mm > OF_THE_TOLERANCE * tolerance_mm)
     begins, ends = [cells.begin[~chosen]], [cells.end[~chosen]]
-    short: dict[int, float] = {}
     places = cells.places(LOOKED_AT)
     for of in _runs(number, chosen):
-        nodes = _Nodes(
-            curve, cells.begin[of[0]], places[of], at[of], (off_mm[of] > tolerance_mm) & np.logical_not(for_feed)
-        )
-        least = float(needed_mm[row[of]].max())
+        nodes = _Nodes(curve, cells.begin[of[0]], places[of], at[of], off_mm[of] > tolerance_mm)
         ended = longest(nodes.way, nodes.at, nodes.may_end, OF_THE_TOLERANCE * tolerance_mm)
-        if nodes.shortest(ended) < least:
-            kept = truest(nodes.way, nodes.at, nodes.may_end, least) if for_feed or how_near else None
-            short[int(number[of[0]])] = np.nan if kept is None else nodes.distance_mm(kept)
-            ended = kept if for_feed and kept is not None else ended
         begins.append(nodes.places[np.concatenate([[0], ended[:-1]])])
         ends.append(nodes.places[ended])
     end = np.concatenate(ends)
     order = np.argsort(end, kind="stable")
-    return Pieces(np.concatenate(begins)[order], end[order]), short
+    return Pieces(np.concatenate(begins)[order], end[order])
 
 
 class _Nodes:
@@ -229,15 +208,6 @@ class _Nodes:
         way = behind[row - row[0]] + share * length[row]
         first = (begin - row[0]) * length[row[0]]
         self.way = np.concatenate([[first], way])
-
-    def shortest(self, ended: NDArray[np.int64]) -> float:
-        return float(np.diff(self.way[np.concatenate([[0], ended])]).min())
-
-    def distance_mm(self, ended: NDArray[np.int64]) -> float:
-        nodes = np.concatenate([[0], ended])
-        on = np.column_stack([np.interp(self.way, self.way[nodes], self.at[nodes, axis]) for axis in range(6)])
-        off = self.at - on
-        return float(np.maximum(np.linalg.norm(off[:, :3], axis=1), np.linalg.norm(off[:, 3:], axis=1)).max())
 
 
 def cell_off_mm(at: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -290,7 +260,6 @@ def _cells(
     curve: CommandCurve,
     model: MachineModel,
     tolerance_mm: float,
-    shortest_mm: NDArray[np.float64] | None,
     whole: NDArray[np.bool_],
 ) -> tuple[Pieces, NDArray[np.float64]]:
     toolpath = curve.toolpath
@@ -303,8 +272,6 @@ def _cells(
         row, share = cells.row, cells.end - cells.begin
         way_mm, turn_deg = share * toolpath.tip_mm[row], share * toolpath.turn_deg[row]
         can = (way_mm > SHORTEST_MM) | (turn_deg > SHORTEST_DEG)
-        if shortest_mm is not None:
-            can &= (way_mm > shortest_mm[row]) | (toolpath.tip_mm[row] == 0.0)
         at_feed = (toolpath.kind[row] == RowKind.FEED) & curve.leads_on[row] & ~whole[row]
         bent = at_feed & can & (cell_off_mm(at) > tolerance_mm / FINER)
         if not bent.any():

@@ -92,7 +92,6 @@ class Toolpath:
         units_said: whether the program states its unit of length.
         numbers: first and last line number; a compensated program carries its checksum in the first.
         run: number of the program among those that are written together, from 1.
-        merges_mm: distance within which the control merges short moves, shape (n,); 0 if it does not.
         arc: centre X, Y [mm] and spanned angle of a chord [rad], counter-clockwise positive, shape (n, 3); angle 0 in straight
             rows. None: no arcs.
     """
@@ -105,7 +104,6 @@ class Toolpath:
     dwell_s: NDArray[np.float64]
     line: NDArray[np.int64]
     corners_mm: NDArray[np.float64]
-    merges_mm: NDArray[np.float64]
     system: NDArray[np.int8]
     frame: NDArray[np.int8]
     text: Mapping[int, str] = field(default_factory=dict)
@@ -147,7 +145,6 @@ class Toolpath:
             dwell_s=self.dwell_s[row],
             line=self.line[row],
             corners_mm=np.where((corners == 0.0) & ~last, PIECE_CORNER_MM, corners),
-            merges_mm=np.zeros(len(row)),
             system=self.system[row],
             frame=self.frame[row],
             text=MappingProxyType({place[old]: text for old, text in self.text.items()}),
@@ -170,7 +167,6 @@ class Toolpath:
             dwell_s=self.dwell_s[rows],
             line=self.line[rows],
             corners_mm=self.corners_mm[rows],
-            merges_mm=self.merges_mm[rows],
             system=self.system[rows],
             frame=self.frame[rows],
             text=MappingProxyType({}),
@@ -272,7 +268,6 @@ class _Rows(NamedTuple):
     dwell_s: float
     line: int
     corner_mm: float
-    merge_mm: float
     system: int
     frame: NDArray[np.int8]
     arc: tuple[float, float, float]
@@ -286,7 +281,6 @@ class ToolpathBuilder:
 
     Attributes:
         corner_mm: rounding allowed in the moves that follow; None: not stated.
-        merge_mm: distance within which the control merges those moves.
         system: of the numbers that follow, as `Toolpath.system`.
         increments: whether numbers are increments.
     """
@@ -294,7 +288,6 @@ class ToolpathBuilder:
     def __init__(self, name: str, start: NDArray[np.float64] | None = None) -> None:
         self.name = name
         self.corner_mm: float | None = None
-        self.merge_mm = 0.0
         self.system = ACTIVE_SYSTEM
         self.increments = False
         self.guard: tuple[str, ...] | None = None
@@ -392,7 +385,6 @@ class ToolpathBuilder:
             dwell_s=each([rows.dwell_s for rows in self._rows], np.float64),
             line=each([rows.line for rows in self._rows], np.int64),
             corners_mm=self._corners_mm(count),
-            merges_mm=each([rows.merge_mm for rows in self._rows], np.float64),
             system=each([rows.system for rows in self._rows], np.int8),
             frame=each([rows.frame for rows in self._rows], np.int8).reshape(-1, 6),
             text=MappingProxyType(dict(self._text)),
@@ -434,7 +426,7 @@ class ToolpathBuilder:
         corner_mm = np.nan if self.corner_mm is None else self.corner_mm
         poses = np.array(poses, dtype=np.float64)
         counted = self.system if system is None else system
-        self._rows.append(_Rows(kind, poses, feed, dwell_s, line, corner_mm, self.merge_mm, counted, self._frame, arc))
+        self._rows.append(_Rows(kind, poses, feed, dwell_s, line, corner_mm, counted, self._frame, arc))
         self._count += len(poses)
         self._pose = poses[-1]
 

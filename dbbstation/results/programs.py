@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.facts.serialise import Kept
-from dbbstation.nc.kept import said_acceleration
+from dbbstation.nc.remarks import said_acceleration
 from dbbstation.results.frame import Framed
 
 if TYPE_CHECKING:
@@ -30,12 +30,8 @@ class WrittenProgram:
         model_uncertainty_by_axis_um: of X, Y and Z; None in a nominal program.
         model_uncertainty_not_known_because: None if known.
         tilt_left_um: tilt correction left out, felt 100 mm from the tip.
-        feed_s: time at feed as the control plans it.
-        rapid_s: time of rapids at the machine's greatest feed.
-        merged_um: distance of left-out points from merged lines; None if not merged.
-        cost: of a preference, in words; may be empty.
-        slower_rapids: loss in words; empty if negligible.
-        merged: cost of merging in words; empty if none.
+        feed_s: time at feed as reckoned; None if the control's look-ahead is not known.
+        remarks: what is not as asked for, in words.
     """
 
     file: str
@@ -50,13 +46,8 @@ class WrittenProgram:
     tilt_left_um: float | None
     feed_s: float | None
     nominal_feed_s: float | None
-    rapid_s: float | None
-    nominal_rapid_s: float | None
-    merged_um: float | None
+    remarks: tuple[str, ...]
     text: Annotated[str, Kept] = field(repr=False)
-    cost: Annotated[str, Kept] = ""
-    slower_rapids: Annotated[str, Kept] = ""
-    merged: Annotated[str, Kept] = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,8 +81,6 @@ class ProgramsResult(Framed):
                 "chord_error_um": one.chord_error_um,
                 "feed_s": one.feed_s,
                 "nominal_feed_s": one.nominal_feed_s,
-                "rapid_s": one.rapid_s,
-                "nominal_rapid_s": one.nominal_rapid_s,
             }
             for one in self.programs
         ]
@@ -137,11 +126,6 @@ def _written(file: str, each: Program) -> WrittenProgram:
         tilt_left_um=each.tilt_left_um,
         feed_s=each.feed_s,
         nominal_feed_s=each.nominal_feed_s,
-        rapid_s=each.rapid_s,
-        nominal_rapid_s=each.nominal_rapid_s,
-        merged_um=each.merged_um,
+        remarks=each.remarks,
         text=each.text,
-        cost=each.cost,
-        slower_rapids=each.slower_rapids,
-        merged=each.merged,
     )

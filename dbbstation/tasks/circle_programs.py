@@ -49,8 +49,8 @@ def write_circle_programs(
     step_deg: float = STEP_DEG,
     clearance_mm: float | None = CLEARANCE_MM,
     chord_um: float = 1e3 * CIRCLE_CHORD_MM,
-    prefer: str | None = None,
-    accept_chord_um: float | None = None,
+    prefer: str = "accuracy",
+    strict: bool = False,
     time_s: float | None = None,
     largest_correction_mm: float = LARGEST_CORRECTION_MM,
     force: bool = False,
@@ -68,8 +68,8 @@ def write_circle_programs(
         tests: names; empty for all.
         clearance_mm: height of rapids above the first point; None: the bar stays on, without rapids and stops.
         chord_um: greatest distance of a compensated move from the circle.
-        prefer: what to keep if chord and feed cannot both be kept.
-        accept_chord_um: accepted if the requested one is missed.
+        prefer: `accuracy`, or `position-only` to leave A, B and C as they are.
+        strict: refuse programs that miss the chord error or a feed.
         time_s: start of the programs after the session's, for models that depend on time.
         largest_correction_mm: models that shift a point by more are refused.
 
@@ -77,7 +77,7 @@ def write_circle_programs(
         InputError: every fault of the files.
         TravelError: a program leaves the machine's travel.
         ModelError: the model is of another machine, or has a source that needs what a program lacks.
-        StationError: a circle cannot keep both chord and feed.
+        StationError: `strict` refuses a circle.
         OutputError: a program exists without `force`.
         StoppedError: `stop` returned True; nothing was written.
     """
@@ -92,7 +92,7 @@ def write_circle_programs(
             time_s=time_s,
             largest_mm=largest_correction_mm,
             prefer=prefer,
-            accept_chord_um=accept_chord_um,
+            strict=strict,
         )
     warnings = () if inverse is None or inverse.identified is None else model_warnings(inverse.identified)
     telling.note(*warnings)

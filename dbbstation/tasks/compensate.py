@@ -47,8 +47,8 @@ def compensate(
     written_in: str | None = None,
     start: ArrayLike | None = None,
     chord_um: float = 1e3 * CHORD_MM,
-    prefer: str | None = None,
-    accept_chord_um: float | None = None,
+    prefer: str = "accuracy",
+    strict: bool = False,
     time_s: float | None = None,
     largest_correction_mm: float = LARGEST_CORRECTION_MM,
     force: bool = False,
@@ -66,8 +66,8 @@ def compensate(
         written_in: dialect of `program`; None: by its extension.
         start: pose before the program, X, Y, Z [mm], A, B, C [deg]; None: its first move names all six.
         chord_um: greatest distance of a move from the path.
-        prefer: if chord and feed cannot both be kept: `accuracy`, `feed` or `position-only`; None: refuse the program.
-        accept_chord_um: accepted if `chord_um` is missed.
+        prefer: `accuracy`, or `position-only` to leave A, B and C as they are.
+        strict: refuse a program that misses the chord error or a feed.
         time_s: start of the program after the session's, for models that depend on time.
         largest_correction_mm: models that shift a point by more are refused.
         force: overwrite `out`.
@@ -82,8 +82,7 @@ def compensate(
         KinematicsError: a pose that the machine cannot take.
         ModelError: the model has a source that needs what a program lacks.
         MachineError: a feed that the machine does not reach.
-        StationError: the program is compensated or for another machine, corrections are too large, or chord and feed cannot both
-            be kept.
+        StationError: the program is compensated or for another machine, corrections are too large, or `strict` refuses it.
         ValueError: an unknown `prefer`, or `start` is no pose.
     """
     source = Path(program)
@@ -100,7 +99,7 @@ def compensate(
         time_s=time_s,
         largest_mm=largest_correction_mm,
         prefer=prefer,
-        accept_chord_um=accept_chord_um,
+        strict=strict,
     )
     telling = Telling(say=say)
     warnings = () if inverse.identified is None else model_warnings(inverse.identified)

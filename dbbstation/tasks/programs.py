@@ -28,15 +28,14 @@ def inverse_of(
     *,
     time_s: float | None,
     largest_mm: float,
-    prefer: str | None,
-    accept_chord_um: float | None,
+    prefer: str,
+    strict: bool,
 ) -> Inverse:
     """Return the model to compensate with; the header names its file and sessions by hash.
 
     Args:
         largest_mm: greatest correction.
-        prefer: what to keep if chord and feed cannot both be kept.
-        accept_chord_um: accepted if the requested one is missed.
+        prefer: `accuracy` or `position-only`.
 
     Raises:
         InputError: every fault with its place.
@@ -47,8 +46,7 @@ def inverse_of(
     origin |= {f"cause unknown {k}": name for k, name in enumerate(unknown_causes(identified.model), start=1)}
     origin |= {f"model warning {k}": text for k, text in enumerate(model_warnings(identified), start=1)}
     origin |= {f"session {name}": f"sha256 {digest}" for name, digest in identified.sessions.items()}
-    keeping = None if prefer is None else Prefer(prefer)
-    return Inverse(identified.model, origin, time_s, identified, largest_mm, keeping, accept_chord_um)
+    return Inverse(identified.model, origin, time_s, identified, largest_mm, Prefer(prefer), strict)
 
 
 def origin_of(named: Mapping[str, Path], inverse: Inverse | None, provenance: Provenance) -> dict[str, str]:

@@ -117,8 +117,6 @@ def test_whatever_reads_a_model_says_what_is_missing_and_takes_the_file(bowed, t
             "a",
             "--step-deg",
             "5",
-            "--accept-chord-um",
-            "200",
         ),
         "compensate": ("compensate", program, "--model", model, "--prefer", "accuracy"),
     }[command]

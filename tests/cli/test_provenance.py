@@ -75,8 +75,6 @@ def test_a_program_names_program_command_and_inputs_once(run, tmp_path):
         "a",
         "--step-deg",
         "1",
-        "--accept-chord-um",
-        "10",
         "--out",
         tmp_path / "o",
     )
@@ -87,7 +85,7 @@ def test_a_program_names_program_command_and_inputs_once(run, tmp_path):
     assert command.startswith(
         "; command: dbbstation program --plan table2.yaml --machine reference.yaml --model small.yaml"
     )
-    assert {"--test a", "--step-deg 1.0", "--accept-chord-um 10.0"} <= {
+    assert {"--test a", "--step-deg 1.0"} <= {
         " ".join(pair) for pair in zip(command.split(), command.split()[1:], strict=False)
     }
     for path in (PLAN, MACHINE, MODEL):

@@ -205,9 +205,7 @@ def test_programs_take_limit_and_steps(run, shop):
     refused = run(*nominal, "--out", "compensated", "--model", MODEL)
     assert refused.code == FAILED
     assert "0.01 mm" in refused.err.splitlines()[-1]
-    allowed = run(
-        *nominal, "--out", "compensated", "--model", MODEL, "--largest-correction-mm", "1", "--accept-chord-um", "10"
-    )
+    allowed = run(*nominal, "--out", "compensated", "--model", MODEL, "--largest-correction-mm", "1")
     assert allowed.code == DONE, allowed.err
 
 

@@ -13,7 +13,6 @@ import pytest
 
 from dbbstation.errors import InputError, StationError
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import RowKind, Toolpath
@@ -55,7 +54,7 @@ def test_the_tool_goes_along_their_path(style, linuxcnc, crooked):
     model = MachineModel(crooked.machine, crooked.sources)
     seed = style + len(STYLES)
     path = read_program(look_alike(seed), "drawn.ngc")
-    written = compensated_program(path, linuxcnc, Inverse(model, prefer=Prefer.ACCURACY), chord_mm=1e-3)
+    written = compensated_program(path, linuxcnc, Inverse(model), chord_mm=1e-3)
     assert written.chord_um <= 1.0
     done = read_program(written.text, "written.ngc")
     row, share = done.subdivided(2.0, 2.0)

@@ -85,9 +85,7 @@ class Coarse(LinuxCNC):
 @pytest.mark.parametrize("change", [lambda text: text, lambda text: bare(without_numbers(text))])
 def test_a_program_with_four_decimals_is_known_and_its_rounding_is_part_of_what_is_reached(linuxcnc, crooked, change):
     path = read_program(PART.replace("M2", "G1 X40 Y0 A0\nG3 I-40 P2 A9 B3 C-3\nM2"), "part.ngc")
-    fine, coarse = (
-        compensated_program(path, dialect, Inverse(crooked, accepted_um=3.0)) for dialect in (linuxcnc, Coarse())
-    )
+    fine, coarse = (compensated_program(path, dialect, Inverse(crooked)) for dialect in (linuxcnc, Coarse()))
     assert re.search(r"X\d+\.\d{4} ", coarse.text)
     # Half a last decimal in each of three angles, 100 mm from the tip: 0.15 µm; the mark adds three decimals at most.
     assert 0.01 < coarse.chord_um - fine.chord_um < 7.0 * 0.5e-4 * np.radians(100.0) * np.sqrt(3.0) * 1e3 + 0.01
@@ -97,10 +95,7 @@ def test_a_program_with_four_decimals_is_known_and_its_rounding_is_part_of_what_
 
 def test_a_program_too_short_for_its_mark_says_so(crooked):
     path = read_program(PART, "part.ngc")
-    assert (
-        "; its poses are too few to carry a mark"
-        in compensated_program(path, Coarse(), Inverse(crooked, accepted_um=3.0)).text
-    )
+    assert "; its poses are too few to carry a mark" in compensated_program(path, Coarse(), Inverse(crooked)).text
 
 
 def test_nominal_programs_are_not_taken_for_compensated_ones():

@@ -6,20 +6,18 @@ and every acceleration a hundred times it plans the same way in each servo cycle
 
 from __future__ import annotations
 
-import functools
 import math
-import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from dbbstation.errors import StationError
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program, planner_of
-from dbbstation.nc.planner import KEPT, cuts
+from dbbstation.nc.planner import cuts
+from dbbstation.nc.remarks import KEPT
 from dbbstation.plan.plan import Plan
 from tests.nc.planner.linuxcnc import PERIOD_NS, BehindError, Ran, missing, run, run_once
 from tests.nc.planner.required import needs
@@ -165,7 +163,7 @@ def circle_programs_of(
     return nominal.text, compensated
 
 
-@pytest.mark.parametrize("prefer", [None, pytest.param(Prefer.POSITION_ONLY, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("prefer", [Prefer.ACCURACY, pytest.param(Prefer.POSITION_ONLY, marks=pytest.mark.nightly)])
 def test_a_small_circle_keeps_its_feed(linuxcnc, table2, crooked, prefer):
     """At 1 m/s², which is taken where the machine file does not say it; it took 1.37 times as long in steps of 0.1 degrees."""
     nominal, compensated = circle_programs_of(linuxcnc, table2, crooked, 50.0, 1000.0, None, prefer)
@@ -173,85 +171,17 @@ def test_a_small_circle_keeps_its_feed(linuxcnc, table2, crooked, prefer):
     assert second.moving_s / first.moving_s <= KEPT
 
 
-def test_a_part_that_is_refused_reaches_the_feed_that_is_said(linuxcnc, crooked):
+@pytest.mark.parametrize(
+    ("what", "feed"), [("arc", 1500), ("part", 1000), pytest.param("part", 3000, marks=pytest.mark.nightly)]
+)
+def test_the_time_that_is_said_is_taken(linuxcnc, crooked, what, feed):
+    """Within a tenth: short pieces run up to 8 % fast, and ramps at corners are not reckoned."""
     model = accelerating(crooked, 1000.0)
-    with pytest.raises(StationError, match=r"arc\.ngc:\d+: F1500 cannot be kept within 0\.1 µm") as caught:
-        compensated_program(linuxcnc.read(ARC.format(feed=1500), "arc.ngc"), linuxcnc, Inverse(model))
-    feed = int(re.search(r"reaches F(\d+)", str(caught.value))[1])
-    assert 500 < feed < 800
-    nominal = ARC.format(feed=feed)
-    done = compensated_program(linuxcnc.read(nominal, "arc.ngc"), linuxcnc, Inverse(model))
-    # What LinuxCNC makes of the nominal one is not ours: beside its own arcs it leaves P at high feeds.
-    first = run(nominal, mm_s2=1000.0, faster=FASTER)
-    assert first.moving_s == pytest.approx(done.nominal_feed_s, rel=0.005)
-    assert on_its_path(linuxcnc, done.text, 1000.0).moving_s / first.moving_s <= KEPT
-    slow = compensated_program(
-        linuxcnc.read(ARC.format(feed=1500), "arc.ngc"), linuxcnc, Inverse(model, prefer=Prefer.ACCURACY)
-    )
-    ran = run(slow.text, mm_s2=1000.0, faster=FASTER)
-    assert ran.moving_s == pytest.approx(slow.feed_s, rel=0.03)
-    assert slow.feed_s > 1.2 * slow.nominal_feed_s
-
-
-@pytest.mark.nightly
-@pytest.mark.timeout(7200)
-@pytest.mark.parametrize("mm_s2", [500.0, 1000.0, 5000.0])
-@pytest.mark.parametrize("feed", [1000, 3000, 6000])
-@pytest.mark.parametrize("what", ["circle", "part", "arc"])
-def test_every_program_that_is_written_keeps_its_feed(linuxcnc, table2, crooked, what, feed, mm_s2, capsys):
-    model = accelerating(crooked, mm_s2)
-
-    def written(feed: int, prefer: Prefer | None) -> tuple[str, Program]:
-        if what == "circle":
-            return circle_programs_of(linuxcnc, table2, crooked, 150.0, float(feed), mm_s2, prefer)
-        nominal = {"part": PART, "arc": ARC}[what].format(feed=feed)
-        read = linuxcnc.read(nominal, f"{what}.ngc")
-        return nominal, compensated_program(read, linuxcnc, Inverse(model, prefer=prefer), chord_mm=1e-3)
-
-    def tell(feed: int, prefer: Prefer | None, *cells: str) -> None:
-        row = [what, str(feed), f"{mm_s2 / 1e3:g}", prefer or "", *cells]
-        with capsys.disabled():
-            print(f"| {' | '.join(row)} |", flush=True)  # noqa: T201 - the table of the docs
-
-    def check(feed: int, prefer: Prefer | None, nominal: str, program: Program) -> None:
-        # Its interpreter runs at the usual clock, and must keep ahead of the planner.
-        faster = max(12_000 // feed, 2)
-        path = linuxcnc.read(program.text, "written.ngc")
-        first, at_most_mm = planned(nominal, mm_s2, faster), allowed_mm(path, mm_s2)
-        at_most_s = 1.01 * program.feed_s if prefer is Prefer.ACCURACY else KEPT * first.moving_s
-        ran, off_mm = judged(program.text, path, mm_s2, faster, at_most_s=at_most_s)
-        ratio = ran.moving_s / first.moving_s
-        tell(
-            feed,
-            prefer,
-            *(f"{first.moving_s:.2f}", f"{ran.moving_s:.2f}", f"{ratio:.4f}"),
-            *(f"{1e3 * off_mm:.2f}", f"{1e3 * at_most_mm:.2f}"),
-        )
-        assert off_mm < at_most_mm
-        # Short pieces run up to 5 % fast.
-        assert prefer is not Prefer.ACCURACY or 0.95 * program.feed_s < ran.moving_s
-        assert ran.moving_s <= at_most_s
-
-    for prefer in (None, Prefer.FEED, Prefer.POSITION_ONLY):
-        try:
-            nominal, program = written(feed, prefer)
-        except StationError as refused:
-            if "and the model corrects" in str(refused):
-                tell(feed, prefer, "refused: as far off as it corrects", "", "", "", "")
-                continue
-            reached = int(re.search(r"reaches F(\d+)", str(refused))[1])
-            tell(feed, prefer, f"refused, F{reached} is reached", "", "", "", "")
-            assert reached < feed
-            check(reached, prefer, *written(reached, prefer))
-            if prefer is None:
-                check(feed, Prefer.ACCURACY, *written(feed, Prefer.ACCURACY))
-        else:
-            check(feed, prefer, nominal, program)
-
-
-@functools.cache
-def planned(nominal: str, mm_s2: float, faster: int) -> Ran:
-    return run(nominal, mm_s2=mm_s2, faster=faster)
+    path = linuxcnc.read({"part": PART, "arc": ARC}[what].format(feed=feed), f"{what}.ngc")
+    done = compensated_program(path, linuxcnc, Inverse(model))
+    ran = on_its_path(linuxcnc, done.text, 1000.0)
+    assert ran.moving_s == pytest.approx(done.feed_s, rel=0.1)
+    assert (done.feed_s > 1.2 * done.nominal_feed_s) == (what == "arc" or feed > 1000)
 
 
 @pytest.mark.nightly

@@ -14,9 +14,7 @@ import numpy as np
 import pytest
 
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse, compensated_program
-from dbbstation.nc.kept import MergedMovesError, TooSlowError
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from tests.nc.grammar import part
@@ -53,11 +51,7 @@ def does_the_same(linuxcnc, bent, tmp_path):
         wanted = events(text, tmp_path)
         assert wanted is not None, f"seed {seed}: LinuxCNC refuses\n{text}"
         path = linuxcnc.read(text, "part.ngc")
-        try:
-            written = compensated_program(path, linuxcnc, Inverse(bent)).text
-        except (TooSlowError, MergedMovesError):
-            # The control rounds more of the nominal program: one program in some thousands.
-            written = compensated_program(path, linuxcnc, Inverse(bent, prefer=Prefer.ACCURACY)).text
+        written = compensated_program(path, linuxcnc, Inverse(bent)).text
         done = events(written, tmp_path)
         assert done is not None, f"seed {seed}: LinuxCNC refuses what was written\n{text}\n{written}"
         try:

@@ -204,14 +204,12 @@ class _Interpreter:
 
     def _path_control(self, block: ProgramBlock) -> None:
         word = block.codes[ModalGroup.PATH]
-        corner = merge = 0.0
+        corner = 0.0
         if word.value == 64.0:  # noqa: PLR2004
-            allowed, merged = block.words.pop("P", None), block.words.pop("Q", None)
-            # LinuxCNC takes P0 for no bound, as if P were not there, and P for Q where Q is not there.
+            allowed, _ = block.words.pop("P", None), block.words.pop("Q", None)
+            # LinuxCNC takes P0 for no bound, as if P were not there.
             corner = allowed.value * self._unit_mm if allowed is not None and allowed.value > 0.0 else math.inf
-            within = merged or allowed
-            merge = 0.0 if within is None else within.value * self._unit_mm
-        self.path.corner_mm, self.path.merge_mm = corner, merge
+        self.path.corner_mm = corner
 
     def _move(self, block: ProgramBlock) -> None:
         motion = block.code(ModalGroup.MOTION)

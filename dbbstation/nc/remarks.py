@@ -1,0 +1,82 @@
+"""What a compensated program does not keep: said beside it, or a reason to refuse it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import StationError
+from dbbstation.nc.compensate import Prefer
+
+if TYPE_CHECKING:
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.nc.compensate import Compensation
+    from dbbstation.nc.dialect import Dialect
+
+KEPT = 1.01
+"""A longer time at feed than this share of the time as written is said."""
+
+
+def remarks_on(
+    done: Compensation, asked_um: float, machine: Machine, dialect: Dialect, prefer: Prefer
+) -> tuple[str, ...]:
+    """Return sentences on a missed chord error, the time that short pieces cost, and a tilt that is left."""
+    said = []
+    if done.chord_um > asked_um:
+        said.append(
+            f"the path is kept within {up(done.chord_um)} µm, not within {asked_um:g} µm, at line {done.chord_line}: the correction "
+            "has a step or bends more than the shortest pieces follow"
+        )
+    if dialect.look_ahead is None:
+        said.append(f"how far {dialect.name} looks ahead is not known: whether it keeps F was not checked")
+    elif done.seconds > KEPT * done.nominal_seconds:
+        said.append(
+            f"about {done.seconds:.0f} s at feed, {done.nominal_seconds:.0f} as written, with {said_acceleration(machine)}"
+        )
+    if prefer is Prefer.POSITION_ONLY:
+        said.append(
+            f"A, B and C are not corrected: a tilt is left that is felt as {up(done.tilt_um)} µm 100 mm from the tip"
+        )
+    return tuple(said)
+
+
+def check_kept(name: str, done: Compensation, asked_um: float, machine: Machine) -> None:
+    """Refuse a program that misses the chord error or a feed anywhere, with what keeps both everywhere.
+
+    Raises:
+        StationError: names the worst line.
+    """
+    if done.chord_um > asked_um:
+        raise StationError(
+            f"the path is kept within {up(done.chord_um)} µm here, not within {asked_um:g} µm",
+            where=where(name, done.chord_line),
+            remedy=f"--chord-um {up(done.chord_um)} is kept everywhere; without --strict the program is written as it is",
+        )
+    if math.isfinite(done.slowest_mm_min):
+        reached = math.floor(done.slowest_mm_min)
+        raise StationError(
+            f"the control reaches {f'F{reached}' if reached else 'no F'} here, with {said_acceleration(machine)}; the program takes about "
+            f"{done.seconds:.0f} s at feed, {done.nominal_seconds:.0f} as written",
+            where=where(name, done.slowest_line),
+            remedy=(f"F{reached} is kept everywhere; " if reached else "")
+            + "without --strict the program is written as it is",
+        )
+
+
+def said_acceleration(machine: Machine) -> str:
+    """Return the acceleration, and whether the machine file states it."""
+    known = "of the machine file" if machine.acceleration_mm_s2 is not None else "assumed: the machine file has none"
+    return f"the acceleration of {machine.planned_acceleration_mm_s2 / 1e3:g} m/s² ({known})"
+
+
+def where(name: str, line: int) -> str:
+    """Return the place of a line in a program."""
+    return f"{name}:{line}" if line else name
+
+
+def up(value: float) -> str:
+    """A number with two digits, rounded up."""
+    if value <= 0.0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.ceil(value / unit - 1e-9) * unit:.4g}"

@@ -159,7 +159,8 @@ def _print_mismatch(result: DiagnosisFigures) -> None:
     from dbbstation.results.model_warnings import chance_in_words
 
     if result.held_out_worse:
-        echo("Held-out tests are predicted worse than by the kinematic calibration alone. Nothing is identified.\n")
+        echo("Held-out tests are predicted worse than by the kinematic calibration alone.\n")
+    echo("\n".join((*result.sentences(), "")))
     if result.mismatch:
         echo(
             f"The recordings differ from the kinematic model by {result.misfit_rms_um:.2f} µm rms beyond noise "

@@ -1,4 +1,4 @@
-"""Each named cause's gain in held-back groups of tests."""
+"""Each named cause's gain in held-back groups of tests, and each class's."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.explained import MOST_MEMBERS
-from dbbstation.diagnosis.left_out import groups_of
-from dbbstation.inference.chosen_anew import ChosenAnew, chosen_anew
+from dbbstation.diagnosis.left_out import groups_of, predicted_without
+from dbbstation.inference.chosen_anew import GainsOfTests, chosen_anew
+from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.hypotheses import CLOSE, search
 
 if TYPE_CHECKING:
@@ -17,28 +18,31 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.explained import Explained
     from dbbstation.inference.model_comparison import Member, ModelComparison
+    from dbbstation.inference.settled import Settled
 
 
-def without_tests(explained: Explained) -> ChosenAnew | None:
-    """Hold back groups of tests; None for too few, or without named causes.
+def without_tests(explained: Explained, outcome: Settled) -> GainsOfTests | None:
+    """Hold back groups of tests; None for too few, or without causes.
 
     The reference is the kinematic calibration of the same tests.
     """
     settled, channel = explained.settled, explained.channel
     groups = groups_of(channel.observations)
-    if not settled.members or groups is None:
+    if not settled.best.members or groups is None:
         return None
-    target = channel.target(settled.after)
+    held_back = []
+    for group in np.unique(groups):
+        held_back.append(np.zeros(len(outcome.channel.residual), dtype=bool))
+        for rows, own in zip(channel.runs, groups, strict=True):
+            held_back[-1][rows] = own == group
+    target = outcome.bank.target
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
     # What was laid out before it was laid out better is asked for by nobody.
     variants = [variant for cause in settled.causes for variant in cause.variants]
     used = np.unique(np.concatenate([columns for one in variants for columns in (one.columns, one.slack)]))
 
     def of_others() -> Iterator[ModelComparison]:
-        for group in np.unique(groups):
-            out = np.zeros(len(target), dtype=bool)
-            for rows, own in zip(channel.runs, groups, strict=True):
-                out[rows] = own == group
+        for out in held_back:
             kept = np.where(out, 0.0, target)
             yield channel.beside_base(noise_mm, settled.scatter, but_for=out, only=used).comparison(kept)
 
@@ -48,4 +52,10 @@ def without_tests(explained: Explained) -> ChosenAnew | None:
         return found.best.members
 
     of_all = channel.beside_base(noise_mm, settled.scatter).comparison(target)
-    return chosen_anew(of_all, of_others(), choose, lambda name: (name,), lambda cause: cause.named)
+    follow = follow_of(outcome)
+    classes = [one.wanted for one in classes_of(outcome, VariableProbabilities(outcome))]
+    anew = chosen_anew(of_all, of_others(), choose, lambda name: (name,), lambda cause: cause.named, (classes, follow))
+    names = [m.cause.name for m in settled.best.members if not m.cause.setup]
+    without = {wanted: {name for name in names if follow(name) & wanted} for wanted in classes}
+    errors = predicted_without(explained, [(), *without.values(), names])
+    return GainsOfTests(held_back, anew, dict(zip([*without, frozenset[str]()], errors[1:], strict=True)), errors[0])

@@ -13,9 +13,10 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.after_reversals import after_reversals
 from dbbstation.diagnosis.chosen_anew import without_tests
 from dbbstation.diagnosis.explain import explain, without
-from dbbstation.diagnosis.findings import Diagnosis, Unexplained, Verdict
+from dbbstation.diagnosis.findings import Diagnosis, Unexplained
 from dbbstation.diagnosis.left_out import found_again, predicted, widened_by_tests
 from dbbstation.diagnosis.left_where import where_left
+from dbbstation.diagnosis.levels import circle_levels, outcome_of
 from dbbstation.diagnosis.limits import limits_of
 from dbbstation.diagnosis.locate import locations_of
 from dbbstation.diagnosis.next_test import next_tests
@@ -77,9 +78,12 @@ def diagnose(
     explained, findings = judged(explained)
     progress("held-out tests")
     stopped = explained.settled.stopped
-    anew = without_tests(explained) if hold_out and not stopped else None
+    outcome = outcome_of(explained)
+    gains = without_tests(explained, outcome) if hold_out and not stopped else None
+    anew = None if gains is None else gains.anew
+    levels = circle_levels(explained, outcome, gains)
     explained = _widened(explained)
-    findings = judge(explained, anew)
+    findings = judge(explained, outcome, anew, levels)
     settled, before, outliers = explained.settled, explained.before, explained.outliers
     after, members = settled.after, settled.members
     rivals = [f.name for f in sorted(findings, key=lambda f: -f.gain)[:RIVALS]]
@@ -99,6 +103,7 @@ def diagnose(
         after=after,
         held_out=held_out,
         chosen_anew=anew,
+        levels=levels,
         outliers=tuple(beside(outlier, after) for outlier in outliers),
         workspace=elsewhere,
         locations=locations_of(before, after, found, explained.first, rest.variable) if mismatch else (),
@@ -132,12 +137,12 @@ def _widened(explained: Explained) -> Explained:
 
 def judged(explained: Explained) -> tuple[Explained, tuple[SourceFinding, ...]]:
     """Judge named causes, removing improbable ones from the joint model until stable."""
-    findings = judge(explained)
+    findings = judge(explained, outcome_of(explained))
     given_up: set[str] = set()
     while rather_not := doubtful(explained, findings):
         given_up |= rather_not
         explained = without(explained, given_up)
-        findings = judge(explained)
+        findings = judge(explained, outcome_of(explained))
     return explained, findings
 
 
@@ -148,7 +153,7 @@ def doubtful(explained: Explained, findings: Sequence[SourceFinding]) -> set[str
     stay.
     """
     members = {member.cause.name for member in explained.settled.members}
-    doubted = {f.name for f in findings if f.verdict is Verdict.NOT_TESTABLE and f.probability < EVEN}
+    doubted = {f.name for f in findings if f.probability < EVEN and not (f.ambiguous_with or f.equivalent)}
     return members & doubted
 
 

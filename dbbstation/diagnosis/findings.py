@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.held_out import HeldOut
+    from dbbstation.inference.levels import Levels
     from dbbstation.inference.limit_reached import LimitReached
 
 __all__ = [
@@ -219,7 +220,8 @@ class Diagnosis:
         before: base fit.
         after: joint fit, or `before`.
         held_out: predictions before and after [mm].
-        chosen_anew: without each group; None without names or for few tests.
+        chosen_anew: without each group; None without causes or for few tests.
+        levels: existence, variables and cause of a difference [µm].
         workspace: the calibration's error elsewhere; None without findings.
         locations: largest share first.
         second_start_agrees: None if interrupted.
@@ -235,6 +237,7 @@ class Diagnosis:
     after: Calibration
     held_out: tuple[HeldOut, HeldOut]
     chosen_anew: ChosenAnew | None
+    levels: Levels
     outliers: tuple[Outlier, ...]
     workspace: WorkspaceError | None
     locations: tuple[Location, ...]

@@ -19,7 +19,7 @@ from dbbstation.inference.selection_frequency import renumbered, selection_frequ
 from dbbstation.inference.square_root import solve
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.explained import Explained
@@ -42,6 +42,28 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
         for active in (every[: len(channel.base.prior)], every)
     )
     return without, having
+
+
+def predicted_without(explained: Explained, left_out: Sequence[Collection[str]]) -> list[float]:
+    """Return rms errors of held-out tests by base and causes, each time without some [mm]; a ball that is off settles in its test."""
+    channel, settled = explained.channel, explained.settled
+    members = [m for m in settled.best.members if not m.cause.setup]
+    variants = [member.variant for member in members]
+    known = channel.known_with(variants)
+    blocks = channel.blocks(channel.columns_of(variants), channel.target(settled.after))
+    owner = np.repeat(np.arange(len(members)), [len(variant.columns) for variant in variants])
+    groups, base = (
+        in_turn([o.test for o in channel.observations], FOLDS_OF_AN_ERROR),
+        np.arange(len(channel.base.prior)),
+    )
+    found = []
+    for names in left_out:
+        kept = np.array([m.cause.name not in names for m in members], dtype=bool)[owner]
+        active = np.concatenate([base, len(base) + np.flatnonzero(kept)])
+        found.append(
+            held_out(blocks, groups, known, active, max(settled.noise_mm, SMALLEST_NOISE_MM), channel.held).rms
+        )
+    return found
 
 
 def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:

@@ -56,20 +56,24 @@ class VerdictsByLevel:
         classes = [one for one in self._levels.follows if name in one.members]
         answers = {one.answer for one in classes}
         if FollowsAnswer.UNDECIDED in answers:
-            return Verdict.AMBIGUOUS, (), "These rows do not decide it."
+            return Verdict.AMBIGUOUS, (), f"These {self._settled.channel.rows_are} do not decide it."
         if sigmas < OUT:
             return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
         if acts is Acts.ONCE or any(one.in_time for one in classes):
             return self._happened(name)
         if FollowsAnswer.DOES_NOT_PREDICT in answers:
-            return Verdict.DOES_NOT_PREDICT, (), "It was found in these rows, and held-out parts gain nothing by it."
+            return (
+                Verdict.DOES_NOT_PREDICT,
+                (),
+                f"It was found in these {self._settled.channel.rows_are}, and held-out parts gain nothing by it.",
+            )
         if FollowsAnswer.NOT_TESTED in answers and self._worse:
             return (
                 Verdict.DOES_NOT_PREDICT,
                 (),
                 "With everything that was found these rows are left worse than as simulated.",
             )
-        return _of_laws(classes, name)
+        return _of_laws(classes, name, self._settled.channel.rows_are)
 
     def instead_of(self, name: str) -> frozenset[str]:
         """Members in whose place a law is named that is none of them; none where it is not."""
@@ -78,8 +82,8 @@ class VerdictsByLevel:
     def alike(self, name: str) -> str:
         """What rows cannot tell a cause from that is no member; empty where there is nothing."""
         for one in self._levels.follows:
-            if one.form is not None and name in one.form.not_worse:
-                return next(iter(one.form.names or sorted(one.members)))
+            if one.form is not None and name in (*one.form.not_worse, *one.form.names):
+                return next(other for other in (*one.form.names, *sorted(one.members)) if other != name)
         return ""
 
     def equivalent(self, name: str) -> tuple[str, ...]:
@@ -115,7 +119,7 @@ def _named(one: Followed, name: str) -> bool:
     return one.form is not None and name in one.form.names
 
 
-def _of_laws(classes: Sequence[Followed], name: str) -> Said:
+def _of_laws(classes: Sequence[Followed], name: str, rows: str) -> Said:
     """What is said of a member of classes that are followed: each must name it."""
     if all(_named(one, name) for one in classes):
         return Verdict.IDENTIFIED, (), ""
@@ -123,5 +127,5 @@ def _of_laws(classes: Sequence[Followed], name: str) -> Said:
         (*one.form.names, *one.form.not_worse) for one in classes if one.form is not None and not _named(one, name)
     ]
     others = tuple(dict.fromkeys(n for names in open_to for n in names if n != name and JOINED not in n))
-    text = f"These rows cannot tell it from {', '.join(others)}." if others else "No single law was named here."
+    text = f"These {rows} cannot tell it from {', '.join(others)}." if others else "No single law was named here."
     return Verdict.AMBIGUOUS, others, text

@@ -144,6 +144,7 @@ class Channel:
         levels: kind of each row from 0, with own noise each, shape (n,); None: one kind.
         clock: for omitted rows or gradual steps; None: immediate.
         direction: of travel, shape (n,); None: no direction-dependent looks in time.
+        rows_are: what answers call the rows: `rows`, or `tests`.
     """
 
     residual: NDArray[np.float64]
@@ -168,6 +169,7 @@ class Channel:
     levels: NDArray[np.int64] | None = None
     clock: Clock | None = None
     direction: NDArray[np.float64] | None = None
+    rows_are: str = "rows"
 
     def __post_init__(self) -> None:
         if not len(self.kept):

@@ -9,15 +9,22 @@ and open directions of the base: what a part adds to a set's log evidence.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
+from dbbstation.inference.followed import ClassGain
 from dbbstation.inference.verdict import DensityGains
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from dbbstation.inference.folds import Kind
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
+
+Classes: TypeAlias = "tuple[Sequence[frozenset[str]], Callable[[str], frozenset[str]]]"
+"""Classes of variables, and what each cause follows."""
 
 LEAST_PARTS = 4
 """Parts from which on what they say of each other is more than chance: a gain without the best of them, and a spread."""
@@ -30,10 +37,12 @@ class ChosenAnew:
     Attributes:
         brought: by kind, log density per part with less without it; absent if not chosen.
         whole: per part, of everything over the base.
+        of_classes: by class of variables, log density per part with less without what follows it.
     """
 
     brought: tuple[dict[Kind, float], ...]
     whole: tuple[float, ...]
+    of_classes: tuple[Mapping[frozenset[str], float], ...] = ()
 
     def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
         """Return the joint gain of kinds per part; empty if never chosen."""
@@ -45,12 +54,43 @@ class ChosenAnew:
         return sum(self.whole) < 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class GainsOfTests:
+    """Held-out gains of classes in groups of tests.
+
+    Attributes:
+        rows: of each group, shape (n,).
+        errors: rms error of predicting groups without each class, by its variables; of the base alone under none.
+        error: with everything.
+    """
+
+    rows: Sequence[NDArray[np.bool_]]
+    anew: ChosenAnew
+    errors: Mapping[frozenset[str], float]
+    error: float
+
+    def of(self, wanted: Collection[str] | None) -> ClassGain:
+        """Return the gain of everything over some variables; None: everything."""
+        key = frozenset(wanted or ())
+        gains = tuple(part[key] for part in self.anew.of_classes) if key else self.anew.whole
+        return ClassGain(DensityGains(gains, tuple(int(one.sum()) for one in self.rows)), self.errors[key], self.error)
+
+    def but_for(self, _ignored: Collection[str]) -> GainsOfTests:
+        """Return the same: what happens in a run is a random effect of that run."""
+        return self
+
+    def errors_with(self, _wanted: Collection[str]) -> list[float]:
+        """Return the error with everything."""
+        return [self.error]
+
+
 def chosen_anew(
     of_all: ModelComparison,
     of_others: Iterable[ModelComparison],
     choose: Callable[[ModelComparison], Sequence[Member]],
     kind_of: Callable[[str], Kind],
     asked: Callable[[Cause], bool] = lambda _: True,
+    classes: Classes = ((), lambda _: frozenset()),
 ) -> ChosenAnew:
     """Choose anew without each part, and predict it.
 
@@ -58,8 +98,9 @@ def chosen_anew(
         of_all: causes over all rows.
         choose: most probable members, starting from all rows' choice.
         kind_of: from a cause to its kind.
+        classes: what follows each is left out together.
     """
-    brought, whole = [], []
+    brought, whole, of_classes, follows = [], [], [], classes[1]
     for others in of_others:
         chosen = choose(others)
         names = [member.cause.name for member in chosen if asked(member.cause)]
@@ -68,10 +109,17 @@ def chosen_anew(
         for name in names:
             but_for = _predicted(of_all, others, [m for m in chosen if m.cause.name != name])
             found[kind_of(name)] = found.get(kind_of(name), 0.0) + with_all - but_for
+        rest = {wanted: [m for m in chosen if not follows(m.cause.name) & wanted] for wanted in classes[0]}
+        of_classes.append(
+            {
+                wanted: with_all - _predicted(of_all, others, less) if len(less) < len(chosen) else 0.0
+                for wanted, less in rest.items()
+            }
+        )
         brought.append(found)
         whole.append(with_all)
         del others  # its products fill as much memory as those of the next part will
-    return ChosenAnew(tuple(brought), tuple(whole))
+    return ChosenAnew(tuple(brought), tuple(whole), tuple(of_classes))
 
 
 def _predicted(of_all: ModelComparison, of_others: ModelComparison, members: Sequence[Member]) -> float:

@@ -10,6 +10,7 @@ from scipy.special import logsumexp
 
 from dbbstation.inference.bank import LOOKED_FOR
 from dbbstation.inference.levels import RUN, TIME
+from dbbstation.inference.model_comparison import FLEXIBLE
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.uneven import log_student
@@ -33,10 +34,6 @@ MOST_VARIABLES = 5
 
 LEAST_ADDED = 0.02
 """Probability that a variable must add to a class to be named in it: less changes no figure that is printed with two digits."""
-
-INTERCHANGEABLE = 0.9
-"""Share of the squares of a fitted effect that one cause over another variable must make for both to be named: what it leaves is less
-than a third of the effect. With 0.8 and 0.95 none of ten tables named a further variable, as with this."""
 
 WAYS = {
     **dict.fromkeys((Family.HYSTERESIS, Family.FRICTION, Family.SCALED), "direction"),
@@ -85,13 +82,16 @@ def only_begun(settled: Settled) -> frozenset[str]:
     """Return uncertain members whose memory is mostly initial transient: these follow time."""
     channel, bank, found, first = settled.channel, settled.bank, set(), 0
     members = settled.best.members
-    values = settled.comparison.estimates(members).values if members else np.zeros(0)
+    remembering = {name for name, law in bank.laws.items() if law.family is Family.MEMORY}
+    if not remembering.intersection(settled.best.names):
+        return frozenset()
+    values = settled.comparison.estimates(members).values
     axes = np.linalg.qr(channel.base.samples[channel.kept])[0]
     for member in members:
         own = values[first : first + len(member.columns)]
         first += len(member.columns)
-        count, law = len(member.variant.columns), bank.laws.get(member.cause.name)
-        if law is None or law.family is not Family.MEMORY or count < 2:  # noqa: PLR2004 - its gain, then its state at each start
+        count = len(member.variant.columns)
+        if member.cause.name not in remembering or count < 2:  # noqa: PLR2004 - its gain, then its state at each start
             continue
         samples = bank.samples(member.variant.columns)[channel.kept]
         samples = samples - axes @ (axes.T @ samples)
@@ -101,7 +101,8 @@ def only_begun(settled: Settled) -> frozenset[str]:
     return frozenset(name for name in found if settled.posterior.probability([name]) < SURE)
 
 
-def _follow(settled: Settled) -> Callable[[str], frozenset[str]]:
+def follow_of(settled: Settled) -> Callable[[str], frozenset[str]]:
+    """Return what each cause follows, by name."""
     begun = only_begun(settled)
     return lambda name: frozenset({TIME}) if name in begun else followed_by(settled.bank, name)
 
@@ -125,7 +126,7 @@ class VariableProbabilities:
     def __init__(self, settled: Settled) -> None:
         self._sets: dict[frozenset[str], float] = {}
         for one, share in weighted(settled):
-            follow, weights = _follow(one), one.posterior.weights
+            follow, weights = follow_of(one), one.posterior.weights
             total = float(logsumexp(list(weights.values())))
             for names, weight in weights.items():
                 if weight > total - NEGLIGIBLE:
@@ -172,7 +173,7 @@ class VariableClass:
 
 def classes_of(settled: Settled, probabilities: VariableProbabilities) -> list[VariableClass]:
     """Return classes of the best set's variables, most probable first."""
-    follow = _follow(settled)
+    follow = follow_of(settled)
     of = {member.cause.name: follow(member.cause.name) for member in settled.best.members}
     there = sorted(frozenset[str]().union(*of.values()), key=lambda v: (-probabilities.of([v]), v))
     found: list[VariableClass] = []
@@ -204,7 +205,7 @@ def interchangeable(
         picked = pattern is not None and pattern.family in LOOKED_FOR
         if cause.name in best.names or len(over) != 1 or over & own or picked or way_of(bank, cause.name) != VALUE:
             continue
-        if share_of(settled, members, cause) >= INTERCHANGEABLE:
+        if share_of(settled, members, cause) >= bank.interchangeable:
             found |= over
     return tuple(sorted(found))
 
@@ -213,10 +214,11 @@ def share_of(settled: Settled, members: Collection[str], cause: Cause) -> float:
     """Share of the squares of what members do that a cause can make, beside base and the other members: its best form."""
     columns, values, _ = estimated(settled, members)
     others = [m for m in settled.best.members if m.cause.name not in members]
-    most = max(len(one.columns) for one in cause.variants)
+    stiff = [one for one in cause.variants if len(one.columns) < FLEXIBLE] or cause.variants
+    most = max(len(one.columns) for one in stiff)
     made = (
         share_made(settled.comparison.beside(others, np.concatenate([columns, one.columns])), values)
-        for one in cause.variants
+        for one in stiff
         if len(one.columns) == most
     )
     return max(made)
@@ -315,7 +317,7 @@ class ChosenWithoutParts:
 
 def left_with(one: Settled, wanted: Collection[str]) -> NDArray[np.float64]:
     """Return the residual beside what follows some variables alone, refitted with the base, shape (n,); none: beside everything."""
-    follow = _follow(one)
+    follow = follow_of(one)
     rest = [name for name in one.best.names if wanted and not follow(name) & set(wanted)]
     return _left_without(one, rest)
 
@@ -327,7 +329,7 @@ def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignore
     """
     brought, before, after = [], 0.0, 0.0
     for part in parts:
-        one, rows, follow = part.settled, part.rows, _follow(part.settled)
+        one, rows, follow = part.settled, part.rows, follow_of(part.settled)
         out = [name for name in one.best.names if follow(name) <= set(ignored)]
         names = [n for n in one.best.names if n not in out and (wanted is None or follow(n) & set(wanted))]
         with_all = _left_without(one, out)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.alternatives import EQUIVALENT
-from dbbstation.inference.bank import LOOKED_FOR
 from dbbstation.inference.followed import followed_by
 from dbbstation.inference.levels import JOINED, LawForm, ScoredLaw
 from dbbstation.inference.verdict import ABSENT, SURE
@@ -51,17 +50,14 @@ def law_form(
         parts: rows of each part, shape (n,); None: nothing was held back, and the evidence of all rows decides.
         found_anew: causes at picked places that parts gain by though each part took no part in picking; others are not named. None: not tested.
     """
-    barred = frozenset[str]() if found_anew is None else _picked(settled) - set(found_anew)
+    barred = settled.bank.nameless
+    if found_anew is not None:
+        barred |= settled.bank.looked_for - set(found_anew)
     whole = _place(settled, one.members, one.wanted, parts, barred)
     if whole.name is not None or len(one.members) == 1:
         return whole
     each = {name: _place(settled, {name}, one.wanted, parts, barred) for name in sorted(one.members)}
     return replace(whole, together=tuple(name for name, form in each.items() if form.name == name))
-
-
-def _picked(settled: Settled) -> frozenset[str]:
-    """Return causes at places that these rows picked."""
-    return frozenset(name for name, one in settled.bank.patterns.items() if one.family in LOOKED_FOR)
 
 
 def _place(
@@ -81,6 +77,10 @@ def _place(
     order = sorted(totals, key=lambda name: -totals[name])
     alive = [name for name in order if not _is_worse(scores[order[0]], scores[name], parts)]
     best = max(alive, key=lambda name: worth[name])
+    if best not in names:
+        # What is the same to these rows keeps the name that the most probable set has.
+        own = (name for name in alive if name in names)
+        best = next((n for n in own if _are_the_same(settled, candidates[n], candidates[best], others)), best)
     not_worse, same = list[str](), list[str]()
     for name in order:
         if name == best or _is_worse(scores[best], scores[name], parts):
@@ -91,7 +91,7 @@ def _place(
         )
         if not refuted:
             (same if contains else not_worse).append(name)
-        elif contains and _contains(settled, candidates[best], candidates[name], others):
+        elif contains and _are_the_same(settled, candidates[best], candidates[name], others):
             same.append(name)
     single = len(candidates[best]) == 1 and best not in barred
     named = single and not not_worse and _is_worse(scores[best], np.zeros(len(scores[best])), parts)
@@ -177,6 +177,10 @@ def _contains(settled: Settled, one: Sequence[Member], other: Sequence[Member], 
         float(np.sum(np.square(_left(effect, np.hstack([beside, form]))))) <= (1.0 - EQUIVALENT**2) * left
         for form in forms
     )
+
+
+def _are_the_same(settled: Settled, one: Sequence[Member], other: Sequence[Member], others: Sequence[Member]) -> bool:
+    return _contains(settled, one, other, others) and _contains(settled, other, one, others)
 
 
 def _count(members: Sequence[Member]) -> int:

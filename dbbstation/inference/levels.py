@@ -5,10 +5,11 @@ Each has own probability over all sets and held-out gain. An uncertain level tak
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+from dbbstation.facts.serialise import Absent
 from dbbstation.facts.value import Value  # noqa: TC001 - types of fields are read when results are written
 from dbbstation.inference.verdict import ABSENT, SURE
 
@@ -17,6 +18,12 @@ if TYPE_CHECKING:
 
 TIME, RUN = "time", "run"
 """What is followed by what acts in single rows or over the clock, and by offsets of runs."""
+
+BALL, BAR = "a ball put up elsewhere", "the bar's length"
+"""What set-up faults of circles follow."""
+
+ONCE = frozenset({TIME, RUN, BALL, BAR})
+"""What happens in a run, or goes on in time: no other rows can show it again."""
 
 JOINED = " + "
 """Between the names of a sum of laws."""
@@ -49,11 +56,18 @@ class Detectable:
         follows: variable or cause.
         size: rms found in nine of ten cases, in the residual's unit; None if absorbed at any size.
         concealed: absorbed share of squares.
+        confirm: what shows it; absent for variables.
     """
 
     follows: str
     size: float | None
     concealed: float
+    confirm: Annotated[str | None, Absent] = None
+
+    @property
+    def name(self) -> str:
+        """Return the effect in words."""
+        return f"an effect over {self.follows}" if self.confirm is None else f"an effect of {self.follows}"
 
 
 @dataclass(frozen=True)
@@ -129,6 +143,7 @@ class Followed:
         form: None if not followed, or time.
         slope: of the straight line through the members' sum over the first variable; None for times and angles.
         straight: share of the squares that this line makes.
+        where: strut, or all struts; absent where it is none, or not sure.
     """
 
     variables: tuple[tuple[str, ...], ...]
@@ -148,11 +163,12 @@ class Followed:
     form: LawForm | None = None
     slope: Value | None = None
     straight: float = 0.0
+    where: Annotated[str | None, Absent] = None
 
     @property
     def in_time(self) -> bool:
         """Whether it is the time, or the run, alone: other rows cannot show it again."""
-        return set[str]().union(*self.variables) <= {TIME, RUN}
+        return set[str]().union(*self.variables) <= ONCE
 
     @property
     def name(self) -> str:
@@ -180,6 +196,24 @@ class Levels:
         every = [one for one in self.follows if one.answer in CORRECTS]
         own = frozenset(name for one in every for names in one.variables for name in names)
         return own | {name for one in every for name in one.or_variables if name != TIME}
+
+    def times(self, factor: float) -> Levels:
+        """Return the same in a smaller unit."""
+
+        def scaled(size: float | None) -> float | None:
+            return None if size is None else factor * size
+
+        differs = self.differs
+        sizes = tuple(replace(one, size=scaled(one.size)) for one in differs.detectable)
+        follows = (
+            replace(one, rms=factor * one.rms, before=scaled(one.before), after=scaled(one.after))
+            for one in self.follows
+        )
+        return replace(
+            self,
+            differs=replace(differs, matters=factor * differs.matters, detectable=sizes),
+            follows=tuple(follows),
+        )
 
 
 CORRECTS = (FollowsAnswer.FOLLOWS, FollowsAnswer.GOES_ON, FollowsAnswer.NOT_TESTED)

@@ -12,6 +12,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.coloured import FEWEST_INDEPENDENT
 from dbbstation.inference.consequence import may_result
 from dbbstation.inference.detectable import detectable
+from dbbstation.inference.folds import HeldOutError
 from dbbstation.inference.followed import (
     VariableProbabilities,
     classes_of,
@@ -20,12 +21,12 @@ from dbbstation.inference.followed import (
     way_probability,
 )
 from dbbstation.inference.law_form import law_form
-from dbbstation.inference.levels import RUN, TIME, Followed, FollowsAnswer, Levels, difference_of
+from dbbstation.inference.levels import ONCE, RUN, TIME, Followed, FollowsAnswer, Levels, difference_of
 from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
-    from dbbstation.inference.folds import HeldOutError
+    from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.followed import ClassGain, PartGains, VariableClass
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Detectable
@@ -45,10 +46,11 @@ def levels_of(
     settled: Settled,
     left: LeftOver,
     parts: PartGains | None,
-    held_out: HeldOutError | None,
+    held_out: HeldOutError | ChosenAnew | None,
     matters: float | None = None,
     *,
     worse: bool = False,
+    sizes: tuple[Detectable, ...] | None = None,
 ) -> Levels:
     """Return the three levels.
 
@@ -57,6 +59,7 @@ def levels_of(
         parts: None if not tested.
         matters: size of interest, in the residual's unit; None: the refitted residual.
         worse: without held-out parts: the fitted sum leaves more of all rows than the reference.
+        sizes: smallest detectable ones where noise is of a known kind; None: over variables, and the order of the rows tells the noise.
     """
     probabilities = VariableProbabilities(settled)
     every = classes_of(settled, probabilities)
@@ -65,18 +68,19 @@ def levels_of(
         parts = parts.but_for({TIME, RUN})
     found = [_followed(settled, one, probabilities, parts, held_out) for one in every]
     classes = tuple(sorted(found, key=lambda one: (one.consequence, one.may_result)))
-    sizes = detectable(settled)
+    doubts = _doubts_about_noise(settled) if sizes is None else ()
+    sizes = detectable(settled) if sizes is None else sizes
     size = settled.channel.size if matters is None else matters
     samples = settled.noise.independent_samples(settled.channel.stretches)
     differs = difference_of(
         probability_of_any(settled),
         classes,
         None if parts is None else parts.of(None).gains,
-        _doubts(settled, left, sizes, size),
+        (*doubts, *_doubts(settled, left, sizes, size)),
         (size, matters is not None, samples, sizes),
     )
     levels = Levels(differs, classes, False if worse and held_out is None and settled.best.members else None)
-    if held_out is None or parts is None or not settled.best.members:
+    if not isinstance(held_out, HeldOutError) or parts is None or not settled.best.members:
         return levels
     corrected = held_out.corrected(parts.errors_with(levels.corrects))
     return replace(levels, correction=corrected.after < corrected.as_simulated)
@@ -87,20 +91,25 @@ def _doubts(settled: Settled, left: LeftOver, sizes: tuple[Detectable, ...], mat
     channel, unit, found = settled.channel, settled.channel.unit, list[str]()
     if settled.stopped:
         found.append("the search ended at its limit of work")
+    if not left.is_noise:
+        found.append(f"what is left is not noise: {left.worst.rms:.2g} {unit} in {left.worst.name}".replace("  ", " "))
+    for one in sizes:
+        if one.size is None:
+            parameters = ", ".join(channel.base.names)
+            found.append(f"{one.name} could be concealed by {parameters}")
+        elif one.size > matters:
+            found.append(f"{one.name} is not found below {one.size:.2g} {unit}".rstrip())
+    return tuple(found)
+
+
+def _doubts_about_noise(settled: Settled) -> tuple[str, ...]:
+    channel, found = settled.channel, list[str]()
     if len(channel.target) <= FEWEST_INDEPENDENT:
         found.append(f"{len(channel.target)} rows are too few to know the noise")
     if channel.time is None:
         found.append("the order of the rows is unknown, so that noise cannot be told from an effect")
-    if not left.is_noise:
-        found.append(f"what is left is not noise: {left.worst.rms:.2g} {unit} in {left.worst.name}".replace("  ", " "))
     if slow_chance(settled) < BY_CHANCE:
         found.append("slow noise could hide it")
-    for one in sizes:
-        if one.size is None:
-            parameters = ", ".join(channel.base.names)
-            found.append(f"an effect over {one.follows} could be concealed by {parameters}")
-        elif one.size > matters:
-            found.append(f"an effect over {one.follows} is not found below {one.size:.2g} {unit}".rstrip())
     return tuple(found)
 
 
@@ -125,7 +134,7 @@ def _followed(
     one: VariableClass,
     probabilities: VariableProbabilities,
     parts: PartGains | None,
-    held_out: HeldOutError | None,
+    held_out: HeldOutError | ChosenAnew | None,
 ) -> Followed:
     probability = min(probabilities.of(each) for each in one.each)
     gain = None if parts is None else parts.of(one.wanted)
@@ -159,13 +168,13 @@ def _followed(
     )
 
 
-def _found_anew(settled: Settled, one: VariableClass, held_out: HeldOutError) -> list[str]:
+def _found_anew(settled: Settled, one: VariableClass, held_out: HeldOutError | ChosenAnew) -> list[str]:
     """Return members whose kind held-out parts gain by, found anew without each."""
     return [name for name in one.members if held_out.gains_of({settled.bank.kind_of(name)}).predicts]
 
 
 def _in_time(one: VariableClass) -> bool:
-    return set[str]().union(*one.each) <= {TIME, RUN}
+    return set[str]().union(*one.each) <= ONCE
 
 
 def _straight(settled: Settled, one: VariableClass) -> tuple[Value | None, float]:

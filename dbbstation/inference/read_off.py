@@ -19,7 +19,7 @@ from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, Gains, Verdict, claim
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -125,15 +125,27 @@ def read_off(settled: Settled, trial: Trial | None = None, levels: Levels | None
         trial: None: the client judges [`claim`]; sure ones are identified here.
         levels: verdicts are read off these; None: each cause is judged by itself.
     """
-    judge = _Judge(settled, trial, levels)
+    judge = CauseJudge(settled, trial, levels)
     found = [judge.finding(cause) for cause in settled.causes]
     found += [judge.refused(name, why) for name, why in settled.refused.items()]
     return tuple(sorted(found, key=lambda one: (one.verdict.rank, -one.log_factor)))
 
 
-class _Judge:
-    def __init__(self, settled: Settled, trial: Trial | None, levels: Levels | None) -> None:
-        self._trial = trial
+class CauseJudge:
+    """Findings on causes; a client of its own words and values derives from it.
+
+    Args:
+        form_uncertainty: of a member, as a share; None: its law's.
+    """
+
+    def __init__(
+        self,
+        settled: Settled,
+        trial: Trial | None,
+        levels: Levels | None,
+        form_uncertainty: Callable[[Member], float] | None = None,
+    ) -> None:
+        self._trial, self._rows = trial, settled.channel.rows_are
         self._settled, self._best, laws = settled, settled.best, settled.bank.laws
         self._members = {member.cause.name: member for member in self._best.members}
         self._without = settled.bank.base_values(np.zeros(len(settled.channel.residual)))
@@ -142,7 +154,8 @@ class _Judge:
             settled.causes,
             settled.posterior,
             self._best,
-            lambda member: laws[member.cause.name].form_uncertainty if member.cause.name in laws else 0.0,
+            form_uncertainty
+            or (lambda member: laws[member.cause.name].form_uncertainty if member.cause.name in laws else 0.0),
             self._best.members,
         )
         self._classes = self._alternatives.classes
@@ -185,7 +198,7 @@ class _Judge:
             values, covariance = self._values[cause.name]
         sigmas = self._sigmas(shown, values, covariance)
         effect = self._settled.bank.samples(shown.columns) @ values
-        whole, rms, confounded = self._concealed(effect)
+        whole, rms, confounded = self._concealed(shown, effect, values)
         verdict, others, text = self._verdict(cause, member, probability, sigmas)
         gains = self._gains(cause.name) if member is not None else None
         law = self._settled.bank.laws.get(cause.name)
@@ -208,7 +221,7 @@ class _Judge:
             sigmas=sigmas,
             whole_rms=whole,
             confounded=confounded,
-            values=self._named(shown, values, covariance),
+            values=self._values_of(shown, values, covariance),
             spans=tuple(_span(v.values[largest], v.name, v.unit) for v in variables) if there else (),
             rows_there=int(largest.sum()),
             rows=rows,
@@ -244,7 +257,9 @@ class _Judge:
         (first, last), blocks = rows[0], self._settled.channel.blocks
         return any(0 <= first - b.start < SHORTEST or 0 <= b.stop - 1 - last < SHORTEST for b in blocks)
 
-    def _named(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> dict[str, Value]:
+    def _values_of(
+        self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
+    ) -> dict[str, Value]:
         """Return parameters with the larger of model and jackknife uncertainty."""
         found = named_values(self._settled, member, values, covariance)
         own = self._own.get(member.cause.name)
@@ -269,7 +284,11 @@ class _Judge:
         if member is None and probability < EVEN:
             return self._absent(cause, probability)
         others = self._alternatives.ambiguity(cause.name)
-        text = f"These rows cannot tell it from {', '.join(others)}." if others else "These rows do not decide it."
+        text = (
+            f"These {self._rows} cannot tell it from {', '.join(others)}."
+            if others
+            else f"These {self._rows} do not decide it."
+        )
         return Verdict.AMBIGUOUS, others, text
 
     def _instead_of(self, name: str) -> frozenset[str]:
@@ -321,12 +340,12 @@ class _Judge:
             if self._seen(cause, ()) >= OUT:
                 beside = next((n for n in self._members if self._seen(cause, self._best.without(n)) >= OUT), None)
                 what = beside or "what was found"
-                return Verdict.NOT_TESTABLE, (), f"Beside {what} these rows would not show it."
+                return Verdict.NOT_TESTABLE, (), f"Beside {what} these {self._rows} would not show it."
             if self._seen(cause, (), base=False) >= OUT:
                 return Verdict.NOT_TESTABLE, (), "The fitted parameters would take it up."
-            return Verdict.NOT_TESTABLE, (), "These rows would not show it at its plausible size."
+            return Verdict.NOT_TESTABLE, (), f"These {self._rows} would not show it at its plausible size."
         if probability > ABSENT:
-            return Verdict.NOT_TESTABLE, (), "These rows leave it open: they neither show nor exclude it."
+            return Verdict.NOT_TESTABLE, (), f"These {self._rows} leave it open: they neither show nor exclude it."
         return Verdict.RULED_OUT, (), "It would have been seen at its plausible size and was not needed."
 
     def _seen(self, cause: Cause, others: tuple[Member, ...], *, base: bool = True) -> float:
@@ -343,7 +362,9 @@ class _Judge:
         """Return an effect's norm beside the base in standard deviations."""
         return norm_over_sigma(self._settled.comparison.beside((), member.columns), values, covariance)
 
-    def _concealed(self, effect: NDArray[np.float64]) -> tuple[float, float, float]:
+    def _concealed(
+        self, _shown: Member, effect: NDArray[np.float64], _values: NDArray[np.float64]
+    ) -> tuple[float, float, float]:
         """Return an effect's rms, its rms beyond the base, and the absorbed share."""
         kept = effect[self._settled.channel.kept]
         whole = _rms(kept - kept.mean())

@@ -13,11 +13,13 @@ from dbbstation.facts.run import OfRun
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.levels import Levels
 from dbbstation.inference.limit_reached import LimitReached
 from dbbstation.inference.verdict import Gains
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.effects import CauseContribution
 from dbbstation.results.frame import Framed
+from dbbstation.results.levels_text import level_sentences
 
 
 @dataclass(frozen=True)
@@ -235,6 +237,7 @@ class DiagnosisFigures(Framed):
         second_start_agrees: whether a second search agrees; None without one.
         next_test: None: no proposal.
         limits: search, parameters and joint fit that ended at a limit.
+        levels: existence, variables and cause of a difference.
     """
 
     mismatch: bool
@@ -257,7 +260,14 @@ class DiagnosisFigures(Framed):
     second_start_agrees: bool | None
     next_test: ProposedTest | None
     further_tests: tuple[ProposedTest, ...]
+    levels: Levels
     limits: tuple[LimitReached, ...] = ()
+
+    def sentences(self) -> list[str]:
+        """The answer in three levels, in words; a notebook shows it above the table."""
+        values = {one.name: one.parameters for one in self.sources}
+        what = "Measured circles and the kinematic model"
+        return level_sentences(self.levels, "µm", values, rows="tests", what=what)
 
     @property
     def identified(self) -> tuple[CauseResult, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.inference.levels import RUN, Differs, FollowsAnswer
+from dbbstation.inference.levels import RUN, TIME, Differs, FollowsAnswer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -21,16 +21,26 @@ MOST_LISTED = 4
 WAYS = {"value": "by value", "direction": "by direction of travel", "late": "late", "in_time": "in time"}
 
 
-def level_sentences(levels: Levels, unit: str, values: Mapping[str, Mapping[str, Value]]) -> list[str]:
+def level_sentences(
+    levels: Levels,
+    unit: str,
+    values: Mapping[str, Mapping[str, Value]],
+    *,
+    rows: str = "rows",
+    what: str = "Measured and simulated values",
+) -> list[str]:
     """Return sentences on existence, variables and law of a difference, and correction.
 
     Args:
         unit: may be empty.
         values: numbers of laws, by law and number.
+        rows: what took part, such as `tests`.
+        what: differs.
     """
-    found = [*_difference(levels.differs, unit)]
+    found = [*_difference(levels.differs, unit, what, rows)]
     for one in levels.follows:
-        found += _followed(one, unit, values)
+        found += _followed(one, unit, values, rows)
+    found += _hidden(levels.differs, unit)
     if levels.correction is False:
         found.append(no_correction(levels))
     return found
@@ -43,36 +53,46 @@ def no_correction(levels: Levels) -> str:
     return "No correction is offered: the corrected values predict held-out rows no better than as simulated. The refit may be at fault."
 
 
-def _difference(one: DifferenceFound, unit: str) -> Iterator[str]:
+def _difference(one: DifferenceFound, unit: str, what: str, rows: str) -> Iterator[str]:
     answer = {
-        Differs.YES: f"Measured and simulated values differ: probability {one.probability:.3f}",
+        Differs.YES: f"{what} differ: probability {one.probability:.3f}",
         Differs.NO: f"No effect of {_size(one.matters, unit)} rms or more is there: probability of any effect {one.probability:.2f}",
-        Differs.CANNOT_TELL: f"Whether measured and simulated values differ cannot be told: {one.why}",
+        Differs.CANNOT_TELL: f"Whether {what[0].lower()}{what[1:]} differ cannot be told: {one.why}",
     }[one.answer]
     if one.answer is Differs.YES and one.why:
         answer += f"; {one.why}"
     elif one.answer is Differs.YES and one.gain is not None:
-        answer += f", log density of held-out rows {one.gain:+.0f}"
+        answer += f", log density of held-out {rows} {one.gain:+.0f}"
     yield f"{answer}."
     seen = [f"{d.follows} {_size(d.size, unit)}" for d in one.detectable if d.size is not None][:MOST_LISTED]
     if seen and one.answer is not Differs.YES:
         yield f"Smallest effects that are found, rms: {', '.join(seen)}. The noise has {one.independent_samples:.0f} independent samples."
-    hidden = [d for d in one.detectable if d.size is not None and d.concealed > LIKELY]
-    for d in hidden[:MOST_LISTED]:
+    hidden = [d for d in one.detectable if d.size is not None and d.concealed > LIKELY][:MOST_LISTED]
+    for d in (d for d in hidden if d.confirm is None):
         yield f"Fitted parameters take up {100.0 * d.concealed:.0f} % of the squares of an effect over {d.follows}."
 
 
-def _followed(one: Followed, unit: str, values: Mapping[str, Mapping[str, Value]]) -> Iterator[str]:
+def _hidden(one: DifferenceFound, unit: str) -> Iterator[str]:
+    """What fitted parameters conceal of causes, and what would show it."""
+    named = [d for d in one.detectable if d.size is not None and d.confirm is not None]
+    for d in [d for d in named if d.concealed > LIKELY][:MOST_LISTED]:
+        share = f"fitted parameters take up {100.0 * d.concealed:.0f} % of its squares"
+        yield f"Up to {_size(d.size, unit)} rms of {d.follows} may be hidden: {share}. {d.confirm}"
+
+
+def _followed(one: Followed, unit: str, values: Mapping[str, Mapping[str, Value]], rows: str) -> Iterator[str]:
     ways = [WAYS[way] for way, probability in one.ways.items() if probability >= LIKELY]
     how = f"probability {one.probability:.3f}{''.join(f', {way}' for way in ways)}, {_size(one.rms, unit)} rms"
-    also = f" These rows cannot tell it from {_listed(one.or_variables)}." if one.or_variables else ""
+    also = f" These {rows} cannot tell it from {_listed(one.or_variables)}." if one.or_variables else ""
+    name = f"{one.name}, {one.where}" if one.where else one.name
+    happened = "Something happened in time" if one.name == TIME else f"It happened once: {name}"
     what = {
-        FollowsAnswer.FOLLOWS: f"The difference follows {one.name}",
+        FollowsAnswer.FOLLOWS: f"The difference follows {name}",
         FollowsAnswer.GOES_ON: "The difference goes on in time; no listed variable says it",
-        FollowsAnswer.HAPPENED: "Runs differ by an offset" if one.name == RUN else "Something happened in time",
-        FollowsAnswer.DOES_NOT_PREDICT: f"In these rows the difference follows {one.name}; other rows gain nothing by it",
-        FollowsAnswer.NOT_TESTED: f"The difference follows {one.name}; this was not tested on held-out rows",
-        FollowsAnswer.UNDECIDED: f"The difference may follow {one.name}; these rows do not decide it",
+        FollowsAnswer.HAPPENED: "Runs differ by an offset" if name == RUN else happened,
+        FollowsAnswer.DOES_NOT_PREDICT: f"In these {rows} the difference follows {name}; other {rows} gain nothing by it",
+        FollowsAnswer.NOT_TESTED: f"The difference follows {name}; this was not tested on held-out {rows}",
+        FollowsAnswer.UNDECIDED: f"The difference may follow {name}; these {rows} do not decide it",
     }[one.answer]
     yield f"{what}: {how}.{also}"
     if (
@@ -80,24 +100,26 @@ def _followed(one: Followed, unit: str, values: Mapping[str, Mapping[str, Value]
         and one.before is not None
         and one.after is not None
     ):
-        yield f"  Correcting it leaves {one.after:.3g} of {_size(one.before, unit)} rms in rows that took no part."
+        yield f"  Correcting it leaves {one.after:.3g} of {_size(one.before, unit)} rms in {rows} that took no part."
     if one.consequence:
         yield f"  {one.name} results from what is simulated: it shows the difference, and is no cause of it."
     elif one.may_result:
         yield f"  {one.name} carries the difference itself: it may be its cause, or result from it. These rows cannot tell."
     if one.form is not None:
-        yield f"  {_law(one.form, values)}"
+        yield f"  {_law(one.form, values, rows)}"
         sloped = any("slope" in values.get(name, {}) for name in one.form.names)
         if one.slope is not None and one.straight >= LIKELY and not sloped:
             yield f"  The straight line through it over {one.variables[0][0]} has {one.slope.in_words}: {100.0 * one.straight:.0f} % of its squares."
 
 
-def _law(form: LawForm, values: Mapping[str, Mapping[str, Value]]) -> str:
+def _law(form: LawForm, values: Mapping[str, Mapping[str, Value]], rows: str) -> str:
     if form.names:
-        same = f" These rows cannot tell it from {_listed(form.not_worse)}." if form.name and form.not_worse else ""
+        same = f" These {rows} cannot tell it from {_listed(form.not_worse)}." if form.name and form.not_worse else ""
         laws = "; and ".join(f"{name}{_numbers(values.get(name, {}))}" for name in form.names)
         return f"{'Law' if len(form.names) == 1 else 'Laws, together'}: {laws}.{same}"
-    return f"Law: open. These rows cannot tell {_listed(form.not_worse)} apart."
+    if len(form.not_worse) == 1:
+        return f"Law: open. Nothing else is as probable as {form.not_worse[0]}."
+    return f"Law: open. These {rows} cannot tell {_listed(form.not_worse)} apart."
 
 
 def _numbers(values: Mapping[str, Value]) -> str:

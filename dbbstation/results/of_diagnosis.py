@@ -83,6 +83,7 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
         second_start_agrees=diagnosis.second_start_agrees,
         next_test=_proposed(diagnosis.next_tests[0]) if diagnosis.next_tests else None,
         further_tests=tuple(_proposed(test) for test in diagnosis.next_tests[1:]),
+        levels=diagnosis.levels,
         limits=diagnosis.limits,
     )
 

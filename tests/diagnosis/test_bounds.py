@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,7 @@ from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.shapes import AWAY_MM, TOWARDS, Spring, ranges, samples_of, shapes
-from dbbstation.diagnosis.verdicts import _Judge
-from dbbstation.inference.verdict import Acts
+from dbbstation.diagnosis.verdicts import _CircleJudge
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.diagnose import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
@@ -102,12 +103,11 @@ def _still(folder, *mechanisms):
 
 @pytest.mark.parametrize(("group", "verdict"), [((), Verdict.NOT_TESTABLE), (("backlash",), Verdict.AMBIGUOUS)])
 def test_only_a_group_of_which_one_is_there_is_ambiguous(group, verdict):
-    judge = object.__new__(_Judge)
-    judge._probability = lambda names: 0.7 if "play" in names else 0.0
-    judge._sigmas_of, judge._gains = lambda _: 9.0, lambda _: None
-    judge._acts, judge._anew = lambda _: Acts.ALWAYS, None
-    judge._named = {"play": None, "backlash": None}
-    judge._classes, judge._ambiguities = {"play": ("play",)}, {"play": ("play", *group)}
-    found, others, _, text = judge._verdict_of_member("play")
+    judge = object.__new__(_CircleJudge)
+    judge._levels, judge._classes, judge._rows = None, {"play": ("play",)}, "tests"
+    judge._joint = SimpleNamespace(unmodelled=SimpleNamespace(follows={}))
+    judge._alternatives = SimpleNamespace(probability=lambda _: 0.7, ambiguity=lambda _: group)
+    cause = SimpleNamespace(name="play")
+    found, others, text = judge._verdict(cause, object(), 0.7, 9.0)
     assert (found, others) == (verdict, group)
     assert ("open" in text) is not bool(group)

@@ -18,7 +18,7 @@ from unittest import mock
 
 import numpy as np
 
-from dbbstation.inference import followed, patterns
+from dbbstation.inference import patterns
 from dbbstation.inference.curves import Spline
 from dbbstation.inference.detectable import MARGIN, detectable
 from dbbstation.inference.followed import VariableProbabilities, classes_of, probability_of_any
@@ -59,7 +59,7 @@ def named_at(kind: str, seed: int) -> dict[str, bool]:
     """Whether, by share, a class names a variable besides those that are followed."""
     settled, found = settled_of(table_of(kind, seed, 2.0)), {}
     for share in SHARES:
-        with mock.patch.object(followed, "INTERCHANGEABLE", share):
+        with mock.patch.object(Bank, "interchangeable", share):
             classes = classes_of(settled, VariableProbabilities(settled))
         others = {SAME.get(v, v) for one in classes for v in one.others} - EFFECTS[kind][2]
         found[str(share)] = bool(others)

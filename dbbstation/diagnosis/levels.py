@@ -1,0 +1,191 @@
+"""Circles as an outcome like any other: levels and verdicts are read off it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.checks.missing_physics import is_missing_physics, remainder_of
+from dbbstation.calibration.outliers.outlier import OutlierKind
+from dbbstation.diagnosis.left_where import where_left
+from dbbstation.diagnosis.shapes import SIGNED
+from dbbstation.inference.alternatives import EQUIVALENT
+from dbbstation.inference.bank import Bank
+from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.coloured import Coloured
+from dbbstation.inference.detectable import MARGIN, least_seen
+from dbbstation.inference.left_over import SIGNIFICANT, LeftOver, ResidualTest
+from dbbstation.inference.levels import BALL, BAR, RUN, Detectable, Differs, Followed, FollowsAnswer
+from dbbstation.inference.levels_of import levels_of
+from dbbstation.inference.places import with_places
+from dbbstation.inference.settled import Settled
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.outliers.outlier import Outlier
+    from dbbstation.diagnosis.channel import CircleChannel
+    from dbbstation.diagnosis.explained import Explained, SettledCircles
+    from dbbstation.inference.chosen_anew import GainsOfTests
+    from dbbstation.inference.levels import Levels
+    from dbbstation.inference.model_comparison import Cause
+    from dbbstation.inference.projection import BesideBase
+    from dbbstation.sources.contract import ErrorSource
+
+SESSION_TIME = "the time of the session"
+"""Variable of what warms up or drifts over a session: tests that were held back lie between others."""
+
+UM = 1e3
+
+NOTHING = 1e-3
+"""Share of the noise up to which the rms of an effect is none."""
+
+
+class CircleBank(Bank):
+    """Columns of circles, which are laid out already, in white noise.
+
+    A tenth of the squares of an effect is thousands in log evidence here: variables are interchangeable where causes are equivalent.
+    """
+
+    interchangeable = EQUIVALENT**2
+
+    def __init__(self, rows: Channel, circles: CircleChannel, settled: SettledCircles) -> None:
+        self.channel, self.patterns, self.laws = rows, {}, {law.name: law for law in rows.laws}
+        self.noise, self.whitening, self.tails = Coloured(settled.noise_mm), None, np.inf
+        self._columns, self._circles, self._scatter = circles.columns, circles, settled.scatter
+        self.nameless = frozenset(cause.name for cause in settled.causes if not cause.named)
+
+    def samples(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return columns over all rows, shape (n, p) [mm]."""
+        return self._columns.of(columns)
+
+    def beside(self, but_for: NDArray[np.bool_] | None = None, only: NDArray[np.int64] | None = None) -> BesideBase:
+        """Return causes beside the base, as of any bank."""
+        return self._circles.beside_base(self.noise.sigma, self._scatter, but_for, only)
+
+
+def outcome_of(explained: Explained) -> Settled:
+    """Return what the comparison of circles came to, as of any channel, in mm."""
+    circles, settled = explained.channel, explained.settled
+    base = circles.base
+    rows = Channel(
+        residual=circles.target(settled.after),
+        unit="mm",
+        blocks=tuple(circles.runs),
+        names=tuple(f"{o.test} {o.raw.circle.direction}" for o in circles.observations),
+        variables=(),
+        base=Base(("the kinematic parameters",), circles.columns.base, base.prior, base.random),
+        laws=tuple(_law(explained, cause) for cause in settled.causes),
+        rows_are="tests",
+    )
+    bank = CircleBank(rows, circles, settled)
+    posterior, best = settled.posterior, settled.best
+    others = tuple(one for one in posterior.hypotheses if one.names != best.names)
+    return Settled(
+        channel=rows,
+        bank=bank,
+        noise=bank.noise,
+        causes=settled.causes,
+        comparison=settled.comparison,
+        posterior=replace(posterior, hypotheses=(best, *others)),
+        refused=settled.refused,
+        stopped=settled.stopped,
+    )
+
+
+def _law(explained: Explained, cause: Cause) -> Law:
+    """A cause with what it follows; its columns are those that were laid out."""
+    settled, circles, variant = explained.settled, explained.channel, cause.variants[0]
+    member = next((m for m in settled.best.members if m.cause.name == cause.name), None)
+    variant = variant if member is None else member.variant
+    source = circles.sources.get((cause.name, variant.law))
+    follows = settled.unmodelled.follows.get(cause.name)
+    once = cause.setup or (source is not None and circles.happens_once(cause.name))
+    if cause.setup:
+        variable = BAR if cause.name == "bar-offset" else BALL
+    elif follows is not None:
+        variable = follows.variable
+    else:
+        variable = RUN if once or source is None else source.varies_with or cause.name
+    wanders = follows is not None and follows.kind == "wander"
+    signed = variable.endswith("sign") or (follows is not None and follows.moves == SIGNED)
+
+    def columns(point: tuple[float, ...]) -> NDArray[np.float64]:
+        return circles.columns.of(next(one.columns for one in cause.variants if one.nonlinear == point))
+
+    return Law(
+        cause.name,
+        columns,
+        variant.plausible,
+        (),
+        (),
+        form_uncertainty=0.0 if source is None else source.form_uncertainty,
+        log_odds=cause.log_prior_odds,
+        followed=(SESSION_TIME if variable == "time" and not wanders else variable,),
+        way="direction" if signed else "",
+        acts_once=once,
+    )
+
+
+def circle_levels(explained: Explained, outcome: Settled, gains: GainsOfTests | None) -> Levels:
+    """Return the three levels of circles [µm].
+
+    Args:
+        gains: None: not tested.
+    """
+    sources = {name: source for (name, _), source in explained.channel.sources.items()}
+    each = (_size(outcome, cause, sources[cause.name]) for cause in outcome.causes if cause.named)
+    sizes = sorted(filter(None, each), key=lambda one: -np.inf if one.size is None else -one.size)
+    anew = None if gains is None else gains.anew
+    found = levels_of(outcome, _left(explained), gains, anew, sizes=tuple(sizes))
+    correction = None if gains is None else gains.error < gains.errors[frozenset()]
+    found = with_places(replace(found, correction=correction), outcome).times(UM)
+    if not explained.outliers:
+        return found
+    differs = replace(found.differs, answer=Differs.YES, why="", probability=1.0)
+    return replace(found, differs=differs, follows=(*found.follows, *map(_happened, explained.outliers)))
+
+
+def _happened(outlier: Outlier) -> Followed:
+    """Class of a ball, bar or run that is kept out of the fit [µm]."""
+    variable = {OutlierKind.RUN: RUN, OutlierKind.BAR: BAR}.get(outlier.kind, BALL)
+    return Followed(
+        ((variable,),), (), FollowsAnswer.HAPPENED, 1.0, {}, outlier.size_um, (), where=outlier.runs or outlier.test
+    )
+
+
+def _size(outcome: Settled, cause: Cause, source: ErrorSource) -> Detectable | None:
+    """Smallest size of a named cause that these tests would show, beside what was found, before the geometry takes its part.
+
+    None: at its plausible size it moves nothing here.
+    """
+    variant = max(cause.variants, key=lambda one: len(one.columns))
+    others = outcome.best.without(cause.name)
+    samples = outcome.bank.samples(variant.columns)
+    of_base = outcome.comparison.beside((), variant.columns) * outcome.noise.sigma**2
+    shown = float(variant.plausible**2 @ np.diag(of_base))
+    whole = float(np.sum(np.square(samples * variant.plausible)))
+    if whole < (NOTHING * outcome.noise.sigma) ** 2 * len(samples):
+        return None
+    size = least_seen(
+        outcome.comparison.beside(others, variant.columns),
+        samples,
+        variant.plausible,
+        cause.log_prior_odds + variant.log_weight,
+    )
+    concealed = float(np.clip(1.0 - shown / max(whole, 1e-300), 0.0, 1.0))
+    return Detectable(cause.name, None if size is None else MARGIN * size, concealed, source.texts.confirm)
+
+
+def _left(explained: Explained) -> LeftOver:
+    """What joint model and unmodelled effects leave, as of any channel [mm]."""
+    settled = explained.settled
+    if any(settled.unmodelled.of(member) for member in settled.best.members):
+        return LeftOver(True, 1.0, ())  # noqa: FBT003 - its first field
+    found = remainder_of(settled.after, settled.noise)
+    rms_um, where = where_left(settled.after.observations, found)
+    is_noise = not is_missing_physics(settled.left) and found.probability >= SIGNIFICANT
+    test = ResidualTest("these tests", found.probability, rms_um / UM, where)
+    return LeftOver(is_noise, found.probability, (test,))

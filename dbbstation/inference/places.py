@@ -1,0 +1,39 @@
+"""Which part of an object a class acts on, such as one strut: from the forms of its members."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import logsumexp
+
+from dbbstation.inference.verdict import SURE
+
+if TYPE_CHECKING:
+    from dbbstation.inference.levels import Levels
+    from dbbstation.inference.settled import Settled
+
+
+def with_places(levels: Levels, settled: Settled) -> Levels:
+    """Return levels with the strut, or all struts, that each class acts on for sure."""
+    return replace(levels, follows=tuple(replace(one, where=_place(settled, one.members)) for one in levels.follows))
+
+
+def _place(settled: Settled, names: tuple[str, ...]) -> str | None:
+    """Return the form that all members have at a probability of `SURE`, beside the others; None if there is none, or it has no name."""
+    labels = {max(form_probabilities(settled, name).items(), key=lambda one: one[1]) for name in names}
+    found = {label if probability >= SURE else "" for label, probability in labels}
+    return (found.pop() or None) if len(found) == 1 else None
+
+
+def form_probabilities(settled: Settled, name: str) -> dict[str, float]:
+    """Return the probability of each form of a member, by label, beside the other members."""
+    cause = next(one for one in settled.causes if one.name == name)
+    scan = settled.comparison.scan(settled.best.without(name), [cause])
+    worth = logsumexp(scan.weighted, axis=1)
+    shares = np.exp(worth - logsumexp(worth))
+    found: dict[str, float] = {}
+    for variant, share in zip(cause.variants, shares, strict=True):
+        found[variant.label] = found.get(variant.label, 0.0) + float(share)
+    return found

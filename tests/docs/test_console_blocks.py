@@ -15,6 +15,7 @@ import pytest
 from dbbstation.cli import cli
 from dbbstation.cli.diagnose import _print as print_diagnosis
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.inference.levels import DifferenceFound, Differs, Levels
 from dbbstation.results.diagnosis import BeforeAfter, CauseResult, DiagnosisFigures, ParameterShift, UnexplainedResult
 from tests.cli.conftest import Outcome, call
 from tests.once import OF_TABLES, STUDIES, computed_once
@@ -281,10 +282,20 @@ def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys
             second_start_agrees=True,
             next_test=None,
             further_tests=(),
+            levels=Levels(DifferenceFound(Differs.YES, "", 1.0, 2.0, False, 100.0, ()), (), None),  # noqa: FBT003
         )
     )
     printed = {_without_numbers(line) for line in capsys.readouterr().out.splitlines()}
-    beginnings = ("The recordings", "cause ", "value ±", "residual ", "error of ", "bias of ", "Nothing ")
+    beginnings = (
+        "Measured circles",
+        "The recordings",
+        "cause ",
+        "value ±",
+        "residual ",
+        "error of ",
+        "bias of ",
+        "Nothing ",
+    )
     for document, least in (("README.md", 2), ("docs/diagnosis.md", 7)):
         shown = [c.shown for c in COMMANDS if c.kind == (document, "dbbstation diagnose measured")]
         lines = [line for block in shown for line in block if line.startswith(beginnings)]

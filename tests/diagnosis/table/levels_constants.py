@@ -19,6 +19,7 @@ from unittest import mock
 import numpy as np
 
 from dbbstation.inference import patterns
+from dbbstation.inference.bank import Bank
 from dbbstation.inference.curves import Spline
 from dbbstation.inference.detectable import MARGIN, detectable
 from dbbstation.inference.followed import VariableProbabilities, classes_of, probability_of_any

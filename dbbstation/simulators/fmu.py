@@ -5,12 +5,14 @@ Ports are FMU inputs of the port's name; signals are its variables.
 
 from __future__ import annotations
 
+import zipfile
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.catalogue import FOREIGN
 from dbbstation.diagnosis.simulator.ports import SimulationFault
+from dbbstation.files.gateway import opened
 from dbbstation.simulators.exchanged import ExchangedSimulator
 
 if TYPE_CHECKING:
@@ -18,6 +20,28 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+
+MOST_UNPACKED_MB, MOST_DESCRIBED_MB, MOST_FILES = 2000.0, 50.0, 20_000
+"""Bounds of what an FMU unpacks to: all of it, its description, and how many files. A vehicle model has some 100 MB."""
+
+_DESCRIPTION = "modelDescription.xml"
+
+
+def fault_of_fmu(path: Path) -> str:
+    """Return why a file is no FMU that can be unpacked; empty if it can. Nothing is unpacked for that."""
+    try:
+        with opened(path) as _, zipfile.ZipFile(path) as archive:
+            sizes = {one.filename: one.file_size / 1e6 for one in archive.infolist()}
+    except (OSError, zipfile.BadZipFile, NotImplementedError, ValueError) as error:
+        return f"is no FMU: {error}"
+    if _DESCRIPTION not in sizes:
+        return f"is no FMU: it has no {_DESCRIPTION}"
+    # Python unpacks no more than an archive states.
+    for size, most in ((sum(sizes.values()), MOST_UNPACKED_MB), (sizes[_DESCRIPTION], MOST_DESCRIBED_MB)):
+        if size > most:
+            return f"unpacks to {size:,.0f} MB, at most {most:g} MB are unpacked"
+    return f"holds {len(sizes):,} files, at most {MOST_FILES:,} are unpacked" if len(sizes) > MOST_FILES else ""
 
 
 class FmuSimulator(ExchangedSimulator):

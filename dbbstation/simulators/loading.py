@@ -24,7 +24,7 @@ from dbbstation.files.own_classes import classes_in_files, module_name, own_inst
 from dbbstation.files.places import real_path
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
 from dbbstation.simulators.allowed import files_of_simulator
-from dbbstation.simulators.fmu import FmuSimulator
+from dbbstation.simulators.fmu import FmuSimulator, fault_of_fmu
 from dbbstation.simulators.program import ProgramSimulator, whole_command
 
 if TYPE_CHECKING:
@@ -118,6 +118,8 @@ def _source(path: Path, file: SimulatorFile) -> Path | ExchangedSimulator:
         return ProgramSimulator(command, ports, tuple(file.outputs), file.time_limit_s)
     if file.fmu is not None:
         fmu = (path.parent / file.fmu).absolute()
+        if fault := fault_of_fmu(fmu):
+            raise InputError([Problem(str(path.parent / file.fmu), 0, 0, fault, "name another FMU")])
         return FmuSimulator(fmu, file.variables, ports, tuple(file.outputs), file.time_limit_s)
     python = path.parent / str(file.python)
     simulator_of(python)

@@ -1,9 +1,12 @@
 """An FMU as a simulator, of FMI 2 and of FMI 3: the test compiles both; with a concealed effect, end to end."""
 
+import contextlib
 import json
+import os
 import re
 import shutil
 import subprocess
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -13,6 +16,7 @@ import pytest
 from dbbstation.diagnosis.simulator.model import SimulationRequest
 from dbbstation.diagnosis.simulator.terms import Term, TermForm
 from dbbstation.errors import CalibrationError, InputError
+from dbbstation.simulators import fmu as fmu_module
 from dbbstation.simulators import kept
 from dbbstation.simulators.loading import load_simulator
 from dbbstation.simulators.running import Runs
@@ -20,8 +24,12 @@ from tests.cli.conftest import call
 from tests.diagnosis.simulator.systems import held
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy, an extra, is not installed")
+resource = pytest.importorskip("resource", reason="Windows does not say how much memory was taken")
 if shutil.which("gcc") is None:
     pytest.skip("no gcc to compile an FMU", allow_module_level=True)
+
+# FMPy leaves archives open whose description is none.
+pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
 
 HERE = Path(__file__).parent
 DESCRIPTION_2 = """<?xml version="1.0" encoding="UTF-8"?>
@@ -142,3 +150,68 @@ def test_what_an_fmu_lacks_is_found_end_to_end(folder):
     assert [f["port"] for f in there] == ["flow"]
     rate = next(p for p in data["parameters"] if p["name"] == "rate")
     assert rate["corrected"]["value"] == pytest.approx(0.4, abs=0.05)
+
+
+def rewritten(path, changes):
+    """Replace or add members of an archive."""
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()} | changes
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+
+
+ENTITIES = "".join(f'<!ENTITY {name} "{f"&{of};" * 100}">' for of, name in zip("abcd", "bcde", strict=True))
+HOSTILE = {
+    "entities that grow to 1e11 letters": f'<!DOCTYPE x [<!ENTITY a "{"a" * 1000}">{ENTITIES}]><fmiModelDescription modelName="&e;"/>',
+    "another file": '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]><fmiModelDescription>&a;</fmiModelDescription>',
+    "a deep nest": "<a>" * 100_000 + "</a>" * 100_000,
+    "no XML": "\xff\0",
+    "nothing": "",
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+def test_a_hostile_description_is_one_sentence_without_what_it_asked_for(folder, what):
+    rewritten(folder / "tank.fmu", {"modelDescription.xml": HOSTILE[what]})
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(CalibrationError, match="the simulation failed") as caught:
+        simulated(folder, 0.3)
+    assert "root:" not in str(caught.value)
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < 200e6
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "fault"),
+    [
+        ("resources/zeros", b"\0" * 2_000_001, r"unpacks to 2 MB, at most 2 MB are unpacked"),
+        ("modelDescription.xml", b" " * 1_500_000, r"unpacks to 2 MB, at most 1 MB are unpacked"),
+        ("many", 30, r"holds \d+ files, at most 20 are unpacked"),
+    ],
+)
+def test_an_archive_that_would_unpack_to_too_much_is_refused_before(folder, monkeypatch, name, content, fault):
+    monkeypatch.setattr(fmu_module, "MOST_UNPACKED_MB", 2.0)
+    monkeypatch.setattr(fmu_module, "MOST_DESCRIBED_MB", 1.0)
+    monkeypatch.setattr(fmu_module, "MOST_FILES", 20)
+    changes = {name: content} if isinstance(content, bytes) else {f"{name}/{k}": b"" for k in range(content)}
+    rewritten(folder / "tank.fmu", changes)
+    with pytest.raises(InputError, match=fault):
+        simulated(folder, 0.3)
+
+
+@pytest.mark.parametrize("data", [b"", b"no archive", b"PK\x03\x04" + bytes(200), "cut"])
+def test_what_is_no_archive_is_refused(folder, data):
+    whole = (folder / "tank.fmu").read_bytes()
+    (folder / "tank.fmu").write_bytes(whole[: len(whole) // 2] if data == "cut" else data)
+    with pytest.raises(InputError, match="is no FMU"):
+        simulated(folder, 0.3)
+
+
+@pytest.mark.parametrize("name", ["../../beside.txt", "/tmp/beside-{}.txt"])  # noqa: S108 - where nothing must be written
+def test_nothing_is_unpacked_outside(folder, tmp_path, name):
+    name = name.format(os.getpid())
+    rewritten(folder / "tank.fmu", {name: b"x"})
+    with contextlib.suppress(CalibrationError):
+        simulated(folder, 0.3)
+    assert not list(tmp_path.parent.rglob("beside*"))
+    assert not list(Path(tempfile.gettempdir()).glob("beside*"))

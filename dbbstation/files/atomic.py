@@ -6,6 +6,7 @@ A power cut leaves the old file, the new one or a temporary one with `.new` in i
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import os
 import re
@@ -19,7 +20,7 @@ from dbbstation.files.inputs import was_read
 from dbbstation.files.places import real_path
 from dbbstation.files.recorded_ground import refuse_recorded
 from dbbstation.files.refused import refusal
-from dbbstation.system.handles import open_private
+from dbbstation.system.handles import may_write, open_private
 from dbbstation.system.replacing import remove, remove_tree, rename, replace, sync_folder
 
 if TYPE_CHECKING:
@@ -157,6 +158,9 @@ def _refuse_unfit(path: Path, *, force: bool) -> None:
     if not path.parent.is_dir():
         what = f"cannot be written: there is no folder {path.parent}"
         raise OutputError(what, where=str(path), remedy="make the folder, or name another")
+    if not may_write(path.parent):
+        why, remedy = refusal(PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
+        raise OutputError(f"cannot be written: {why}", where=str(path), remedy=remedy)
 
 
 def refuse_outputs(paths: Iterable[Path | None], *, force: bool) -> None:

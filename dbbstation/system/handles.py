@@ -29,6 +29,11 @@ def open_to_read(path: Path) -> int:
     return os.open(path, _READING)
 
 
+def may_write(folder: Path) -> bool:
+    """Whether the system lets this user make files in a folder, as far as it says beforehand."""
+    return os.access(folder, os.W_OK)
+
+
 def open_private(path: str, flags: int) -> int:
     """Open a file as `open` asks for it; if it is made, only its owner may read it."""
     return os.open(path, flags, 0o600)

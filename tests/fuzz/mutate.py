@@ -8,6 +8,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import random
     from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+FORGED = "no fault at all"
+"""What a line begins with that a name with a line feed has forged."""
+SOUND = "sound/"
+"""Folder of files that commands need beside the spoilt ones and that stay as they are."""
 
 NUMBERS = (
     b"0", b"-0.0", b"-1", b"1e308", b"-1e308", b"1e-320", b"1e160", b"1e-160", b"1e15", b"nan", b"inf", b"-inf", b".nan", b"", b"1_000", b"0x10",
@@ -16,7 +22,7 @@ NUMBERS = (
 )  # fmt: skip
 VALUES = (
     b"null", b"~", b"[]", b"{}", b"[1, 2]", b"{a: 1}", b"[[[]]]", b"''", b'""', b"!!python/none x", b"&a x", b"*a", b"|", b">", b"- 1", b"? x",
-    b"true", b"no", b"word", b"'two words'", b'"\\x1b]0;title\\x07"', b'"\\0"', b'"\\ud800"', b'"a\\nb"', b"=HYPERLINK(1)", b"../../etc/passwd", b"/dev/zero",
+    b"true", b"no", b"word", b"'two words'", b'"\\x1b]0;title\\x07"', b'"\\0"', b'"\\ud800"', b'"a\\nb"', b'"x\\n%s"' % FORGED.encode(), b"=HYPERLINK(1)", b"../../etc/passwd", b"/dev/zero",
     b".", b"s", b"x" * 3000, "µ".encode(), "\u202e".encode(), b"2026-11-20T08:00:00Z", b"9999-12-31T23:59:59Z", b"0001-01-01T00:00:00+14:00", b"ccw", b"cw",
 )  # fmt: skip
 SIGNS = (
@@ -128,12 +134,83 @@ def _column(data: bytes, rng: random.Random, _others: Sequence[bytes]) -> bytes:
     return b"\n".join(lines)
 
 
+def _deep(data: bytes, rng: random.Random, _others: Sequence[bytes]) -> bytes:
+    """Nesting deeper than any parser recurses."""
+    at, (first, last) = (
+        rng.randint(0, len(data)),
+        rng.choice([(b"[", b"]"), (b"{a: ", b"}"), (b"(", b")"), (b"-", b""), (b"- ", b"")]),
+    )
+    depth = rng.choice([50, 900, 20_000])
+    return data[:at] + first * depth + b"1" + last * rng.choice([0, depth]) + data[at:]
+
+
+def _wide(data: bytes, rng: random.Random, _others: Sequence[bytes]) -> bytes:
+    """Some thousand columns more."""
+    lines = data.split(b"\n")
+    sign = max((b",", b";", b"\t"), key=data.count)
+    count, at = rng.choice([300, 9_000]), rng.randrange(3)
+    for row, line in enumerate(lines[:20]):
+        cells = line.split(sign)
+        if len(cells) > 1 and not line.startswith(b"#"):
+            more = [b"%s%d" % (cells[0], k) if row <= at else cells[-1] for k in range(count)]
+            lines[row] = sign.join([*cells, *more])
+    return b"\n".join(lines)
+
+
+def disturb(folder: Path, rng: random.Random) -> None:
+    """Change which files there are in a folder, as a power cut, a sync or a stranger does."""
+    for _ in range(rng.choice([1, 1, 2, 4])):
+        files = [path for path in sorted(folder.rglob("*")) if path.is_file() and SOUND not in path.as_posix()]
+        if files:
+            rng.choice(_DISTURBANCES)(rng.choice(files), rng.choice(files), rng)
+
+
+def _stand_in(one: Path, other: Path, rng: random.Random) -> None:
+    one.unlink()
+    if rng.random() < 0.3:
+        one.mkdir()
+    else:
+        one.symlink_to(rng.choice([one.name, other.name, "/dev/zero", "..", "missing"]))
+
+
+def _renamed(one: Path, _other: Path, rng: random.Random) -> None:
+    names = (f"{one.name}.part", f".{one.name}.x.new", f"x\n{FORGED}", "s[1]", "-a", "a b", f"{one.stem}-2{one.suffix}")
+    one.rename(one.with_name(rng.choice(names)))
+
+
+def _stranger(one: Path, other: Path, rng: random.Random) -> None:
+    names = (
+        ".lock",
+        "worked-out.json",
+        "dbbstation-settings.yaml",
+        "fleet.json",
+        "json.py",
+        "events.log",
+        "session.yaml",
+    )
+    place = rng.choice([one, other]).parent / rng.choice((*names, f".{one.name}.{rng.randrange(99)}.new"))
+    if not place.is_dir():
+        content = (b"", b"{}", b"[" * 900, b"format: dbb-settings/4\n", rng.randbytes(40), one.read_bytes()[:200])
+        place.write_bytes(rng.choice(content))
+
+
+_DISTURBANCES: tuple[Callable[..., object], ...] = (
+    lambda one, *_: one.unlink(),
+    lambda one, other, _rng: one.write_bytes(other.read_bytes()),
+    lambda one, _other, rng: one.write_bytes(one.read_bytes()[: rng.randrange(one.stat().st_size + 1)]),
+    _stand_in,
+    _renamed,
+    _stranger,
+    _stranger,
+)
+
+
 def _splice(data: bytes, rng: random.Random, others: Sequence[bytes]) -> bytes:
     other = rng.choice(others)
     return data[: rng.randint(0, len(data))] + other[rng.randint(0, len(other)) :]
 
 
 _WAYS: tuple[Callable[..., bytes], ...] = (
-    _swap(_NUMBER, NUMBERS), _digits, _swap(_VALUE, VALUES), _swap(_WORD, VALUES), _bytes, _cut, _lines, _column, _splice,
+    _swap(_NUMBER, NUMBERS), _digits, _swap(_VALUE, VALUES), _swap(_WORD, VALUES), _bytes, _cut, _lines, _column, _splice, _deep, _wide,
 )  # fmt: skip
-_SHARES = (5, 4, 5, 2, 5, 1, 4, 2, 0.5)
+_SHARES = (5, 4, 5, 2, 5, 1, 4, 2, 0.5, 0.5, 0.3)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dbbstation.files.shipped import shipped_folder
+from tests.fuzz.mutate import SOUND
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 FIXTURES, PROTOCOLS = shipped_folder("fixtures"), shipped_folder("protocols")
-SOUND = "sound/"
-"""Folder of files that commands need beside the spoilt ones and that stay as they are."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,36 @@ LOG = b"""# dbb-byte-log/1
 
 POSES = b"x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n1.5,0,-1008,0,1,0\n-1,2,-1000,0,0,-1\n"
 
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="tank" guid="{t}"><CoSimulation modelIdentifier="t"/><ModelVariables>
+<ScalarVariable name="rate" valueReference="0" causality="parameter"><Real start="0.4"/></ScalarVariable>
+</ModelVariables><ModelStructure/></fmiModelDescription>
+"""
+
+OF_FMU = b"""format: dbb-simulator/1
+name: tank
+fmu: ../t.fmu
+time: t_s
+inputs: {pump: pump}
+outputs: {level: {column: level_m, unit: m}}
+ports: {flow: {about: what else flows in, unit: m/s, signals: {level: m}}}
+"""
+
 RUN = b"# test: a\n# direction: ccw\n# repeat: 1\nt_s,length_mm,bar_temp_c,note,status\n" + b"".join(
     f"{i / 10:.1f},{150 + i % 7 / 1000:.4f},20.{i % 3},x{i},ok\n".encode() for i in range(60)
 )
+
+
+def _archives() -> list[Seed]:
+    """An FMU without a library; archives and its description are spoilt."""
+    found = io.BytesIO()
+    with zipfile.ZipFile(found, "w") as archive:
+        archive.writestr("modelDescription.xml", DESCRIPTION)
+        archive.writestr("resources/x", bytes(900))
+    rows = b"".join(b"%.2f,0.5,%.4f\n" % (k / 4, 1 + k % 7 / 100) for k in range(40))
+    files = {"t.fmu": found.getvalue(), f"{SOUND}m.yaml": OF_FMU, f"{SOUND}r.csv": b"t_s,pump,level_m\n" + rows}
+    line = f"mismatch {SOUND}r.csv --simulator {SOUND}m.yaml --allow --no-held-out"
+    return [Seed("FMU", files, {line: 1, f"check {SOUND}m.yaml": 1}, 0.05)]
 
 
 def _seeds() -> list[Seed]:
@@ -162,9 +190,14 @@ def _seeds() -> list[Seed]:
                 "replay log.txt --json": 3,
                 "replay log.txt --instrument heidenhain-nd281b": 1,
                 "replay log.txt --instrument mahr-c1202 --zero-mm 150": 1,
+                **{
+                    f"replay log.txt --json --instrument {path.stem}": 0.3
+                    for path in sorted((PROTOCOLS / "instruments").glob("*.yaml"))
+                },
             },
             4,
         ),
+        *_archives(),
         Seed(
             "table",
             {"t.csv": b"".join((FIXTURES / "tables" / "axis.csv").read_bytes().splitlines(keepends=True)[:90])},

@@ -24,7 +24,7 @@ import traceback
 import warnings
 from pathlib import Path
 
-from tests.fuzz.mutate import spoil
+from tests.fuzz.mutate import FORGED, disturb, spoil
 from tests.fuzz.seeds import SEEDS, Seed
 
 TRACED = ("files", "cli", "nc", "instrument", "tasks", "trace", "plan", "machine")
@@ -32,6 +32,9 @@ TRACED = ("files", "cli", "nc", "instrument", "tasks", "trace", "plan", "machine
 
 LONGEST_S = 60.0
 """A case that takes longer is stopped."""
+
+MANY, DISTURBED = 4, 0.3
+"""Seeds with more files are folders: the share of their cases in which files are missing, moved or added, too."""
 
 _PACKAGE = f"{os.sep}dbbstation{os.sep}"
 _Lines = set[tuple[str, int]]
@@ -124,7 +127,8 @@ def run(line: str, folder: Path) -> tuple[int | None, str]:
             main(["--debug", *line.split()])
     except SystemExit as left:
         code = left.code if isinstance(left.code, int) else 1
-        return code, ""
+        said = (out.getvalue() + "\n" + err.getvalue()).splitlines()
+        return code, "Forged: a name makes a line" if any(line.lstrip().startswith(FORGED) for line in said) else ""
     except Exception as error:  # noqa: BLE001 (that is what is looked for)
         from dbbstation.errors import StationError  # noqa: PLC0415
 
@@ -152,6 +156,9 @@ def case(number: int, seed_number: int, folder: Path, reached: Reached) -> dict[
     data = spoil(data, rng, list(seed.files.values()))
     here = folder / "case"
     place({**seed.files, target: data}, here)
+    disturbed = len(seed.files) > MANY and rng.random() < DISTURBED
+    if disturbed:
+        disturb(here, rng)
     _forget_peak()
     began_s = time.monotonic()
     used_s = time.process_time()
@@ -164,7 +171,7 @@ def case(number: int, seed_number: int, folder: Path, reached: Reached) -> dict[
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
     told: dict[str, object] = {
-        "case": number, "kind": seed.kind, "line": line, "file": target, "guided": guided, "code": code, "fault": fault,
+        "case": number, "kind": seed.kind, "line": line, "file": target, "guided": guided, "disturbed": disturbed, "code": code, "fault": fault,
         "cpu_s": round(time.process_time() - used_s, 3), "wall_s": round(time.monotonic() - began_s, 2), "peak_mb": round(_peak_mb()),
     }  # fmt: skip
     if guided:

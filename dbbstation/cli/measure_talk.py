@@ -29,7 +29,6 @@ _OF_MACHINE, _OF_SET_UP = "centre", "set-up"
 
 _ON_ENTER: dict[State, Command] = {
     State.ANNOUNCED: Start(),
-    State.COMPLETE: Accept(),
     State.FLAWED: Repeat(),
     State.PAUSED: Resume(),
 }
@@ -49,6 +48,7 @@ _ASKED = {
     State.PAUSED: "Enter: go on   q: quit",
 }
 
+_ASKED_TO_GO_BACK = "Enter: go back to the circle that is wrong   a WHY: accept this one, leave it   q: quit"
 _ASKED_OF_WRONG = "Enter: repeat   a WHY: accept all the same   x: reject   q: quit"
 
 
@@ -62,7 +62,7 @@ class Talk:
     def __init__(self, *, asking: bool) -> None:
         self._asking = asking
         self._bar = ProgressBar("  recording", COUNTED, unit="°", passing=True)
-        self._wrong = False
+        self._wrong = self._back = False
         self._centre = _OF_MACHINE
 
     def __call__(self, event: events.Event) -> None:
@@ -78,10 +78,12 @@ class Talk:
         for line in lines:
             echo(line, err=True)
         if isinstance(event, events.RunCompleted):
-            self._wrong = bool(event.wrong)
+            self._wrong, self._back = bool(event.wrong), False
+        self._back = self._back or isinstance(event, events.RunDoubted)
         if self._asking and isinstance(event, events.StateChanged) and event.state in _ASKED:
-            doubtful = self._wrong and event.state is State.COMPLETE
-            echo(f"  {_ASKED_OF_WRONG if doubtful else _ASKED[event.state]}", err=True)
+            of_wrong = _ASKED_TO_GO_BACK if self._back else _ASKED_OF_WRONG
+            doubtful = (self._wrong or self._back) and event.state is State.COMPLETE
+            echo(f"  {of_wrong if doubtful else _ASKED[event.state]}", err=True)
 
     def end(self) -> None:
         """Remove the bar after any end."""
@@ -159,7 +161,7 @@ class Keyboard:
         self._send = send
         self._lines = lines or sys.stdin
         self._state = State.BETWEEN
-        self._wrong = False
+        self._wrong = self._back = False
         # A thread that waits for a line cannot be woken; as a daemon it ends with the program.
         self._thread = threading.Thread(target=self._listen, name="keyboard", daemon=True)
 
@@ -172,10 +174,14 @@ class Keyboard:
         if isinstance(event, events.StateChanged):
             self._state = event.state
         elif isinstance(event, events.RunCompleted):
-            self._wrong = bool(event.wrong)
+            self._wrong, self._back = bool(event.wrong), False
+        elif isinstance(event, events.RunDoubted):
+            self._back = True
 
     def _on_enter(self) -> Command | None:
-        return Repeat() if self._doubtful else _ON_ENTER.get(self._state)
+        if self._state is State.COMPLETE:
+            return Repeat(back=self._back) if self._wrong else Accept(back=self._back)
+        return _ON_ENTER.get(self._state)
 
     @property
     def _doubtful(self) -> bool:
@@ -221,6 +227,8 @@ def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: PLR0911 - a 
             head = f"{event.number} of {event.count}: test {event.run.test} {event.run.direction}"
             head += f" (repeat {event.run.repeat})" if event.run.repeat > 1 else ""
             return [head, *(f"  - {step}" for step in event.instructions)]
+        case events.RunDoubted():
+            return [f"  {event.run.label}: doubted: {event.finding.text}"]
         case events.Noted():
             degc = "" if event.ambient_temp_c is None else f"{event.ambient_temp_c:g} °C"
             return [f"  noted: {event.text or degc}"]

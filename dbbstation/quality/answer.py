@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
+from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,22 +28,27 @@ class RunAssessment:
 
     Attributes:
         causes: of REPEAT, the most explanatory first: finding and remedy, a sentence each.
-        unseen: of CANNOT TELL, possible faults that no measurement shows yet.
+        unseen: of CANNOT TELL, possible faults that no measurement of the plan shows.
+        settled_by: of CANNOT TELL, what would show them, a sentence each.
+        later: possible faults that later circles show; they lead back to this one.
     """
 
     word: Advice
     causes: tuple[str, ...] = ()
     unseen: tuple[str, ...] = ()
+    settled_by: tuple[str, ...] = ()
+    later: tuple[str, ...] = ()
 
 
-def answer(findings: Sequence[Finding], problem: str = "") -> RunAssessment:
+def answer(findings: Sequence[Finding], problem: str = "", to_come: int = 0) -> RunAssessment:
     """Return the word on a run.
 
-    REPEAT for any fault. CANNOT TELL without fault, if some fault of `SHOWN_BY` would not have shown, or without
-    findings. Else GOOD.
+    REPEAT for any fault. CANNOT TELL without fault, if some fault of `SHOWN_BY` would not have shown and no later circle
+    shows it, or without findings. Else GOOD.
 
     Args:
         problem: why there is no circle; may be empty.
+        to_come: circles of the plan that are still to be measured.
     """
     wrong = [one for one in findings if one.wrong]
     if problem and not any(one.name is Name.CIRCLE for one in wrong):
@@ -49,14 +56,19 @@ def answer(findings: Sequence[Finding], problem: str = "") -> RunAssessment:
     if wrong:
         return RunAssessment(Advice.REPEAT, tuple(cause_of(one) for one in sorted(wrong, key=rank)))
     decided = {one.name for one in findings if one.verdict is not FindingVerdict.CANNOT_TELL}
-    unseen = tuple(fault for fault, names in SHOWN_BY.items() if not decided & names)
-    unseen += tuple(DOUBTED[one.name] for one in findings if one.name in DOUBTED and _doubted(one))
-    return RunAssessment(Advice.CANNOT_TELL, unseen=unseen) if unseen else RunAssessment(Advice.GOOD)
+    hidden = [fault for fault, names in SHOWN_BY.items() if not decided & names]
+    hidden += [DOUBTED[one.name] for one in findings if one.name in DOUBTED and _doubted(one)]
+    later = tuple(fault for fault in hidden if findings and to_come and fault in SHOWN_LATER)
+    unseen = tuple(fault for fault in hidden if fault not in later)
+    settled_by = tuple(
+        dict.fromkeys(SHOWN_LATER.get(fault, BY_PLAN) for fault in unseen if fault not in DOUBTED.values())
+    )
+    return RunAssessment(Advice.CANNOT_TELL if unseen else Advice.GOOD, (), unseen, settled_by, later)
 
 
 def _doubted(finding: Finding) -> bool:
-    """Return whether a fault is likely but not the only explanation."""
-    return bool(finding.value) and finding.verdict is FindingVerdict.CANNOT_TELL
+    """Return whether a fault that one sound sitting in a thousand has is likelier than not, and not decided."""
+    return (finding.value or 0.0) > -math.log(FALSE_ALARMS_PER_RUN) and finding.verdict is FindingVerdict.CANNOT_TELL
 
 
 def cause_of(finding: Finding) -> str:
@@ -85,6 +97,7 @@ EXPLAINS = (
     (Name.OTHER_DIRECTION, Name.REPEAT),
     (Name.BORE,),
     (Name.FORM,),
+    (Name.SINCE,),
 )
 """Findings in the order in which one brings others about: a feed that is not the programmed one also moves the end of the turn and
 differs from the other direction, and neither of these changes the feed. A drift moves centre and mean. A ball that moved between both directions stands in the wrong
@@ -102,17 +115,29 @@ SHOWN_BY = {
     "whether something moved during the circle": frozenset({Name.CLOSURE, Name.DRIFT}),
     "whether it is the circle of another test": frozenset({Name.TEST}),
     "whether it ran the wrong way round": frozenset({Name.DIRECTION}),
-    "whether the ball stands where it stood": frozenset({Name.OTHER_DIRECTION, Name.REPEAT}),
+    "whether the ball stands where it stood": frozenset({Name.OTHER_DIRECTION, Name.REPEAT, Name.SINCE}),
 }
 """Faults that leave a circle as smooth as a good one, and the findings of which each one shows the fault. Other faults show in every run.
 The finding `bore` is none of them: in the first test of a machine without a model its limit is the machine's own errors, millimetres,
 and would show neither."""
 
+_PROGRAMS = "whether all programs ran as the plan has them"
+
 DOUBTED = {
-    Name.PROGRAMS: "whether all programs ran as the plan has them",
+    Name.PROGRAMS: _PROGRAMS,
     Name.BAR: "whether the bar is as long as stated (put it on its calibrator) or the machine makes all circles so",
 }
 """Faults of all runs that other faults explain too: they are asked about only where the readings favour them."""
+
+BY_PLAN = "more readings a turn and an overlap in the plan show it"
+
+SHOWN_LATER = {
+    "whether it is the circle of another test": "two other tests show it, or a model of the machine, or a session before",
+    "whether it ran the wrong way round": "the other direction and another test show it",
+    "whether the ball stands where it stood": "the other direction or a repeat on the same mounting shows it",
+    _PROGRAMS: "further tests in both directions show it, or a model of the machine",
+}
+"""Faults that later circles of the plan show, judged back on this one, and what shows them where the plan has no circle left."""
 
 DO = {
     Name.HELD: "the plunger sticks or the stroke ends; free it, check the plug, run the circle again",
@@ -137,5 +162,6 @@ DO = {
     "begin a new session: every circle of this one is wrong in the same way",
     Name.BAR: "put the bar on its calibrator, check its certificate and that no extension was changed; then every circle is to be measured again",
     Name.REPEAT: "ball or holder moved since the run before: press them home, run it again",
+    Name.SINCE: "look what was changed at the machine since",
 }
 """What to do at the machine, in the shop's words."""

@@ -35,6 +35,7 @@ class Name(StrEnum):
     LOCAL = "local difference"
     PROGRAMS = "all programs"
     BAR = "bar of all runs"
+    SINCE = "session before"
 
 
 class FindingVerdict(StrEnum):

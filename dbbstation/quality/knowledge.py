@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.plan.circle import Circle
+    from dbbstation.trace.circle import RawCircle
     from dbbstation.trace.recording import Recording
 
 HIGHEST_HARMONIC = 3
@@ -217,14 +218,18 @@ def seen(run: Run) -> Seen:
     except TraceError as error:
         return Seen(run, None, f"{error.what}; {error.remedy}", lost, _feed_of(run), _longer_s(run), unusable=unusable)
     raw = analysis.raw
-    theta = np.radians(raw.theta_deg - raw.circle.start_deg)
-    long_um = 1e3 * (raw.length_mm - raw.circle.bar_mm)
-    found = amplitudes(long_um, theta, HIGHEST_HARMONIC)
-    orthonormal = _orthonormal(found)
     local = np.zeros(LOCAL_COEFFICIENTS)
     if len(raw) > SAMPLES_PER_HARMONIC * LOCAL_HARMONIC:
+        long_um = 1e3 * (raw.length_mm - raw.circle.bar_mm)
         local = _orthonormal(amplitudes(long_um, np.radians(raw.theta_deg), LOCAL_HARMONIC))
-    return Seen(run, analysis, "", lost, analysis.feed_mm_min, _longer_s(run), orthonormal, unusable, local, _ways(run))
+    form = coefficients_um(raw)
+    return Seen(run, analysis, "", lost, analysis.feed_mm_min, _longer_s(run), form, unusable, local, _ways(run))
+
+
+def coefficients_um(raw: RawCircle) -> NDArray[np.float64]:
+    """Return a circle's form as of `Seen.coefficients_um`."""
+    theta = np.radians(raw.theta_deg - raw.circle.start_deg)
+    return _orthonormal(amplitudes(1e3 * (raw.length_mm - raw.circle.bar_mm), theta, HIGHEST_HARMONIC))
 
 
 def _orthonormal(found: NDArray[np.complex128]) -> NDArray[np.float64]:

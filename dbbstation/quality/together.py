@@ -130,7 +130,12 @@ def _placed(
 
 def read_um(one: Seen) -> NDArray[np.float64]:
     """Return coefficients of the readings along the travel; their mean shows other lengths."""
-    return along_travel(one.run.circle) * one.coefficients_um + _length_um(one.run.circle)
+    return read_along_um(one.run.circle, one.coefficients_um)
+
+
+def read_along_um(circle: Circle, form_um: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the same of a form on a circle, shape (7,) [µm]."""
+    return along_travel(circle) * form_um + _length_um(circle)
 
 
 def expected_um(one: Run | Planned) -> NDArray[np.float64]:

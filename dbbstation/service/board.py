@@ -96,6 +96,7 @@ class Board:
         runs: recorded runs of all sittings, by name.
         reasons: of rejections, by name.
         completed: run awaiting its verdict, or the last one.
+        doubted: accepted runs that contradict the others, by name.
         temperature_due: whether a run began since the last temperature.
         messages: newest last.
     """
@@ -121,6 +122,7 @@ class Board:
     verdicts: dict[str, RunDecision] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
     completed: events.RunCompleted | None = None
+    doubted: dict[str, events.RunDoubted] = field(default_factory=dict)
     fault: events.Fault | None = None
     finished: events.SessionFinished | None = None
     temperature_due: bool = False
@@ -175,6 +177,10 @@ class Board:
         """Return planned runs without accepted recording."""
         return tuple(task for task, mark in zip(self.tasks, self.marks, strict=True) if mark is not Mark.ACCEPTED)
 
+    def in_doubt(self, test: str, direction: Direction) -> bool:
+        """Return whether an accepted run of a test and direction contradicts the others."""
+        return any((one.run.test, one.run.direction) == (test, direction) for one in self.doubted.values())
+
     def runs_of(self, test: str, direction: Direction) -> tuple[events.RunCompleted, ...]:
         """Return a test's runs in a direction, in recording order."""
         mine = [one for one in self.runs.values() if (one.run.test, one.run.direction) == (test, direction)]
@@ -209,7 +215,13 @@ class Board:
             case events.Noted() if event.ambient_temp_c is not None:
                 self.temperature_due = False
             case events.RunCompleted():
+                self.doubted = {}
                 self._complete(event)
+            case events.RunDoubted():
+                self.doubted[event.run.label] = event
+                known = self.runs.get(event.run.label)
+                if known is not None:
+                    self.runs[event.run.label] = replace(known, findings=(event.finding, *known.findings))
             case events.RunRestored():
                 self._begin(event.run)
                 self._trace(event.run, event.samples)
@@ -294,6 +306,8 @@ class Board:
     def _judge(self, run: events.RunId, verdict: RunDecision, reason: str = "") -> None:
         """Note a verdict on the announced or an earlier run."""
         self.verdicts[run.label], self.reasons[run.label] = verdict, reason
+        if verdict is RunDecision.REJECTED:
+            self.doubted.pop(run.label, None)
         announced = self.announced.run if self.announced else None
         if announced is not None and announced.label == run.label:
             if verdict is RunDecision.ACCEPTED:

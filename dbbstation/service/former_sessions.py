@@ -6,14 +6,12 @@ import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError
 from dbbstation.files.atomic import write_bytes
 from dbbstation.files.gateway import content_of, digest_of
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
-from dbbstation.machine.difference import differences
 from dbbstation.service.candidates import CandidateFormat, candidates
-from dbbstation.service.session_list import dated_folders
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -79,37 +77,6 @@ def before_and_now(folder: Path) -> BeforeAndNow:
     return BeforeAndNow(in_force(now, by_sha256), tuple(formers))
 
 
-def former_sessions(
-    now: SessionFolder, under: Path, tests: set[str] | None = None
-) -> list[tuple[datetime, SessionFolder]]:
-    """Return earlier sessions of the same machine, plan and jig, the last first.
-
-    Both are real or both virtual, with the same nominal machine and serial number. Every accepted test of this session,
-    else of its plan, was run there at the same place.
-
-    Args:
-        under: searched with subfolders.
-        tests: required there; None: as above.
-    """
-    accepted = now.in_state(RunState.ACCEPTED)
-    began = min((run.started for run in accepted if run.started is not None), default=None)
-    tests = tests or {run.test for run in accepted} or set(now.plan.tests)
-    found = []
-    for _, folder in dated_folders(under):
-        if folder == now.folder.absolute():
-            continue
-        try:
-            then = read_session(folder)
-        except InputError:
-            continue  # the list of sessions says what is wrong with it
-        runs = then.in_state(RunState.ACCEPTED)
-        ended = max((run.started for run in runs if run.started is not None), default=None)
-        measured = {run.test for run in runs}
-        if ended is not None and (began is None or ended < began) and tests <= measured and _alike(now, then, tests):
-            found.append((ended, then))
-    return sorted(found, key=lambda one: one[0], reverse=True)
-
-
 def in_force(session: SessionFolder, models: dict[str, Path]) -> InForce:
     """Return what commanded a session's accepted circles.
 
@@ -145,20 +112,6 @@ def keep_models(former: Former, folder: Path) -> tuple[Path, ...]:
             write_bytes(copy, data)
         copies.append(copy)
     return tuple(copies)
-
-
-def _alike(now: SessionFolder, then: SessionFolder, tests: set[str]) -> bool:
-    if bool(now.virtual) is not bool(then.virtual):
-        return False
-    serials = {one.serial_number for one in (now, then) if one.serial_number}
-    same = all(
-        name in now.plan.tests
-        and name in then.plan.tests
-        and (now.plan.tests[name].ball, now.plan.tests[name].circle)
-        == (then.plan.tests[name].ball, then.plan.tests[name].circle)
-        for name in tests
-    )
-    return len(serials) < 2 and same and not differences(now.machine, then.machine)  # noqa: PLR2004 - two different ones
 
 
 def _sha256(path: Path) -> str:

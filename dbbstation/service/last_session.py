@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
-from dbbstation.service.former_sessions import former_sessions
 from dbbstation.service.live_trace import LiveTrace
 from dbbstation.station.events import RunId
 from dbbstation.trace.cut import cut

@@ -37,6 +37,8 @@ def message_of(event: object) -> Message | None:  # noqa: C901, PLR0911 - a line
             )
         case events.RunCompleted(problem=problem) if problem:
             return Message(Weight.WARNING, f"{event.run.label}: {problem_alone(event)}")
+        case events.RunDoubted():
+            return Message(Weight.WARNING, f"{event.run.label} is doubted: {event.finding.text}")
         case events.RunRestored():
             return Message(Weight.NOTE, f"{event.run.label} was recorded before and waits for its verdict")
         case events.RunLate() | events.FeedInMissed():

@@ -8,21 +8,16 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.files.recordings.entries import RunState
-from dbbstation.files.recordings.session import SESSION_FILE, read_session
+from dbbstation.files.recordings.former import dated_folders
+from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.duration import circles_s
 from dbbstation.station.schedule import Schedule
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
     from pathlib import Path
 
     from dbbstation.files.recordings.session import SessionFolder
-
-DEPTH = 2
-"""Folders below the one that is searched: sessions of a machine, of a month."""
-
-MOST = 30
-"""Sessions that are read: each takes some hundredths of a second, and nobody looks further back here."""
 
 
 @dataclass(frozen=True)
@@ -62,32 +57,6 @@ def list_sessions(under: Path, remembered: Iterable[Path] = ()) -> tuple[Session
         remembered: further folders; missing ones are ignored.
     """
     return tuple(_line(folder, datetime.fromtimestamp(at, UTC)) for at, folder in dated_folders(under, remembered))
-
-
-def dated_folders(under: Path, remembered: Iterable[Path] = ()) -> list[tuple[float, Path]]:
-    """Return session folders with their files' times [s since 1970]; arguments as of `list_sessions`."""
-    folders = {folder.absolute() for folder in (*_found(under, DEPTH), *remembered)}
-    dated = []
-    for folder in folders:
-        try:
-            dated.append(((folder / SESSION_FILE).stat().st_mtime, folder))
-        except OSError:
-            continue
-    dated.sort(key=lambda one: (-one[0], one[1]))
-    return dated[:MOST]
-
-
-def _found(folder: Path, depth: int) -> Iterator[Path]:
-    try:
-        inside = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
-        is_session = (folder / SESSION_FILE).is_file()
-    except OSError:
-        return
-    if is_session:
-        yield folder
-    elif depth:
-        for path in inside:
-            yield from _found(path, depth - 1)
 
 
 def _line(folder: Path, changed: datetime) -> SessionLine:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.recordings.bar_reach import unlike_bar
+from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.station.detector import Patience
@@ -128,7 +129,8 @@ def assemble(
     # Real runs bear the computer's time, so that they fit what thermometers log.
     now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
     storage = Storage(writer, now, kept, unreadable, asked=asked, instrument=job.instrument)
-    judge = RunJudge(writer, kept, job.model)
+    former = next((one for _, one in former_sessions(writer.session, job.folder.absolute().parent)), None)
+    judge = RunJudge(writer, kept, job.model, former)
     sequencer = Sequencer(
         plan,
         schedule,
@@ -136,6 +138,7 @@ def assemble(
         programs=names,
         patience=job.patience,
         judge=judge.judge,
+        doubted=judge.doubted,
         waiting=unjudged(writer.session, judge.judge),
         rate_hz=job.rate_hz,
     )

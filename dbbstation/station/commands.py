@@ -29,9 +29,13 @@ class Accept:
 
     Attributes:
         reason: why, despite a finding; empty: the findings are kept.
+        back: the doubted runs no longer count, and are measured next.
+        alone: an earlier run of the same test and direction no longer counts.
     """
 
     reason: str = ""
+    back: bool = False
+    alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -40,9 +44,11 @@ class Repeat:
 
     Attributes:
         reason: empty: the finding, else the operator's wish.
+        back: as of `Accept`.
     """
 
     reason: str = ""
+    back: bool = False
 
 
 @dataclass(frozen=True)

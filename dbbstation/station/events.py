@@ -162,6 +162,8 @@ class RunCompleted:
         problem: why it is unusable; empty if usable.
         findings: of its circle; empty without one.
         doubtful: possibly damaged samples, kept but unused.
+        to_come: circles of the plan that are still to be measured.
+        counts_beside: accepted run of the same test and direction that the plan does not ask for beside this one; or None.
     """
 
     run: RunId
@@ -171,16 +173,26 @@ class RunCompleted:
     problem: str
     findings: tuple[Finding, ...] = ()
     doubtful: int = 0
+    to_come: int = 0
+    counts_beside: RunId | None = None
 
     @property
     def answer(self) -> RunAssessment:
         """Return the run's word and its cause."""
-        return answer(self.findings, "" if self.figures is not None else self.problem or "no circle")
+        return answer(self.findings, "" if self.figures is not None else self.problem or "no circle", self.to_come)
 
     @property
     def wrong(self) -> tuple[Finding, ...]:
         """Return findings beyond their limit."""
         return tuple(finding for finding in self.findings if finding.wrong)
+
+
+@dataclass(frozen=True)
+class RunDoubted:
+    """An accepted run contradicts the others, as the circle just completed shows."""
+
+    run: RunId
+    finding: Finding
 
 
 @dataclass(frozen=True)
@@ -310,6 +322,7 @@ Event: TypeAlias = (
     | FeedInSeen
     | RunProgress
     | RunCompleted
+    | RunDoubted
     | RunRestored
     | FeedInMissed
     | Noted

@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError
+from dbbstation.errors import InputError, TraceError
 from dbbstation.files.recordings.entries import RunEntry, RunState
-from dbbstation.files.recordings.judged import planned_circles, run_of
+from dbbstation.files.recordings.judged import circles_of_plan, planned_circles, run_of
 from dbbstation.instrument.reading import DOUBTFUL
+from dbbstation.quality.assigned import Assigned, Reference
+from dbbstation.quality.finding import Finding, FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
-from dbbstation.quality.knowledge import seen
+from dbbstation.quality.knowledge import coefficients_um, seen
+from dbbstation.quality.together import read_along_um
 from dbbstation.station import events
 from dbbstation.trace.analysis import figures
+from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from dbbstation.files.recordings.entries import CommandedProgram
+    from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Direction
-    from dbbstation.quality.finding import Finding
-    from dbbstation.quality.knowledge import Seen
-    from dbbstation.station.events import Event, RunId
+    from dbbstation.quality.knowledge import Planned, Seen
+    from dbbstation.station.events import Event
     from dbbstation.trace.recording import Recording
 
 
@@ -48,6 +54,7 @@ class RunJudge:
         writer: its judged runs are read now.
         programs: by test and direction.
         model: gives expected circles; None: the nominal machine.
+        former: the last session of machine and plan; None: none.
     """
 
     def __init__(
@@ -55,6 +62,7 @@ class RunJudge:
         writer: SessionWriter,
         programs: Mapping[tuple[str, Direction], CommandedProgram] | None = None,
         model: IdentifiedModel | None = None,
+        former: SessionFolder | None = None,
     ) -> None:
         self._writer = writer
         self._programs = programs or {}
@@ -64,6 +72,8 @@ class RunJudge:
         self._waiting: dict[tuple[str, Direction, int], Seen] = {}
         self._rejected: dict[tuple[str, Direction, int], Seen] = {}
         self._together = SessionRuns([])
+        self._former = former
+        self._doubted: dict[events.RunId, Finding] = {}
         kept = {RunState.ACCEPTED: self._counting, RunState.REJECTED: self._rejected}
         for entry in writer.runs:
             if entry.state in kept:
@@ -101,7 +111,7 @@ class RunJudge:
             found.append(JudgedRun(completed, entry.state is RunState.ACCEPTED, entry.reason))
         return tuple(found)
 
-    def judge(self, run: RunId, recording: Recording) -> tuple[Finding, ...]:
+    def judge(self, run: events.RunId, recording: Recording) -> tuple[Finding, ...]:
         """Return a new run's findings.
 
         Args:
@@ -122,9 +132,45 @@ class RunJudge:
         )
         one = run_of(self._writer.session, entry, recording, self._model, self._planned)
         self._waiting[_key(run)] = new = seen(one)
-        others = [known for key, known in self._counting.items() if key != _key(run)]
+        counting = {key: known for key, known in self._counting.items() if key != _key(run)}
+        assigned = self._assigned([*counting.values(), new]) if new.analysis is not None else None
+        suspects = {} if assigned is None else assigned.suspects()
+        self._doubted = {events.RunId(*key, 0): suspects[known] for key, known in counting.items() if known in suspects}
+        others = [known for known in counting.values() if known not in suspects]
         self._together = SessionRuns([*others, new], self._together)
-        return self._together.judge(new).findings
+        findings = self._together.judge(new).findings
+        return findings if assigned is None else _decided(findings, new, assigned, suspects.get(new))
+
+    def doubted(self) -> Mapping[events.RunId, Finding]:
+        """Return accepted runs that contradict the others since the last run was judged."""
+        return self._doubted
+
+    def _assigned(self, runs: list[Seen]) -> Assigned | None:
+        """Return all runs of the sitting together; None if the plan's circles are not known."""
+        known = {(one.test, one.circle.direction) for one in self._circles}
+        if any((one.run.test, one.run.circle.direction) not in known for one in runs):
+            return None
+        return Assigned(self._circles, runs, self._reference)
+
+    @cached_property
+    def _circles(self) -> tuple[Planned, ...]:
+        return circles_of_plan(self._writer.session, self._model)
+
+    @cached_property
+    def _reference(self) -> Reference | None:
+        """Return the session before, if it has every circle of the plan."""
+        former, read = self._former, {}
+        if former is None:
+            return None
+        runs = [run for run in former.in_state(RunState.ACCEPTED) if run.program is None]
+        for entry in runs:
+            with suppress(InputError, TraceError):
+                form_um = coefficients_um(cut(former.load(entry).recording, circle := former.circle(entry)))
+                read[entry.test, str(entry.direction)] = read_along_um(circle, form_um)
+        dates = [run.started.date() for run in runs if run.started is not None]
+        if not dates or any((one.test, str(one.circle.direction)) not in read for one in self._circles):
+            return None
+        return Reference(former.folder.name, max(dates), read)
 
     def _read(self, entry: RunEntry, into: dict[tuple[str, Direction, int], Seen]) -> None:
         """Take in a recorded run; unreadable ones are reported elsewhere."""
@@ -136,5 +182,25 @@ class RunJudge:
         into[_key(entry)] = seen(one)
 
 
-def _key(run: RunId | RunEntry) -> tuple[str, Direction, int]:
+def _decided(
+    findings: tuple[Finding, ...], one: Seen, assigned: Assigned, suspect: Finding | None
+) -> tuple[Finding, ...]:
+    """Return findings with what all runs together decide."""
+    decided = []
+    for finding in findings:
+        if suspect is not None and finding.name is suspect.name:
+            decided.append(suspect)
+        elif suspect is None and finding.name in CIRCLE_SHOWN and finding.verdict is FindingVerdict.CANNOT_TELL:
+            decided.append(assigned.finding(one, finding))
+        else:
+            decided.append(finding)
+    since = assigned.since(one)
+    return (*decided, since) if since is not None else tuple(decided)
+
+
+CIRCLE_SHOWN = frozenset({Name.TEST, Name.DIRECTION})
+"""Findings on which circle a run shows."""
+
+
+def _key(run: events.RunId | RunEntry) -> tuple[str, Direction, int]:
     return run.test, run.direction, run.repeat

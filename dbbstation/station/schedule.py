@@ -86,6 +86,22 @@ class Schedule:
         runs = [(test, direction) for (test, direction, _), accepted in self._accepted.items() if accepted]
         return tuple(task for task in self.tasks if task.occurrence > runs.count((task.test, task.direction)))
 
+    def to_come(self, run: RunId) -> int:
+        """Return how many tasks without an accepted run are left beside a run's own."""
+        mine = self.tasks[self._place_of(run.test, run.direction)]
+        return sum(task != mine for task in self.open)
+
+    def counts_beside(self, run: RunId) -> RunId | None:
+        """Return an accepted run of the same task that would count beside this one, or None."""
+        if any((task.test, task.direction) == (run.test, run.direction) for task in self.open):
+            return None
+        mine = [
+            (t, d, r)
+            for (t, d, r), accepted in self._accepted.items()
+            if accepted and (t, d) == (run.test, run.direction)
+        ]
+        return RunId(*mine[-1], 0) if mine and mine[-1][2] != run.repeat else None
+
     def number_of(self, run: RunId) -> int:
         """Return a run's task number, from 1."""
         return self._place_of(run.test, run.direction) + 1

@@ -88,6 +88,7 @@ class Sequencer:
         patience: how long to wait for the machine.
         waiting: recorded runs without verdict, oldest first; judged before measuring.
         judge: judges a run with a circle; None: no judging.
+        doubted: accepted runs that the run just judged puts in doubt.
         rate_hz: readings per second; None: not known.
     """
 
@@ -101,13 +102,15 @@ class Sequencer:
         patience: Patience | None = None,
         waiting: Sequence[Waiting] = (),
         judge: Callable[[RunId, Recording], tuple[Finding, ...]] | None = None,
+        doubted: Callable[[], Mapping[RunId, Finding]] = dict,
         rate_hz: float | None = None,
     ) -> None:
         self.state = State.BETWEEN
         self.plan = plan
         self.schedule = schedule
         self._recorded = recorded
-        self._judge_run = judge
+        self._judge_run, self._look_back = judge, doubted
+        self._doubted: Mapping[RunId, Finding] = {}
         self._programs = programs or {}
         self._patience = patience or Patience()
         self._rate_hz = rate_hz
@@ -239,9 +242,14 @@ class Sequencer:
 
     def _accept(self, command: Accept) -> None:
         run = self._announced()
+        beside = self.schedule.counts_beside(run) if command.alone else None
         self.schedule.accept(run)
         reason = command.reason or (f"accepted although {self._wrong}" if self._wrong else "")
         self._out.append(events.RunAccepted(run, reason))
+        if beside is not None:
+            self.schedule.judge(beside.test, beside.direction, beside.repeat, accepted=False)
+            self._out.append(events.RunRejected(beside, f"{run.label} counts in its place"))
+        self._take_back(command)
         self._to_next(Trigger.ACCEPT)
 
     def _throw_out(self, command: Repeat | Reject) -> None:
@@ -254,7 +262,18 @@ class Sequencer:
             self._out.append(events.RunRejected(run, reason))
         if isinstance(command, Reject):
             self.schedule.pass_over(run)
+        else:
+            self._take_back(command)
         self._to_next(COMMAND_CAUSES[type(command)])
+
+    def _take_back(self, command: Accept | Repeat) -> None:
+        """Take the doubted runs back; the first of them comes next."""
+        doubted = self._doubted if command.back else {}
+        for run, finding in doubted.items():
+            self.schedule.judge(run.test, run.direction, run.repeat, accepted=False)
+            self._out.append(events.RunRejected(run, finding.text))
+        for run in list(doubted)[:1]:
+            self.schedule.go_to(run.test, run.direction)
 
     def _reorder(self, command: GoTo | Judge) -> None:
         """Obey a command about the order or a verdict, or refuse it."""
@@ -410,8 +429,20 @@ class Sequencer:
             found, problem = record.circle_figures(recording, self.plan.largest_loss_percent)
             if found is not None and self._judge_run is not None:
                 findings = self._judge_run(record.run, recording)
-        completed = events.RunCompleted(record.run, len(record), record.lost, found, problem, findings, record.doubtful)
+        completed = events.RunCompleted(
+            record.run,
+            len(record),
+            record.lost,
+            found,
+            problem,
+            findings,
+            record.doubtful,
+            self.schedule.to_come(record.run),
+            self.schedule.counts_beside(record.run),
+        )
         self._out.append(completed)
+        self._doubted = self._look_back() if findings else {}
+        self._out += [events.RunDoubted(run, finding) for run, finding in self._doubted.items()]
         self._wrong = _found_wrong(completed)
         self.schedule.recorded(record.run)
         self._edges = None

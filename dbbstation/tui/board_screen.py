@@ -81,6 +81,8 @@ class RunScreen(BoardScreen):
         ("enter", "tell('start')", "Start"),
         ("enter", "next", "Next"),
         ("m", "tell('touched')", "Mounting"),
+        ("u", "undecided", "Undecided"),
+        ("l", "alone", "In its place"),
         ("a", "accept", "Accept"),
         ("r", "tell('repeat')", "Repeat"),
         ("x", "tell('reject')", "Reject"),
@@ -100,14 +102,46 @@ class RunScreen(BoardScreen):
         if action == "accept":
             return Accept in self.desk.board.allowed
         if action == "next":
-            return self.desk.board.state in VERDICT
+            return self.desk.board.state in VERDICT and not self._undecided
+        if action == "undecided":
+            return self._undecided
+        if action == "alone":
+            completed = self.desk.board.completed
+            beside = None if completed is None else completed.counts_beside
+            return Accept in self.desk.board.allowed and beside is not None and not self._faulty
         return super().check_action(action, parameters)
 
-    def action_next(self) -> None:
-        """Accept the run or repeat it, as its word says."""
+    @property
+    def _faulty(self) -> bool:
         completed = self.desk.board.completed
-        again = completed is None or completed.answer.word is Advice.REPEAT
-        self.desk.send(COMMANDS["repeat" if again else "accept"])
+        return completed is None or completed.answer.word is Advice.REPEAT
+
+    @property
+    def _undecided(self) -> bool:
+        """Return whether the run's word is CANNOT TELL and no earlier run is in doubt."""
+        board = self.desk.board
+        if Accept not in board.allowed or board.completed is None or board.doubted:
+            return False
+        return board.completed.answer.word is Advice.CANNOT_TELL
+
+    def keys(self) -> object:
+        """Return what decides the active keys, with the word on the run."""
+        return super().keys(), self._undecided, bool(self.desk.board.doubted)
+
+    def action_next(self) -> None:
+        """Accept the run or repeat it, as its word says; then back to runs in doubt."""
+        back = bool(self.desk.board.doubted)
+        self.desk.send(Repeat(back=back) if self._faulty else Accept(back=back))
+
+    def action_undecided(self) -> None:
+        """Accept a run of which not every fault would show."""
+        completed = self.desk.board.completed
+        if completed is not None:
+            self.desk.send(Accept(f"not to be seen: {', '.join(completed.answer.unseen)}"))
+
+    def action_alone(self) -> None:
+        """Accept the run in place of the earlier one."""
+        self.desk.send(Accept(alone=True))
 
     def action_accept(self) -> None:
         """Accept the run; a faulty one only for a reason."""

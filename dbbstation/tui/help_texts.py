@@ -25,10 +25,12 @@ class Help:
 
 _RUN_KEYS = {
     "enter": (
-        "The ball stands and the bar is in: the station waits for the machine. Behind a circle: what the word says. GOOD and CANNOT TELL "
-        "are accepted, REPEAT is measured again."
+        "The ball stands and the bar is in: the station waits for the machine. Behind a circle: what the word says. GOOD is accepted, "
+        "REPEAT is measured again. If an earlier circle is wrong, the station goes back to its test."
     ),
     "m": "The same, and the holder was touched although nobody asked for it: a new mounting begins.",
+    "u": "CANNOT TELL: the run counts although a fault that is named would not show.",
+    "l": "The run counts in place of an earlier one of the same test and direction; else both count.",
     "a": "The complete run counts; the next one is announced. Where something is wrong with it the station asks why.",
     "r": "The run does not count and is measured again. While the circle runs, the station asks first.",
     "x": "The run does not count and the next one is announced. While the circle runs, the station asks first.",
@@ -52,8 +54,8 @@ HELP = {
             ),
             (
                 "While a run waits for its verdict, one word says what to do with it. REPEAT: something is wrong, and what explains most "
-                "comes first, with what to do. CANNOT TELL: nothing is wrong, and a fault that is named would not show yet. GOOD: every "
-                "fault that is looked for would show. On the right stand the findings: number, limit, and good, cannot tell or wrong."
+                "comes first, with what to do. CANNOT TELL: nothing is wrong, and a fault that is named would not show, neither now nor "
+                "by a later circle. GOOD: every fault shows now or by a later circle, which leads back here. On the right stand the findings: number, limit, and good, cannot tell or wrong."
             ),
         ),
         {
@@ -115,11 +117,11 @@ HELP = {
         (
             "Before a circle: which ball goes into which bore, tilt and bar. Enter when it stands.",
             (
-                "During and behind the circle: the length, what happens, and what to do. GOOD and CANNOT TELL go on by Enter; REPEAT is "
-                "measured again by Enter, and nothing else can be done with it."
+                "During and behind the circle: the length, what happens, and what to do. GOOD goes on by Enter, CANNOT TELL by U. REPEAT is "
+                "measured again by Enter. If an earlier circle is wrong, Enter goes back to it."
             ),
         ),
-        {key: sentence for key, sentence in _RUN_KEYS.items() if key in {"enter", "m", "r", "p"}},
+        {key: sentence for key, sentence in _RUN_KEYS.items() if key in {"enter", "m", "u", "r", "p"}},
     ),
     "answer": Help(
         "Answer",

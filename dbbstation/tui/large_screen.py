@@ -11,6 +11,7 @@ from textual.widgets import Footer
 
 from dbbstation.quality.answer import Advice
 from dbbstation.station.states import RECORDING, State
+from dbbstation.tui import texts
 from dbbstation.tui.block_letters import HIGH, block_rows, largest
 from dbbstation.tui.board_screen import RunScreen
 from dbbstation.tui.now_line import NowLine
@@ -57,6 +58,10 @@ class LargeFigures(Panel):
         if board.state is State.COMPLETE and board.completed is not None:
             word = board.completed.answer.word
             state, state_style = str(word), LARGE_STYLES[word]
+            if board.doubted:
+                state, state_style, action = texts.LARGE_BACK, LARGE_STYLES[Advice.REPEAT], "Enter"
+            elif word is Advice.CANNOT_TELL:
+                action = "U"
         length = self._length(board)
         # One size for all states: letters that change their size are harder to read than small ones.
         room = self.content_size

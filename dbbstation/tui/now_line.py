@@ -35,7 +35,7 @@ class NowLine(Panel):
         wrong = (
             board.state is State.COMPLETE
             and board.completed is not None
-            and board.completed.answer.word is Advice.REPEAT
+            and (board.completed.answer.word is Advice.REPEAT or bool(board.doubted))
         )
         self.set_class(board.fault is not None or board.state is State.FLAWED or wrong, "-fault")
         self.set_class(board.fault is None and board.state in _ASKING and not wrong, "-asking")

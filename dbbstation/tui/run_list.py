@@ -42,7 +42,7 @@ class RunList(Panel):
             cells = []
             for number, (task, mark) in group:
                 current = len(rows) if number == here else current
-                cells.append(_cell(task.direction.value, mark))
+                cells.append(_cell(task.direction.value, mark, doubted=board.in_doubt(task.test, task.direction)))
             title = name if occurrence == 1 else f"{name} again"
             rows.append(Content(f"{_cut(title, room):{room}} ") + Content(" ").join(cells))
         height = max(self.size.height, 1)
@@ -50,9 +50,9 @@ class RunList(Panel):
         return lines(*rows[first : first + height])
 
 
-def _cell(direction: str, mark: Mark) -> Content:
-    sign, style = SIGNS[mark]
-    return Content.assemble(f"{direction:3} ", (f"{sign} {mark.value}".ljust(_CELL - 4), style))
+def _cell(direction: str, mark: Mark, *, doubted: bool = False) -> Content:
+    (sign, style), word = (("!", "bold $text-error"), "doubted") if doubted else (SIGNS[mark], mark.value)
+    return Content.assemble(f"{direction:3} ", (f"{sign} {word}".ljust(_CELL - 4), style))
 
 
 def _cut(name: str, room: int) -> str:

@@ -11,6 +11,7 @@ from dbbstation.station.states import State
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dbbstation.quality.answer import RunAssessment
     from dbbstation.service.board import Board
     from dbbstation.station.events import RunAnnounced
 
@@ -35,10 +36,13 @@ def now_for_operator(board: Board) -> str:
     if board.fault is not None or board.state not in {State.COMPLETE, State.FLAWED} or completed is None:
         return now(board) if board.finished is None else _THROUGH
     found = completed.answer
+    if board.doubted:
+        return _looked_back(board)
     if found.word is Advice.REPEAT:
         return f"{found.word}  {completed.run.label}: {_ended(found.causes[0])} Enter measures it again."
-    unseen = f"Not to be seen yet: {', '.join(found.unseen)}. " if found.unseen else ""
-    return f"{found.word}  {completed.run.label}. {unseen}Enter goes on."
+    if found.word is Advice.CANNOT_TELL:
+        return f"{found.word}  {completed.run.label}: {_unseen(found)} U goes on all the same, R measures it again."
+    return f"{found.word}  {completed.run.label}. {_later(found)}Enter goes on."
 
 
 _THROUGH = "Every circle is measured: the answer follows."
@@ -71,11 +75,34 @@ def _verdict(board: Board) -> str:
     if board.completed is None:
         return "The run is complete."
     name, found = board.completed.run.label, board.completed.answer
+    if board.doubted:
+        return f"{_looked_back(board)} A accepts this one and leaves them."
+    beside = board.completed.counts_beside
+    both = f"{beside.label} counts too: L accepts this one in its place. " if beside is not None else ""
     if found.word is Advice.REPEAT:
         more = f" ({len(found.causes) - 1} more)" if len(found.causes) > 1 else ""
         return f"{found.word}  {name}: {_ended(found.causes[0])}{more} Enter or R measures it again; A asks why it counts all the same."
-    unseen = f"Not to be seen yet: {', '.join(found.unseen)}. " if found.unseen else ""
-    return f"{found.word}  {name}. {unseen}Enter or A accepts it, R measures it again, X rejects it and goes on."
+    if found.word is Advice.CANNOT_TELL:
+        return f"{found.word}  {name}: {_unseen(found)} {both}U or A accepts it all the same, R measures it again."
+    return f"{found.word}  {name}. {both}{_later(found)}Enter or A accepts it, R measures it again, X rejects it and goes on."
+
+
+def _unseen(found: RunAssessment) -> str:
+    settled = f"; {'; '.join(found.settled_by)}" if found.settled_by else ""
+    return f"{', '.join(found.unseen)}{settled}."
+
+
+def _later(found: RunAssessment) -> str:
+    return f"Later circles show {', '.join(found.later)}. " if found.later else ""
+
+
+def _looked_back(board: Board) -> str:
+    """Return which earlier circles are wrong, and that Enter leads back to them."""
+    first = next(iter(board.doubted.values()))
+    completed = board.completed
+    mine = f"{completed.answer.word}  {completed.run.label}. " if completed is not None else ""
+    what = first.finding.short or first.finding.text
+    return f"{mine}But {', '.join(board.doubted)} must be measured again: {_ended(what)} Enter goes back to test {first.run.test}."
 
 
 def _flawed(board: Board) -> str:

@@ -30,6 +30,9 @@ LARGE_WORDS: Mapping[State | None, tuple[str, str]] = {
 }
 """State and next action in large letters, nine of them at most."""
 
+LARGE_BACK = "go back"
+"""An earlier circle is wrong."""
+
 REASONS = {
     "1": "the holder or the ball was touched",
     "2": "the bar slipped or was knocked",

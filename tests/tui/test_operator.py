@@ -172,7 +172,8 @@ def test_four_screens_and_nothing_that_is_wrong_is_accepted(job_file: Path) -> N
 
 
 def test_a_sound_circle_is_accepted_by_enter() -> None:
-    runner = Waits(Happening().circle("t0", Direction.CCW).events)
+    sound = (found(Name.CLOSURE, 0.1, 1.0, "µm", "", ""),)
+    runner = Waits(Happening(findings=sound).circle("t0", Direction.CCW).events)
     app = StationApp(Happening().shown(), runner, clock=lambda: 0.0)
 
     async def run() -> None:
@@ -184,3 +185,22 @@ def test_a_sound_circle_is_accepted_by_enter() -> None:
 
     asyncio.run(run())
     assert runner.sent == [Accept()]
+
+
+def test_a_circle_that_cannot_be_told_has_a_key_of_its_own() -> None:
+    runner = Waits(Happening().circle("t0", Direction.CCW).events)  # nothing was looked for
+    app = StationApp(Happening().shown(), runner, clock=lambda: 0.0)
+
+    async def run() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            app.push_screen(OperateScreen(app, Happening().shown()))
+            app.look()
+            await pilot.pause()
+            said = " ".join(str(app.screen.query_one("#now").visual).split())
+            assert "two other tests show it, or a model of the machine, or a session before" in said
+            await pilot.press("enter", "u")
+
+    asyncio.run(run())
+    (sent,) = runner.sent
+    assert isinstance(sent, Accept)
+    assert sent.reason.startswith("not to be seen: whether something moved during the circle, whether it is the circle")

@@ -90,8 +90,11 @@ def run_of(
 
 def planned_circles(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:
     """Return all circles of a plan by a model; none without a model, since all are alike then."""
-    if model is None:
-        return ()
+    return () if model is None else circles_of_plan(session, model)
+
+
+def circles_of_plan(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:
+    """Return all circles of a plan as a model expects them, else the nominal machine."""
     found = []
     for name, test in session.plan.tests.items():
         for direction in test.directions:

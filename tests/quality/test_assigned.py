@@ -1,0 +1,159 @@
+"""Which circle of the plan each run shows, on the fifteen-minute sitting of a virtual machine of known errors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import date
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.recordings.judged import circles_of_plan
+from dbbstation.files.recordings.session_details import SessionDetails
+from dbbstation.files.recordings.session_writer import SessionWriter
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.plan.circle import Direction
+from dbbstation.quality.assigned import Assigned, Reference
+from dbbstation.quality.finding import FindingVerdict, Name, undecided
+from dbbstation.quality.knowledge import Run, seen
+from dbbstation.quality.together import read_um
+from dbbstation.trace.recording import Recording
+from dbbstation.virtual.machine import VirtualMachine
+from dbbstation.virtual.truth import random_kinematics
+from tests.station.bench import MACHINE_FILE
+
+if TYPE_CHECKING:
+    from dbbstation.quality.knowledge import Planned, Seen
+
+CCW, CW = Direction.CCW, Direction.CW
+TESTS = ("low", "side", "high")
+PLANNED = [(test, way) for test in TESTS for way in (CCW, CW)]
+
+
+@pytest.fixture(scope="module")
+def sitting(tmp_path_factory: pytest.TempPathFactory) -> tuple[tuple[Planned, ...], dict[tuple[str, Direction], Seen]]:
+    machine = read_machine(MACHINE_FILE)
+    plan = read_inline_plan(shipped_folder("protocols") / "plans" / "ten-minute-check.yaml")
+    with SessionWriter.create(tmp_path_factory.mktemp("s") / "session", machine, plan, SessionDetails()) as writer:
+        circles = circles_of_plan(writer.session, None)
+    return circles, measured(circles, 5)
+
+
+def measured(circles: tuple[Planned, ...], seed: int) -> dict[tuple[str, Direction], Seen]:
+    """Return every circle of a random machine."""
+    machine = read_machine(MACHINE_FILE)
+    plan = read_inline_plan(shipped_folder("protocols") / "plans" / "ten-minute-check.yaml")
+    virtual = VirtualMachine(MachineModel(machine, random_kinematics(machine, seed)), plan.to_domain(), seed=seed)
+    runs = {}
+    for circle in circles:
+        made = virtual.run(circle.test, circle.circle.direction)
+        t_s = np.arange(0.0, made.path.duration_s, 0.05)
+        lengths = np.array([made.length_mm_at(t) + virtual.noise_mm() for t in t_s.tolist()])
+        recording = Recording(circle.test, t_s, lengths)
+        runs[circle.test, circle.circle.direction] = seen(
+            Run(circle.test, 1, circle.test, circle.circle, recording, expected=circle.expected)
+        )
+    return runs
+
+
+def shown(sitting: object, instead: dict[tuple[str, Direction], tuple[str, Direction]], count: int = 6) -> Assigned:
+    """The first runs of a sitting, some of which show another circle: the reading along the travel is the other's."""
+    circles, runs = sitting
+    made = []
+    for asked in PLANNED[:count]:
+        other = runs[instead.get(asked, asked)]
+        sign = runs[asked].run.circle.direction.sign * other.run.circle.direction.sign
+        signs = np.array([1, 1, 1, 1, sign, sign, sign])
+        made.append(replace(runs[asked], coefficients_um=signs * other.coefficients_um))
+    return Assigned(circles, made)
+
+
+def suspected(assigned: Assigned) -> dict[str, str]:
+    return {one.run.label: finding.short for one, finding in assigned.suspects().items()}
+
+
+def test_a_sound_sitting_has_no_suspect_and_decides_every_circle(sitting) -> None:
+    for count in range(1, 7):
+        assert suspected(shown(sitting, {}, count)) == {}
+    assigned = shown(sitting, {})
+    for one in assigned.runs:
+        for name in (Name.TEST, Name.DIRECTION):
+            assert assigned.finding(one, undecided(name, "")).verdict is FindingVerdict.GOOD
+
+
+def test_the_first_circle_alone_decides_nothing_and_a_session_before_decides_it(sitting) -> None:
+    circles, runs = sitting
+    alone = shown(sitting, {}, 1)
+    assert alone.finding(alone.runs[0], undecided(Name.TEST, "")).verdict is FindingVerdict.CANNOT_TELL
+    assert alone.since(alone.runs[0]) is None
+    read = {(test, str(way)): read_um(one) for (test, way), one in runs.items()}
+    before = Reference("monday", date(2026, 5, 12), read)
+    known = Assigned(circles, alone.runs, before)
+    assert known.finding(known.runs[0], undecided(Name.TEST, "")).verdict is FindingVerdict.GOOD
+    since = known.since(known.runs[0])
+    assert since.verdict is FindingVerdict.GOOD
+    # The machine was put together anew since: said, and no circle is suspected for it.
+    other = {(test, str(way)): read_um(one) for (test, way), one in measured(circles, 6).items()}
+    changed = Assigned(circles, list(runs.values()), Reference("monday", date(2026, 5, 12), other))
+    assert suspected(changed) == {}
+    since = changed.since(changed.runs[0])
+    assert since.verdict is FindingVerdict.CANNOT_TELL
+    assert "changed since 12 May" in since.text
+    # The program of another test is known at once.
+    wrong = Assigned(circles, shown(sitting, {PLANNED[0]: ("high", CCW)}, 1).runs, before)
+    assert suspected(wrong) == {"low ccw 1": "it is the circle of high ccw"}
+
+
+def test_two_tests_that_changed_places_are_found_behind_the_third(sitting) -> None:
+    swapped = {(one, way): (other, way) for one, other in (("low", "side"), ("side", "low")) for way in (CCW, CW)}
+    found = suspected(shown(sitting, swapped, 5))
+    assert found == {
+        "low ccw 1": "it is the circle of side ccw",
+        "low cw 1": "it is the circle of side cw",
+        "side ccw 1": "it is the circle of low ccw",
+        "side cw 1": "it is the circle of low cw",
+    }
+
+
+@pytest.mark.parametrize("asked", [("low", CCW), ("low", CW), ("high", CW)])
+def test_a_circle_the_wrong_way_round_is_found_in_the_end(sitting, asked: tuple[str, Direction]) -> None:
+    test, way = asked
+    found = suspected(shown(sitting, {asked: (test, CW if way is CCW else CCW)}))
+    label = f"{test} {way} 1"
+    assert "it ran the wrong way round" in found[label]
+    # One of both directions is wrong; where the others cannot say which, both are named.
+    assert set(found) <= {label, f"{test} {CW if way is CCW else CCW} 1"}
+
+
+def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
+    """Against the density of all readings under the whole covariance, one size at a time."""
+    assigned = shown(sitting, {}, 4)
+    labels = tuple(assigned._planned)
+    circles = [assigned.circles[k] for k in labels]
+    logs = []
+    from scipy.special import logsumexp  # noqa: PLC0415
+    from scipy.stats import multivariate_normal  # noqa: PLC0415
+
+    from dbbstation.quality.forms import SIZES  # noqa: PLC0415 - of this test
+
+    machine = np.vstack([assigned._of_machine[k] for k in labels])
+    session = np.vstack([assigned._of_session[k] for k in labels])
+    off = np.concatenate([read_um(one) - read_um_expected(c) for one, c in zip(assigned.runs, circles, strict=True)])
+    for size in SIZES:
+        whole = size**2 * machine @ machine.T + session @ session.T
+        for k, one in enumerate(assigned.runs):
+            rows = slice(7 * k, 7 * k + 7)
+            whole[rows, rows] += assigned._own[labels[k]] + one.u_um**2 * np.eye(7)
+        logs.append(multivariate_normal(np.zeros(len(off)), whole, allow_singular=True).logpdf(off))
+    wanted = logsumexp(logs) - np.log(len(SIZES)) + 0.5 * len(off) * np.log(2.0 * np.pi)
+    assert assigned.score(labels) == pytest.approx(wanted, abs=1e-3)
+
+
+def read_um_expected(circle: Planned) -> np.ndarray:
+    signs = np.array([1, 1, 1, 1, *[circle.circle.direction.sign] * 3])
+    length = np.array([1e3 * circle.circle.bar_mm, 0, 0, 0, 0, 0, 0])
+    return signs * circle.expected.form_um + length

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.service.after import USUAL, After
-from dbbstation.files.recordings.former import former_sessions
 from dbbstation.service.former_sessions import Former, InForce, before_and_now, keep_models
 from dbbstation.service.job import SessionJob, SessionTask
 from dbbstation.service.last_session import last_traces

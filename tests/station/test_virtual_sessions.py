@@ -13,11 +13,11 @@ from dbbstation.errors import InputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.recordings.entries import ReadBy
+from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.service.choice import Choice, prepare
-from dbbstation.files.recordings.former import former_sessions
 from dbbstation.service.memory import Line
 from dbbstation.service.session_line import line_to_go_on
 from dbbstation.service.session_list import list_sessions

@@ -58,12 +58,15 @@ class StepsBefore:
 
 
 def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
-    """Keep finished steps beside their results, if possible.
+    """Keep finished steps beside their results, if possible; another screen's steps of the same session stay.
 
     Args:
         key: from `counted`.
     """
     with suppress(OSError, OutputError):
+        before = _kept(folder / FILE)
+        if before is not None and before.key == key:
+            steps = before.steps | steps
         file = _File(key=key, steps=steps)
         write_text(folder / FILE, file.model_dump_json(indent=1) + "\n", force=True, rewrites=True)
 
@@ -82,15 +85,20 @@ def steps_before(session: Path) -> StepsBefore | None:
     except (InputError, OSError):  # what is wrong with it is said where it is opened
         return None
     for file in kept:
-        try:
-            found = _File.model_validate_json(content_of(file, LARGEST_BYTES))
-        except (OSError, ValidationError):
-            continue
-        if found.key == now:
+        found = _kept(file)
+        if found is not None and found.key == now:
             folder = file.parent
             steps = {name: step for name, step in found.steps.items() if _is_result(folder, name, step)}
             return StepsBefore(folder, now, steps)
     return None
+
+
+def _kept(file: Path) -> _File | None:
+    """Return what a file keeps; None if it is missing or no such file."""
+    try:
+        return _File.model_validate_json(content_of(file, LARGEST_BYTES))
+    except (OSError, ValidationError):
+        return None
 
 
 def _is_result(folder: Path, name: str, step: DoneStep) -> bool:

@@ -33,7 +33,7 @@ TRACED = ("files", "cli", "nc", "instrument", "tasks", "trace", "plan", "machine
 LONGEST_S = 60.0
 """A case that takes longer is stopped."""
 
-MANY, DISTURBED = 4, 0.3
+MANY, DISTURBED = 2, 0.4
 """Seeds with more files are folders: the share of their cases in which files are missing, moved or added, too."""
 
 _PACKAGE = f"{os.sep}dbbstation{os.sep}"

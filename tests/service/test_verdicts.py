@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import pytest
@@ -74,3 +75,29 @@ def test_what_was_worked_out_stands_there_again_until_other_runs_count(session: 
     give_verdict(session, Judge("a", Direction.CW, 1, accepted=True))
     (first.folder / "model.yaml").unlink()  # a file that is gone was not worked out
     assert After(session, start=Done).results[SessionTask.CALIBRATE].progress is None
+
+
+def test_two_screens_on_one_session_lose_nothing_of_each_other(session: Path) -> None:
+    """Each opened before the other has done anything: their results lie apart, or in one folder that keeps both."""
+    first, second = After(session, start=Done), After(session, start=Done)
+    for one, step in ((first, SessionTask.CALIBRATE), (second, SessionTask.REPORT)):
+        one.do(step)
+        one.look()
+    assert first.folder != second.folder
+    again, beside = After(session, start=Done), After(session, start=Done)
+    assert again.folder == beside.folder
+    for one, step in ((again, SessionTask.DIAGNOSE), (beside, SessionTask.CALIBRATE), (beside, SessionTask.REPORT)):
+        one.do(step)
+        one.look()
+    done = {step for step, one in After(session, start=Done).results.items() if one.progress is WorkProgress.DONE}
+    assert {SessionTask.DIAGNOSE, SessionTask.CALIBRATE, SessionTask.REPORT} <= done
+
+
+def test_verdicts_of_two_screens_at_once_are_both_noted(session: Path) -> None:
+    given = [
+        Judge("a", Direction.CW, 1, accepted=False, reason="slip"),
+        Judge("a", Direction.CCW, 1, accepted=False, reason="cable"),
+    ]
+    with ThreadPoolExecutor(2) as screens:
+        list(screens.map(lambda one: give_verdict(session, one), given))
+    assert [run.reason for run in read_session(session).runs] == ["cable", "slip"]

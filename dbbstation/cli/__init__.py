@@ -35,6 +35,7 @@ COMMANDS = {
     "check": "Validate files of any format, and whole sessions.",
     "circles": "Figures of measured circles after ISO 230-4, and findings.",
     "compare": "Where two sessions differ, and which variable that follows.",
+    "control": "Correct inside the control: its kinematics or parameters.",
     "compensate": "Compensate any NC program with a calibrated model.",
     "diagnose": "Find the physics that a calibration leaves out.",
     "demo": "The whole job on a simulated machine, start to end.",

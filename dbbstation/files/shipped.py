@@ -26,3 +26,8 @@ def shipped_folder(name: str) -> Path:
     raise InputError(
         [Problem(str(package / name), 0, 0, "this folder of the installation is missing", "install dbbstation again")]
     )
+
+
+def package_text(name: str) -> str:
+    """Return a text file of the package itself, by its path inside."""
+    return (Path(__file__).resolve().parent.parent / name).read_text(encoding="utf-8")

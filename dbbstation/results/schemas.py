@@ -9,6 +9,7 @@ from dbbstation.results.calibration import CalibrationResult
 from dbbstation.results.checked import CheckResult
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.comparison import ComparisonResult
+from dbbstation.results.control import KinematicsResult
 from dbbstation.results.diagnosis import DiagnosisResult
 from dbbstation.results.drive import DriveResult
 from dbbstation.results.evaluation import EvaluationResult
@@ -53,6 +54,7 @@ RESULTS: dict[str, type] = {
     "program": ProgramsResult,
     "report": ReportResult,
     "session-list": ListedSession,
+    "control-kinematics": KinematicsResult,
     "session-log": SessionEvents,
     "settings": SettingsResult,
     "simulate": SimulatedSession,

@@ -24,12 +24,13 @@ from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part 
 from dbbstation.trace.columns import WithLogged
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Compliance, Hexapod, Machine
     from dbbstation.plan.plan import Plate
+    from dbbstation.sources.c_form import CForm
     from dbbstation.trace.columns import Logged
 
 
@@ -505,6 +506,24 @@ class ErrorSource(ABC):
         """
         logged = self.by_temperature()
         return () if logged is None else (logged,)
+
+    def c_form(
+        self,
+        machine: Machine,  # noqa: ARG002
+        values: NDArray[np.float64],  # noqa: ARG002
+        thermometers: Collection[str] = (),  # noqa: ARG002
+    ) -> CForm | None:
+        """Return the effect as C for a kinematics inside a control; None, the default, if there is none.
+
+        Args:
+            machine: with the identified compliance.
+            values: shape (p,).
+            thermometers: columns without unit that the control has.
+
+        Raises:
+            ModelError: the machine file or the control lacks what it needs.
+        """
+        return None
 
     def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Return changes of the effect by other constants of the law, with a last axis.

@@ -59,6 +59,7 @@ def lines_of(folder):
         "compare": ["compare", SMALL, FIXTURES / "sessions" / "logged"],
         "predict": ["predict", "--model", model, "--poses", poses, "--out", folder / "actual.csv"],
         "compensate": ["compensate", part, "--model", model, "--out", folder / "out.ngc"],
+        "control-kinematics": ["control", "kinematics", "--model", model, "--out", folder / "dbbkins.comp"],
         "program": ["program", *plan, "--test", "low", "--model", model, "--out", folder / "programs"],
         "report": ["report", *with_model, "--before", SMALL, "--out", folder / "report.html"],
         "history": ["history", many],

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.statics import base_loads
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.weights import MM_PER_N, platform_masses, stated_tensions
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -61,3 +64,12 @@ class BaseCompliance(LinearSource):
         force = base_loads(struts, stated_tensions(self.name, machine, frames, struts), machine.strut_masses)
         horizontal, vertical = np.diag([1.0, 1.0, 0.0]), np.diag([0.0, 0.0, 1.0])
         return Effect(base_joint_mm=MM_PER_N * np.stack([force @ horizontal, force @ vertical], axis=-1))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        return CForm(
+            """double load[6] = {0.0}, pull[6][3], t[6], weight = GRAVITY * (STRUT_KG[0] + STRUT_KG[1] + STRUT_KG[3]);
+platform_load(at, load);
+strut_load(at, STRUT_KG, load, pull);
+tensions(at, load, t);
+ALL e->base[i][k] += 1e-6 * v[k == 2] * (t[i] * at->unit[i][k] - pull[i][k] - (k == 2 ? weight : 0.0));"""
+        )

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.statics import GRAVITY_M_S2, Load, stretch_mm, strut_tensions
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.weights import for_such_struts, platform_masses, strut_compliance
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -86,3 +89,11 @@ class CogShift(LinearSource):
         moment = weight_n * np.column_stack([-y, x, np.zeros(len(x))])  # of a weight that points down
         tension = strut_tensions(struts, Load(np.zeros_like(moment), moment))
         return stretch_mm(struts, strut_compliance(machine), tension), tension
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        return CForm(
+            """double load[6] = {0.0}, t[6];
+load[3] = -WEIGHT * dot(at->r[1], v), load[4] = WEIGHT * dot(at->r[0], v);
+tensions(at, load, t);
+EACH e->strut[i] += stretch(at, i, COMPLIANCE) * t[i];"""
+        )

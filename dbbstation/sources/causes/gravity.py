@@ -6,10 +6,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.machine.statics import platform_weight, stretch_mm, strut_tensions
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.weights import MM_PER_N, platform_masses, strut_compliance
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -73,3 +76,11 @@ class Gravity(LinearSource):
         if values[0] == 0.0:
             return None
         return replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N * float(values[0]))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        return CForm(
+            """double load[6] = {0.0}, t[6];
+platform_load(at, load);
+tensions(at, load, t);
+EACH e->strut[i] += stretch(at, i, 1e-6 * v[0]) * t[i];"""
+        )

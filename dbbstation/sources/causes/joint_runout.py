@@ -9,9 +9,12 @@ import numpy as np
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.travel import middle
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -93,6 +96,28 @@ class JointRunout(LinearSource):
         each = np.arange(STRUTS)
         own[:, each, each] = MM_PER_UM * lengths
         return Effect(strut_mm=own.reshape(len(motion), STRUTS, -1))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        rest = inverse(machine.hexapod, middle(machine)).unit[0]
+        return CForm(
+            """EACH {
+    double seen[3], swing[2][2];
+    turned_back(at->r, at->unit[i], seen);
+    for (int k = 0; k < 3; k++) seen[k] -= rest[i][k];
+    for (int a = 0; a < 2; a++) {
+        swing[0][a] = dot(at->unit[i], across[i][a]) - dot(rest[i], across[i][a]);
+        swing[1][a] = dot(seen, across[i][a]);
+    }
+    const double *own = v + 8 * i;
+    for (int end = 0; end < 2; end++) {
+        double up = swing[end][0], level = swing[end][1];
+        const double *o = own + 3 * end;
+        e->strut[i] -= 1e-3 * (o[0] * up * up / 2.0 + o[1] * level * level / 2.0 + o[2] * up * level);
+    }
+    e->strut[i] += 1e-3 * dot((double[3]){own[6], own[7], 0.0}, (double[3]){swing[1][0], swing[1][1], 0.0});
+}""",
+            constants={"rest": rest, "across": _across(rest)},
+        )
 
 
 def _per_offset(motion: Motion, machine: Machine) -> NDArray[np.float64]:

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -54,3 +57,6 @@ class PlatformJoints(LinearSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         return Effect(platform_joint_mm=np.eye(3 * STRUTS).reshape(STRUTS, 3, 3 * STRUTS))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        return CForm("ALL e->platform[i][k] += v[3 * i + k];", by_pose=False)

@@ -9,7 +9,14 @@ from scipy.special import erf
 
 from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
+from dbbstation.machine.statics import (
+    motor_loads,
+    platform_weight,
+    strut_tensions,
+    transverse_load,
+    transverse_pull,
+)
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import (
     SMOOTH_MM,
     Effect,
@@ -26,6 +33,8 @@ from dbbstation.sources.laws.play_operator import PlayState, leaning
 from dbbstation.sources.laws.weights import platform_masses
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -184,6 +193,16 @@ class _Shaken(ErrorSource):
         steep = -np.sqrt(2.0) / _spread_n(values) * 2.0 / np.sqrt(np.pi) * ratio * np.exp(-np.square(ratio))
         by_force = 0.5 * MM_PER_UM * values[:STRUTS] * steep
         return Effect(strut_mm=np.concatenate([by_play, by_force[:, :, None]], axis=2))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        return CForm(
+            """double load[6] = {0.0}, pull[6][3], t[6], moving = GRAVITY * (STRUT_KG[3] + STRUT_KG[0] / 2.0);
+platform_load(at, load);
+strut_load(at, STRUT_KG, load, pull);
+tensions(at, load, t);
+EACH e->strut[i] += 0.5e-3 * v[i] * erf((t[i] - moving * at->unit[i][2]) / spread);""",
+            constants={"spread": _spread_n(values)},
+        )
 
 
 LEAST_N = 1.0

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import Effect, ErrorSource, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.screws import screw_lead_mm
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -95,6 +99,15 @@ class ScrewCyclic(LinearSource):
             own.append((waves[:, :, None, :] * np.eye(STRUTS)[:, :, None]).reshape(len(motion), STRUTS, -1))
         return np.asarray(MM_PER_UM * np.concatenate(own, axis=2), dtype=np.float64)
 
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        body = """for (int order = 1; order <= harmonics; order++) EACH {
+    double turn = 6.28318530717958647693 * order / lead * at->length[i];
+    const double *wave = v + 12 * (order - 1) + 2 * i;
+    e->strut[i] += 1e-3 * (wave[0] * sin(turn) + wave[1] * cos(turn)) * (1.0 + growth * (at->length[i] - middle));
+}"""
+        constants = {"lead": screw_lead_mm(self.name, machine), "harmonics": max(self.harmonics)}
+        return CForm(body, by_pose=False, constants={**constants, "growth": 0.0, "middle": 0.0})
+
 
 USUAL_UM = 2.0
 """Usual size of the first harmonic; that of a harmonic falls with its order, as of a wave with a kink [µm]."""
@@ -172,6 +185,11 @@ class _AlongTheScrew(ErrorSource):
         return Effect(
             strut_mm=np.concatenate([waves * (1.0 + values[-1] * out)[:, :, None], by_growth[:, :, None]], axis=2)
         )
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        form = _TwoHarmonics().c_form(machine, values)
+        grown = {"growth": 1e-5 * float(values[-1]), "middle": sum(machine.travel.strut_mm) / 2.0}
+        return replace(form, constants={**form.constants, **grown})
 
 
 def _out(motion: Motion, machine: Machine) -> NDArray[np.float64]:

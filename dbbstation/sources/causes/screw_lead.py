@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Texts, of_each_strut
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -49,6 +52,10 @@ class ScrewLead(LinearSource):
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         travel = motion.struts(machine).length_mm - _middle_mm(machine)
         return Effect(strut_mm=MM_PER_UM_M * travel[:, :, None] * np.eye(STRUTS))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        body = "EACH e->strut[i] += 1e-6 * v[i] * (at->length[i] - middle);"
+        return CForm(body, by_pose=False, constants={"middle": _middle_mm(machine)})
 
 
 def _middle_mm(machine: Machine) -> float:

@@ -6,12 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws import by_temperature
 from dbbstation.sources.laws.by_temperature import MACHINE, FollowsTemperature
 from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -96,3 +99,7 @@ class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         return Effect(tool_tip_mm=(MM_PER_UM * self.warmer_k(motion) * _OUT_OF_THE_SPINDLE)[..., None])
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        body = "e->tip[2] -= 1e-3 * v[0] * warmer[thermometer[0]];"
+        return CForm(body, by_pose=False, thermometers=self.chosen(thermometers))

@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.machine.statics import DOWN
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -61,3 +64,11 @@ class StrutBending(LinearSource):
         struts = motion.struts(machine)
         across_squared = 1.0 - (struts.unit @ DOWN) ** 2
         return Effect(strut_mm=-MM_PER_UM * (across_squared * (struts.length_mm / 1000.0) ** 5)[:, :, None])
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        return CForm(
+            """EACH {
+    double z = at->unit[i][2], m = at->length[i] / 1000.0;
+    e->strut[i] -= 1e-3 * v[0] * (1.0 - z * z) * m * m * m * m * m;
+}"""
+        )

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Texts, of_each_strut
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -36,3 +39,6 @@ class StrutReferenceLength(LinearSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         return Effect(strut_mm=np.eye(STRUTS))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        return CForm("EACH e->strut[i] += v[i];", by_pose=False)

@@ -9,10 +9,13 @@ import numpy as np
 
 from dbbstation.machine.geometry import StrutMasses
 from dbbstation.machine.statics import motor_loads, stretch_mm, strut_tensions, transverse_load, transverse_pull
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
-from dbbstation.sources.laws.weights import for_such_struts, strut_compliance
+from dbbstation.sources.laws.weights import for_such_struts, masses_for_c, strut_compliance
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -84,6 +87,22 @@ class StrutWeight(LinearSource):
             stretch.append(stretch_mm(struts, strut_compliance(machine), tension, kilogram))
             loads.append(motor_loads(struts, tension, kilogram))
         return Effect(strut_mm=np.stack(stretch, axis=-1), load_n=np.stack(loads, axis=-1))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        lengths = replace(machine.strut_masses or USUAL, strut_kg=0.0, motor_kg=0.0, screw_kg=0.0)
+        given = {f"{part}_kg": float(value) for part, value in zip(_parts(machine), values, strict=True)}
+        return CForm(
+            """double load[6] = {0.0}, pull[6][3], t[6];
+strut_load(at, kg, load, pull);
+tensions(at, load, t);
+EACH {
+    double own = stretch(at, i, COMPLIANCE), grows = COMPLIANCE * SHARE * at->length[i] / 1000.0;
+    double hanging = kg[3] ? kg[3] * at->length[i] / kg[4] : 0.0;
+    double weight = (own - grows) * (kg[3] + kg[0] / 2.0) + grows * (kg[0] + hanging) / 2.0;
+    e->strut[i] += own * t[i] - GRAVITY * at->unit[i][2] * weight;
+}""",
+            constants={"kg": masses_for_c(replace(lengths, **given))},
+        )
 
 
 def _parts(machine: Machine) -> tuple[str, ...]:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws import by_temperature
 from dbbstation.sources.laws.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
 from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -83,6 +86,10 @@ class _ByTemperature(FollowsTemperature, cause=ThermalFrame):
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         return Effect(base_joint_mm=(self.warmer_k(motion)[:, :, None] * _per_growth_mm(machine))[..., None])
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        body = "ALL e->base[i][k] += 1e-6 * v[0] * warmer[thermometer[0]] * Q[i][k];"
+        return CForm(body, by_pose=False, thermometers=self.chosen(thermometers))
 
 
 def _per_growth_mm(machine: Machine) -> NDArray[np.float64]:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws import by_temperature
 from dbbstation.sources.laws.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
 from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -85,6 +88,12 @@ class _ByTemperature(FollowsTemperature, cause=ThermalStruts):
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         return Effect(strut_mm=(self.warmer_k(motion) * _per_growth_mm(motion, machine))[:, :, None])
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        chosen = self.chosen(thermometers)
+        each = chosen if len(chosen) == STRUTS else chosen * STRUTS
+        body = "EACH e->strut[i] += 1e-6 * v[0] * warmer[thermometer[i]] * at->length[i];"
+        return CForm(body, by_pose=False, thermometers=each)
 
 
 def _per_growth_mm(motion: Motion, machine: Machine) -> NDArray[np.float64]:

@@ -9,10 +9,13 @@ import numpy as np
 from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.travel import middle
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.screws import screw_lead_mm
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import JointAxes, Machine
@@ -72,6 +75,24 @@ class UjointScrew(LinearSource):
         # Products of unit complex numbers: differences of angles that never jump by a turn.
         turned = np.angle(here * rest.conj())
         return Effect(strut_mm=(turned / (2.0 * np.pi))[:, :, None])
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        axes, at_rest = _axes(machine), middle(machine)
+        rest = _second_axes(axes, inverse(machine.hexapod, at_rest), at_rest)[0]
+        return CForm(
+            """EACH {
+    double a[3], b[3], of_base[3], of_platform[3], both[3];
+    turned(at->r, platform[i], a);
+    cross(base[i], at->unit[i], of_base), cross(a, at->unit[i], of_platform), cross(of_base, of_platform, both);
+    b[0] = dot(of_base, of_platform), b[1] = dot(at->unit[i], both);
+    e->strut[i] += v[0] / 6.28318530717958647693 * atan2(b[1] * rest[i][0] - b[0] * rest[i][1], b[0] * rest[i][0] + b[1] * rest[i][1]);
+}""",
+            constants={
+                "base": axes.base / _length(axes.base),
+                "platform": axes.platform / _length(axes.platform),
+                "rest": np.column_stack([rest.real, rest.imag]),
+            },
+        )
 
 
 def _second_axes(axes: JointAxes, struts: Struts, frames: Frames) -> NDArray[np.complex128]:

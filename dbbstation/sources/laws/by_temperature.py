@@ -17,7 +17,7 @@ from dbbstation.errors import ModelError
 from dbbstation.sources.contract import Effect, ErrorSource, LinearSource, Motion, Need, Parameter
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -98,13 +98,20 @@ class FollowsTemperature(LinearSource):
         Raises:
             ModelError: names missing ones.
         """
-        logged = known_thermometers(motion)
+        return self.chosen(known_thermometers(motion), "not every run of the session has")
+
+    def chosen(self, logged: Collection[str], lacks: str = "the control has not") -> tuple[str, ...]:
+        """Return the best choice of its thermometers.
+
+        Raises:
+            ModelError: names missing ones.
+        """
         for columns in self.thermometers:
             if all(name in logged for name in columns):
                 return columns
         missing = [[f"{name}_temp_c" for name in columns if name not in logged] for columns in self.thermometers]
         raise ModelError(
-            f"the error source {self.name} follows a thermometer, and not every run of the session has "
+            f"the error source {self.name} follows a thermometer, and {lacks} "
             + ", or ".join(", ".join(names) for names in missing),
             remedy="give recordings with that column, or a model without this source",
         )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dbbstation.errors import ModelError
-from dbbstation.machine.geometry import Compliance
+from dbbstation.machine.geometry import Compliance, StrutMasses
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Hexapod, Machine, Masses
@@ -83,3 +84,10 @@ def stated_loads(source: str, machine: Machine, frames: Frames, hexapod: Hexapod
     """
     struts = inverse(hexapod, frames)
     return motor_loads(struts, stated_tensions(source, machine, frames, struts), machine.strut_masses)
+
+
+def masses_for_c(masses: StrutMasses | None) -> NDArray[np.float64]:
+    """Return a strut's masses and lengths as `strut_load` of `control/kernel.c` takes them, shape (5,) [kg, mm]; zeros for None."""
+    none = StrutMasses(strut_kg=0.0, motor_kg=0.0, motor_length_mm=0.0)
+    own = masses or none
+    return np.array([own.strut_kg, own.motor_kg, own.motor_length_mm, own.screw_kg, own.screw_length_mm])

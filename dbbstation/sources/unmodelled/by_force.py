@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.statics import GRAVITY_M_S2, platform_weight, strut_tensions
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter
 from dbbstation.sources.laws.weights import platform_masses
 from dbbstation.sources.unmodelled.points import piecewise_linear, texts, values_at
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -53,6 +56,13 @@ class UnexplainedByForce(LinearSource):
         points = _points_n(self.name, machine)
         weight = platform_weight(motion.frames(machine), platform_masses(self.name, machine))
         return piecewise_linear(points, strut_tensions(motion.struts(machine), weight))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        body = """double load[6] = {0.0}, t[6];
+platform_load(at, load);
+tensions(at, load, t);
+EACH e->strut[i] += 1e-3 * curve(v + points * i, points, -WEIGHT, WEIGHT, t[i]);"""
+        return CForm(body, constants={"points": POINTS})
 
 
 def _points_n(name: str, machine: Machine) -> NDArray[np.float64]:

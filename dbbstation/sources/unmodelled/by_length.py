@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter
 from dbbstation.sources.unmodelled.points import piecewise_linear, texts, values_at
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -41,6 +44,11 @@ class UnexplainedByLength(LinearSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         return piecewise_linear(_points_mm(machine), motion.struts(machine).length_mm)
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        body = "EACH e->strut[i] += 1e-3 * curve(v + points * i, points, low, high, at->length[i]);"
+        low, high = machine.travel.strut_mm
+        return CForm(body, by_pose=False, constants={"points": POINTS, "low": low, "high": high})
 
 
 def _points_mm(machine: Machine) -> NDArray[np.float64]:

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Owner, Parameter
 from dbbstation.sources.unmodelled.points import MM_PER_UM, PLAUSIBLE_UM, TOLERANCE_UM, texts
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -64,6 +67,13 @@ class UnexplainedWave(ErrorSource):
         each = np.concatenate([waves, (-by_angle * turned_rad / period)[:, :, None]], axis=-1)
         own = each[:, :, None, :] * np.eye(STRUTS)[:, :, None]
         return Effect(strut_mm=MM_PER_UM * own.reshape(len(motion), STRUTS, 3 * STRUTS))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+        body = """EACH {
+    double turn = v[3 * i + 2] ? 6.28318530717958647693 * (at->length[i] - middle) / v[3 * i + 2] : 0.0;
+    e->strut[i] += 1e-3 * (v[3 * i] * sin(turn) + v[3 * i + 1] * cos(turn));
+}"""
+        return CForm(body, by_pose=False, constants={"middle": sum(machine.travel.strut_mm) / 2.0})
 
 
 def _waves(

@@ -1,0 +1,358 @@
+"""A LinuxCNC kinematics component with the errors of a model, as C."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import ModelError, StationError
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.rotation import Rotation
+from dbbstation.machine.statics import GRAVITY_M_S2
+from dbbstation.sources.c_form import c_constant
+from dbbstation.sources.contract import Need
+from dbbstation.sources.laws.weights import masses_for_c, strut_compliance
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.sources.c_form import CForm
+    from dbbstation.sources.contract import Fitted
+
+LONGEST_NAME = 20
+"""HAL takes 47 characters for a pin with the component's name [HAL_NAME_LEN]; the longest pin name of a source takes 26."""
+
+PATIENCE_S = 600.0
+"""A thermometer whose reading stays the same to the last bit for so long is broken or not connected [s]. Ten minutes: a reading
+of 0.01 K changes each minute, one of 0.1 K changes in ten minutes unless the shop keeps its temperature to 0.1 K."""
+
+LARGEST_K = 30.0
+"""A thermometer further from its zero than this is broken: a shop is between 10 and 40 degC."""
+
+HELD_BY_BACKLASH = "backlash"
+"""Source with a history that a control has an entry for: `[JOINT_n]BACKLASH`."""
+
+_KEYWORDS = frozenset(
+    [
+        "auto",
+        "break",
+        "case",
+        "char",
+        "const",
+        "continue",
+        "default",
+        "do",
+        "double",
+        "else",
+        "enum",
+        "extern",
+        "float",
+        "for",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "register",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "struct",
+        "switch",
+        "typedef",
+        "union",
+        "unsigned",
+        "void",
+        "volatile",
+        "while",
+        "component",
+        "pin",
+        "param",
+        "function",
+        "option",
+        "license",
+        "author",
+        "variable",
+        "description",
+        "include",
+        "main",
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Component:
+    """A kinematics component.
+
+    Attributes:
+        text: of the `.comp` file.
+        mathematics: the part of it that needs no LinuxCNC, which a compiler takes alone.
+        parts: sources inside, by name.
+        left_out: sources left out, by name.
+        thermometers: columns whose pins must be connected.
+    """
+
+    name: str
+    text: str
+    mathematics: str
+    parts: tuple[str, ...]
+    left_out: tuple[str, ...]
+    thermometers: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    fitted: Fitted
+    form: CForm
+
+    @property
+    def name(self) -> str:
+        return self.fitted.source.name.replace("-", "_")
+
+
+def check_name(name: str) -> None:
+    """Refuse a name that a component cannot have.
+
+    Raises:
+        StationError: says which names are possible.
+    """
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or name in _KEYWORDS or len(name) > LONGEST_NAME:
+        raise StationError(
+            f"{name!r} is no name of a component in C",
+            remedy=f"name the file with small letters, digits and underscores, at most {LONGEST_NAME}, such as dbbkins.comp",
+        )
+
+
+def component(
+    model: MachineModel,
+    kernel: str,
+    name: str,
+    digest: str,
+    *,
+    left_out: Collection[str] = (),
+    thermometers: Collection[str] = (),
+) -> Component:
+    """Return the component of a model.
+
+    Args:
+        kernel: text of `kernel.c`.
+        name: of the component.
+        digest: SHA-256 of the model file; its first 32 bits are a pin.
+        left_out: sources that the control shall not correct.
+        thermometers: columns without unit that the control has.
+
+    Raises:
+        ModelError: a source has a history, or no C form, and is not left out; or something that it needs is missing.
+        StationError: no such name, or no such source to leave out.
+    """
+    check_name(name)
+    acting = [f for f in model.of_the_machine().sources if f.values.any() and not f.source.of_currents]
+    names = [fitted.source.name for fitted in acting]
+    if unknown := sorted(set(left_out) - set(names)):
+        raise StationError(
+            f"the model has no source {', '.join(unknown)} to leave out", remedy=f"its sources are {', '.join(names)}"
+        )
+    machine = model.as_found
+    parts = [_part(fitted, machine, thermometers) for fitted in acting if fitted.source.name not in left_out]
+    columns = tuple(dict.fromkeys(column for part in parts for column in part.form.thermometers))
+    mathematics = "\n".join([_constants(machine, parts, columns), kernel, _sources(parts, columns)])
+    text = "\n".join(
+        [_declared(name, machine, parts, columns, digest), mathematics, _WRAPPED + _pins(parts, columns, digest)]
+    )
+    out = tuple(one for one in names if one in left_out)
+    return Component(name, text, mathematics, tuple(part.fitted.source.name for part in parts), out, columns)
+
+
+def _part(fitted: Fitted, machine: Machine, thermometers: Collection[str]) -> _Part:
+    source = fitted.source
+    form = source.c_form(machine, fitted.values, thermometers)
+    if form is not None:
+        return _Part(fitted, form)
+    history = source.has_history or Need.TIME in source.needs
+    why = "depends on the way so far or on time, which a kinematics does not know" if history else "has no form in C"
+    entry = "; its width then goes into [JOINT_n]BACKLASH" if source.name == HELD_BY_BACKLASH else ""
+    raise ModelError(
+        f"the error source {source.name} {why}",
+        remedy=f"leave it uncorrected with --leave-out {source.name}{entry}, or compensate programs instead",
+    )
+
+
+def _constants(machine: Machine, parts: Sequence[_Part], columns: Sequence[str]) -> str:
+    hexapod, travel, masses = machine.hexapod, machine.travel, machine.masses
+    axes = np.array([travel.x_mm, travel.y_mm, travel.z_mm, travel.a_deg, travel.b_deg, travel.c_deg])
+    named: dict[str, ArrayLike] = {
+        "Q": hexapod.base_joints_mm,
+        "P": hexapod.platform_joints_mm,
+        "REFERENCE": machine.reference_length_error_mm,
+        "STRUT": travel.strut_mm,
+        "LOW": axes[:, 0],
+        "HIGH": axes[:, 1],
+        "MIDDLE": [0.0, 0.0, float(axes[2].mean()), 0.0, 0.0, 0.0],
+        "ZYX": int(hexapod.rotation is Rotation.ZYX),
+        "BY_POSE": int(any(part.form.by_pose and not part.fitted.source.weighs for part in parts)),
+        "GRAVITY": GRAVITY_M_S2,
+        "WEIGHT": 0.0 if masses is None else GRAVITY_M_S2 * masses.platform_kg,
+        "ABOVE": 0.0 if masses is None else masses.centre_of_gravity_above_tip_mm,
+        "STRUT_KG": masses_for_c(machine.strut_masses),
+        "COMPLIANCE": strut_compliance(machine).at_1000mm_mm_per_n,
+        "SHARE": strut_compliance(machine).growing_share,
+    }
+    switches = f"static int use[{max(len(parts), 1)}] = {{{', '.join('1' for _ in parts) or '0'}}};"
+    warmer = f"static double warmer[{max(len(columns), 1)}];"
+    return "\n".join([*(c_constant(key, value) for key, value in named.items()), switches, warmer])
+
+
+def _sources(parts: Sequence[_Part], columns: Sequence[str]) -> str:
+    functions, calls = [], {True: "", False: ""}
+    for number, part in enumerate(parts):
+        values = {"v": part.fitted.values} if re.search(r"\bv\b", part.form.body) else {}
+        constants: dict[str, ArrayLike] = {**values, **part.form.constants}
+        if part.form.thermometers:
+            constants["thermometer"] = [columns.index(column) for column in part.form.thermometers]
+        lines = [*(c_constant(key, value) for key, value in constants.items()), *part.form.body.split("\n")]
+        body = "\n".join(f"    {line}" for line in lines)
+        functions.append(f"static void of_{part.name}(const seen_t *at, effect_t *e)\n{{\n{body}\n}}\n")
+        calls[part.fitted.source.weighs] += f"    if (use[{number}]) of_{part.name}(at, e);\n"
+    for weighs, which in ((False, "by_command"), (True, "by_weight")):
+        functions.append(f"static void {which}(const seen_t *at, effect_t *e)\n{{\n{calls[weighs]}}}\n")
+    return "\n".join(functions)
+
+
+def _declared(name: str, machine: Machine, parts: Sequence[_Part], columns: Sequence[str], digest: str) -> str:
+    said = re.sub(r'["\\\x00-\x1f]', " ", machine.name)
+    pins = [
+        f'pin in bit use_{part.name} = 1 "correct {part.fitted.source.name}; taken while enabled is false";'
+        for part in parts
+    ]
+    for column in columns:
+        pins.append(f'pin in float {column}_temp_c "thermometer [degC]";')
+        pins.append(f'param rw float {column}_zero_c = -999 "its reading from which growth counts [degC]";')
+    return f"""component {name} "Kinematics of {said} with the errors of the model {digest[:12]}";
+description "Made by dbbstation from a model; do not edit. Model SHA-256 {digest}.";
+pin in bit enabled "connect to motion.motion-enabled: switches are taken while it is false";
+pin out u32 model "first 32 bits of the model's SHA-256";
+pin out u32 fault "0 none, 1 a strut leaves its range, 2 no convergence, 3 a thermometer stands still or is out of range";
+pin out u32 iterations "rounds of the last call";
+pin out float correction-#[6] "joint less that of the nominal machine [mm]";
+param rw float patience_s = {PATIENCE_S!r} "a thermometer that stands still for so long is a fault";
+{chr(10).join(pins)}
+option singleton yes;
+function check nofp "does nothing; halcompile wants one";
+license "GPL"; // version 2 or later, as LinuxCNC that it is built for
+author "dbbstation";
+;;
+#include <rtapi_math.h>
+#include <kinematics.h>
+"""
+
+
+_WRAPPED = """
+FUNCTION(check) { }
+
+static int settled(struct __comp_state *__comp_inst);
+
+static int answered(struct __comp_state *__comp_inst, int wrong)
+{
+    fault = wrong, iterations = rounds;
+    return wrong ? -1 : 0;
+}
+
+int kinematicsInverse(const EmcPose *world, double *joint, const KINEMATICS_INVERSE_FLAGS *iflags, KINEMATICS_FORWARD_FLAGS *fflags)
+{
+    struct __comp_state *__comp_inst = __comp_first_inst;
+    double pose[6] = {world->tran.x, world->tran.y, world->tran.z, world->a, world->b, world->c}, r[3][3];
+    seen_t plain;
+    int wrong = settled(__comp_inst);
+    if (!wrong) wrong = dbb_inverse(pose, joint);
+    if (!wrong) {
+        rotation(pose + 3, r), look(Q, P, pose, r, &plain);
+        EACH correction(i) = joint[i] + REFERENCE[i] - plain.length[i];
+    }
+    return answered(__comp_inst, wrong);
+}
+
+int kinematicsForward(const double *joint, EmcPose *world, const KINEMATICS_FORWARD_FLAGS *fflags, KINEMATICS_INVERSE_FLAGS *iflags)
+{
+    struct __comp_state *__comp_inst = __comp_first_inst;
+    double pose[6] = {world->tran.x, world->tran.y, world->tran.z, world->a, world->b, world->c};
+    int homed = 0, wrong;
+    EACH homed = homed || joint[i] != 0.0;
+    if (!homed) return -1; /* before homing: no pose, and no fault */
+    wrong = settled(__comp_inst);
+    if (!wrong) wrong = dbb_forward(joint, pose);
+    if (!wrong) {
+        world->tran.x = pose[0], world->tran.y = pose[1], world->tran.z = pose[2];
+        world->a = pose[3], world->b = pose[4], world->c = pose[5];
+    }
+    return answered(__comp_inst, wrong);
+}
+
+KINEMATICS_TYPE kinematicsType(void) { return KINEMATICS_BOTH; }
+KINS_NOT_SWITCHABLE
+EXPORT_SYMBOL(kinematicsType);
+EXPORT_SYMBOL(kinematicsForward);
+EXPORT_SYMBOL(kinematicsInverse);
+"""
+
+
+def _pins(parts: Sequence[_Part], columns: Sequence[str], digest: str) -> str:
+    """Return what reads the pins before each call."""
+    switches = "".join(f"        use[{k}] = use_{part.name};\n" for k, part in enumerate(parts))
+    watched = "".join(
+        f"    if (thermometer({k}, {column}_temp_c, {column}_zero_c, patience_s)) return THERMOMETER;\n"
+        for k, column in enumerate(columns)
+    )
+    watching = _THERMOMETER.replace("COUNT", str(len(columns))) if columns else ""
+    return f"""{watching}
+static int settled(struct __comp_state *__comp_inst)
+{{
+    model = 0x{digest[:8]}u;
+    if (!enabled) {{
+{switches}    }}
+{watched}    return FINE;
+}}
+"""
+
+
+_THERMOMETER = f"""
+static int thermometer(int k, double degc, double zero, double patience)
+{{
+    static double last[COUNT];
+    static long long since[COUNT];
+    long long now = rtapi_get_time();
+    if (since[k] == 0 || degc != last[k]) last[k] = degc, since[k] = now;
+    warmer[k] = degc - zero;
+    return now - since[k] > patience * 1e9 || !(fabs(warmer[k]) <= {LARGEST_K!r});
+}}
+"""
+
+
+def settings(made: Component, model: MachineModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return lines of the INI file and of the HAL file for a component.
+
+    Soft limits of joints are the machine's; a play that is left out goes into `BACKLASH`.
+    """
+    travel, name = model.machine.travel, made.name
+    play = next(
+        (f for f in model.sources if f.source.name == HELD_BY_BACKLASH and f.source.name in made.left_out), None
+    )
+    ini = ["[KINS]", f"KINEMATICS = {name}", f"JOINTS = {STRUTS}"]
+    for i in range(STRUTS):
+        ini += [f"[JOINT_{i}]", f"MIN_LIMIT = {travel.strut_mm[0]:.10g}", f"MAX_LIMIT = {travel.strut_mm[1]:.10g}"]
+        ini += [] if play is None else [f"BACKLASH = {1e-3 * float(play.values[i]):.6f}"]
+    hal = ["loadrt [KINS]KINEMATICS", f"net {name}-enabled motion.motion-enabled => {name}.enabled"]
+    for column in made.thermometers:
+        pin = f"{name}.{column.replace('_', '-')}"
+        hal += [f"setp {pin}-zero-c DEGC  # reading at the first sample of the fitted session"]
+        hal += [f"net {column}-temp THERMOMETER => {pin}-temp-c"]
+    return tuple(ini), tuple(hal)

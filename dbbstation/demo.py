@@ -61,7 +61,7 @@ _CIRCLE = re.compile(r"(\d+) of (\d+): (test .*)")
 """What `measure` says when a circle begins."""
 
 SETTINGS = """# The shop's settings of this demonstration: what its circles have to keep.
-format: dbb-settings/2
+format: dbb-settings/1
 tolerances:
   - {quantity: circular-deviation, largest: 8.0, unit: µm}
   - {quantity: centre-deviation, largest: 15.0, unit: µm}

@@ -49,7 +49,7 @@ def _anchor(_context: click.Context, _option: click.Parameter, given: str | None
 @click.option(
     "--schema",
     metavar="FORMAT",
-    help="Print the JSON Schema of a format, such as dbb-plan/2, or of a command's --json, such as calibrate, and stop.",
+    help="Print the JSON Schema of a format, such as dbb-plan/1, or of a command's --json, such as calibrate, and stop.",
 )
 def check(
     files: tuple[Path, ...],
@@ -89,7 +89,7 @@ def check(
       dbbstation check plan.yaml machine.yaml --exclude h --clearance-mm 50
       dbbstation check 2026-11-20-hexapod-7
       dbbstation check 2026-11-20-hexapod-7 --anchor 3f2a9c1b2d4e5f60
-      dbbstation check --schema dbb-plan/2 > dbb-plan-2.schema.json
+      dbbstation check --schema dbb-plan/1 > dbb-plan-1.schema.json
     """
     from dbbstation.cli.output import print_result
     from dbbstation.errors import InputError

@@ -330,7 +330,7 @@ def _split(asker: Asker, mapping: MappingFile, tables: Sequence[ForeignTable]) -
             file = Path(table.table.file).name
             if not click.confirm(f"the angles of {file} turn round: has it {len(parts)} runs", err=True):
                 raise click.UsageError("a run turns one way: check the file")
-            return mapping.model_copy(update={"split": "direction", "format": "dbb-mapping/2"})
+            return mapping.model_copy(update={"split": "direction"})
     return mapping
 
 

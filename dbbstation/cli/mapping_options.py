@@ -272,7 +272,7 @@ def _mapping(table: ForeignTable, data: Mapping[str, Any]) -> MappingFile:
         name: {"means": one.means, **({"unit": one.unit} if one.unit else {})} for name, one in data["columns"].items()
     }
     whole = {
-        "format": "dbb-mapping/1" if data["split"] is None and data["zone"] is None else "dbb-mapping/2",
+        "format": "dbb-mapping/1",
         "separator": separator,
         "decimal": table.language.decimal,
         **data,

@@ -28,7 +28,7 @@ def session() -> None:
       dbbstation session list 2026-11-20-hexapod-7
       dbbstation session reject 2026-11-20-hexapod-7 a-ccw-2 --reason "chip under the holder"
       dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
-      dbbstation session seal from-the-old-program
+      dbbstation session seal recorded-elsewhere
       dbbstation session log 2026-11-20-hexapod-7
     """  # noqa: D301 (click reads the escape)
 
@@ -196,7 +196,7 @@ def amend(folder: Path, *, reason: str, plan: Path | None, machine: Path | None,
 @click.option("--dry-run", is_flag=True, help="Say which runs would get a hash, and write nothing.")
 @_JSON
 def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
-    """Seal a session that was recorded elsewhere or by an older program.
+    """Seal a session that was recorded elsewhere.
 
     A session file written by hand needs no hashes. This adds one for each run that has none, for machine, plan and jig, and a
     chain through all runs. It leaves everything else in the file as it is. Copies of machine, plan and jig go into the folder
@@ -204,8 +204,8 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
 
     \b
     Examples:
-      dbbstation session seal from-the-old-program --dry-run
-      dbbstation session seal from-the-old-program
+      dbbstation session seal recorded-elsewhere --dry-run
+      dbbstation session seal recorded-elsewhere
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
     from dbbstation.files.recordings.sealing import seal_session, sealing

@@ -265,13 +265,11 @@ def _session(checked: Checked) -> None:
 def _seal(session: SessionFolder) -> str:
     if session.seal is None:
         return NO_SEAL
-    if not session.seal.events:
-        return f"sealed, without an event log (`dbbstation session seal` begins one), anchor {anchor_of(session.seal)[:SHORTEST]}"
     return f"sealed, {_count(session.seal.events, 'event')}, anchor {anchor_of(session.seal)[:SHORTEST]}"
 
 
 NO_SEAL = "it carries no seal (`dbbstation session seal` writes one)"
-"""What is said of sessions of older programs, and of those that were written by hand: a changed plan is not noticed there."""
+"""What is said of sessions that were written by hand: a changed plan is not noticed there."""
 
 
 def _judge(checked: Checked, session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]]) -> None:

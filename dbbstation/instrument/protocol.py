@@ -1,4 +1,4 @@
-"""The wire protocol of a length instrument, `dbb-instrument/3`: what one YAML file in `protocols/instruments` says.
+"""The wire protocol of a length instrument, `dbb-instrument/1`: what one YAML file in `protocols/instruments` says.
 
 Protocol
 ├── line       baud rate, bits, parity, stop bits, flow control
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9.-]*$")]
 """Of an instrument or a profile: small letters, digits, hyphens, points."""
-
-_NEWER_WORDS = {"poll", "latch", "text", "errors", "optional"}
-"""Modes and kinds of parts that came with the third version of the format."""
 
 _MM_PER_UNIT: dict[Unit, float] = {"mm": 1.0, "um": 1e-3, "nm": 1e-6, "m": 1e3, "inch": 25.4}
 
@@ -103,11 +100,10 @@ class Ask(Schema):
 
     Attributes:
         mode: `poll`: `request` before each; the device takes the length whenever it likes before it replies. `latch`: the request
-            makes it take the length, within `timing.latch_bounds_s`. `stream`: it sends by itself once it is started. `request`
-            is the name that `latch` had in older files.
+            makes it take the length, within `timing.latch_bounds_s`. `stream`: it sends by itself once it is started.
     """
 
-    mode: Literal["request", "poll", "latch", "stream"]
+    mode: Literal["poll", "latch", "stream"]
     request: Bytes = b""
     request_end: Bytes = b""
     start: tuple[LineCommand, ...] = ()
@@ -117,7 +113,7 @@ class Ask(Schema):
     @model_validator(mode="after")
     def _request_fits(self) -> Ask:
         if self.asked != bool(self.request):
-            raise ValueError("mode request has request bytes, mode stream has none")
+            raise ValueError("modes poll and latch have request bytes, mode stream has none")
         if self.follow_up is not None and not self.asked:
             raise ValueError("a device that streams is not asked, not even after a fault")
         return self
@@ -229,7 +225,7 @@ class Protocol(Schema):
         features: what the virtual instrument has switched on, of the features that optional parts name.
     """
 
-    format: Literal["dbb-instrument/1", "dbb-instrument/2", "dbb-instrument/3"]
+    format: Literal["dbb-instrument/1"]
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
     title: str = Field(min_length=1)
     profile: Name | Literal[""] = ""
@@ -259,10 +255,6 @@ class Protocol(Schema):
             raise ValueError("binary parts need 8 data bits")
         if self.ask.mode == "stream" and self.timing.rate_hz is None:
             raise ValueError("a stream needs timing.rate_hz")
-        kinds = {part.kind for frame in self.frames for part in frame.parts}
-        newer = sorted(_NEWER_WORDS & (kinds | {self.ask.mode}))
-        if newer and self.format < "dbb-instrument/3":
-            raise ValueError(f"`{newer[0]}` came with dbb-instrument/3: write `format: dbb-instrument/3`")
         return self
 
     def whole(self) -> Protocol:

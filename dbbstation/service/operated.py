@@ -16,7 +16,7 @@ from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import format_for, read_document, validate
+from dbbstation.files.yaml.schema import format_of, read_document, validate
 from dbbstation.instrument.library import load_instrument
 from dbbstation.quality.conformity import Conformity
 from dbbstation.service.after import After
@@ -74,7 +74,7 @@ class Operated:
         """
         data = {"tolerances": [one.model_dump(exclude_defaults=True) for one in self.job.tolerances]}
         path = session.absolute().parent / f"{session.name}-tolerances.yaml"
-        write_text(path, yaml_text({"format": format_for(SettingsFile, data), **data}), force=True, rewrites=True)
+        write_text(path, yaml_text({"format": format_of(SettingsFile), **data}), force=True, rewrites=True)
         return path
 
     def _beside(self, name: str) -> Path:

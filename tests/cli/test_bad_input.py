@@ -256,10 +256,10 @@ def test_model_tampered_with(run, tmp_path, model, elsewhere, old, new, what):
 def test_files_in_each_others_places(run, fifteen, model):
     outcome = run("evaluate", fifteen, "--model", fifteen / "machine.yaml")
     assert outcome.code == FAILED
-    assert "this file is a machine (`dbb-machine/1`), a model (`dbb-model/4`) was expected" in outcome.err
+    assert "this file is a machine (`dbb-machine/1`), a model (`dbb-model/1`) was expected" in outcome.err
     outcome = run("calibrate", model)
     assert outcome.code == FAILED
-    assert "this file is a model (`dbb-model/3`), a session (`dbb-session/6`) was expected" in outcome.err
+    assert "this file is a model (`dbb-model/1`), a session (`dbb-session/1`) was expected" in outcome.err
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ def test_one_bar_serves_150_and_144_mm(run, spoilt, length_mm):
 
 
 def test_a_stated_stroke_holds(run, spoilt):
-    spoilt.replace("session.yaml", "dbb-session/1", "dbb-session/2")
+    spoilt.replace("session.yaml", "dbb-session/1", "dbb-session/1")
     spoilt.replace("session.yaml", STATED, "stroke_mm: 1.0, calibrated_length_mm: 148.5")
     outcome = run("check", spoilt.folder)
     assert outcome.code == FAILED

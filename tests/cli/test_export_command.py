@@ -19,7 +19,7 @@ from dbbstation.trace.cut import cut
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
 
-SEALED = shipped_folder("fixtures") / "sessions" / "sealed"
+SEALED = shipped_folder("fixtures") / "sessions" / "logged"
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 
 
@@ -54,7 +54,7 @@ def brought_back(run, table, session, out):
     return read_session(out)
 
 
-@pytest.mark.parametrize("name", ["sealed", "small", "under-spindle"])
+@pytest.mark.parametrize("name", ["logged", "small", "under-spindle"])
 def test_a_session_that_went_out_and_came_in_again_has_the_same_samples(run, tmp_path, name):
     folder = shipped_folder("fixtures") / "sessions" / name
     table = tmp_path / "t.csv"
@@ -113,7 +113,7 @@ def test_rows_say_angle_and_deviation_as_the_circle_has_them(run, tmp_path):
     deviation = np.array([float(row["deviation_um"]) for row in mine])
     np.testing.assert_allclose(deviation, 1e3 * (recording.length_mm - circle.bar_mm), rtol=0, atol=1e-9)
     told = json.loads((tmp_path / "t.csv.provenance.json").read_text(encoding="utf-8"))
-    assert told["inputs"]["sealed/session.yaml"] == session.sha256
+    assert told["inputs"]["logged/session.yaml"] == session.sha256
     assert "µm" in told["columns"]["deviation_um"]
 
 
@@ -129,7 +129,7 @@ def test_parquet_has_the_same_values_with_meaning_and_origin(run, tmp_path):
         texts = [row[name] for row in rows]
         assert ["" if value is None else value if isinstance(value, str) else str(value) for value in values] == texts
     told = json.loads(file.metadata.metadata[b"dbbstation"])
-    assert told["command"].startswith("dbbstation export sealed")
+    assert told["command"].startswith("dbbstation export logged")
     assert file.schema_arrow.field("deviation_um").metadata[b"meaning"]
 
 

@@ -1,4 +1,4 @@
-"""Formats grow: every version stays readable, newer keys raise it, and a file says the oldest version that has its keys."""
+"""Every format has version 1; files of before the first release are refused with the commit that reads them."""
 
 from __future__ import annotations
 
@@ -7,96 +7,37 @@ import re
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.files.formats.every_format import SCHEMAS, json_schema
-from dbbstation.files.formats.machine import MachineFile, read_machine
-from dbbstation.files.formats.plan import PlanFile, read_plan
-from dbbstation.files.recordings.session import read_session
+from dbbstation.files.formats.every_format import SCHEMAS
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.files.yaml.schema import SINCE, format_for, versions_of
-from tests.plant.session import record
-
-FIXTURES = shipped_folder("fixtures")
-STORED = {
-    "dbb-machine/1": FIXTURES / "machines" / "reference.yaml",
-    "dbb-machine/2": FIXTURES / "machines" / "greatest-feed.yaml",
-    "dbb-machine/3": FIXTURES / "machines" / "every-key.yaml",
-    "dbb-jig/1": FIXTURES / "jigs" / "reference-plate.yaml",
-    "dbb-job/1": FIXTURES / "jobs" / "virtual.yaml",
-    "dbb-job/2": FIXTURES / "jobs" / "daily-check.yaml",
-    "dbb-plan/1": shipped_folder("protocols") / "plans" / "table2.yaml",
-    "dbb-plan/2": FIXTURES / "plans" / "every-key.yaml",
-    "dbb-model/1": FIXTURES / "models" / "small.yaml",
-    "dbb-model/2": FIXTURES / "models" / "greatest-feed.yaml",
-    "dbb-model/3": FIXTURES / "models" / "provenance.yaml",
-    "dbb-model/4": FIXTURES / "models" / "null-space.yaml",
-    "dbb-settings/1": FIXTURES / "settings" / "version-1.yaml",
-    "dbb-settings/2": FIXTURES / "settings" / "version-2.yaml",
-    "dbb-settings/3": FIXTURES / "settings" / "version-3.yaml",
-    "dbb-settings/4": FIXTURES / "settings" / "every-key.yaml",
-    "dbb-bar/1": FIXTURES / "bars" / "zerodur.yaml",
-    "dbb-simulator/1": FIXTURES / "simulators" / "pendulum.yaml",
-    "dbb-mapping/1": FIXTURES / "mappings" / "version-1.yaml",
-    "dbb-mapping/2": FIXTURES / "mappings" / "every-key.yaml",
-    "dbb-session/1": FIXTURES / "sessions" / "under-spindle",
-    "dbb-session/2": FIXTURES / "sessions" / "small",
-    "dbb-session/3": FIXTURES / "sessions" / "sealed",
-    "dbb-session/4": FIXTURES / "sessions" / "begun",
-    "dbb-session/5": FIXTURES / "sessions" / "logged",
-    "dbb-session/6": FIXTURES / "sessions" / "virtual",
-}
-"""One stored file of each version."""
+from tests.files.formats.test_schemas import EXAMPLES
 
 
-def test_a_file_of_every_version_is_stored():
-    every = {version for schema in SCHEMAS.values() for version in versions_of(schema)}
-    assert set(STORED) == every
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_every_format_begins_at_one_and_its_examples_are_read(run, name):
+    assert name.endswith("/1")
+    for file in (one for one in EXAMPLES[name] if one.stem != "tank-fmu"):  # its FMU is built by tests
+        assert f"format: {name}\n" in file.read_text(encoding="utf-8")
+        path = file.parent if file.name == "session.yaml" else file
+        outcome = run("check", path, "--json")
+        assert outcome.code == 0, outcome.err
+        assert outcome.data["files"][0]["format"] == name
 
 
-@pytest.mark.parametrize("version", STORED)
-def test_it_is_read(run, version):
-    path = STORED[version]
-    text = (path / "session.yaml" if path.is_dir() else path).read_text(encoding="utf-8")
-    assert f"format: {version}\n" in text
-    outcome = run("check", path, "--json")
-    assert outcome.code == 0, outcome.err
-    assert outcome.data["files"][0]["format"] == version
-
-
-@pytest.mark.parametrize("version", [v for v in STORED if not v.endswith("/1")])
-def test_a_newer_key_in_an_older_version_is_refused_with_what_to_write(run, tmp_path, version):
-    path = STORED[version]
-    file = path / "session.yaml" if path.is_dir() else path
-    name = version.partition("/")[0]
-    older = tmp_path / file.name
-    older.write_text(file.read_text(encoding="utf-8").replace(version, f"{name}/1"), encoding="utf-8")
-    outcome = run("calibrate" if name == "dbb-session" else "check", older)
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_another_version_is_refused_with_the_program_that_reads_it(run, tmp_path, name):
+    file = EXAMPLES[name][0]
+    other = tmp_path / file.name
+    other.write_text(file.read_text(encoding="utf-8").replace(name, name.replace("/1", "/7")), encoding="utf-8")
+    outcome = run("calibrate" if name == "dbb-session/1" else "check", tmp_path if name == "dbb-session/1" else other)
     assert outcome.code == 1
-    keys = {key: since for key, since in SINCE[name].items() if f"{key}:" in older.read_text(encoding="utf-8")}
-    assert int(version.partition("/")[2]) in keys.values()
-    for key, since in keys.items():
-        newer = f"{name}/{since}"
-        fault = rf"{older.name}:\d+:\d+: the key `{key}` came with {newer}, and this file is {name}/1; write `format: {newer}`"
-        assert re.search(fault, outcome.err), outcome.err
+    fault = rf"{file.name}:\d+:\d+: `{name[:-1]}7` is a version that this program does not know; it reads {name}; .*commit [0-9a-f]{{8}}"
+    assert re.search(fault, outcome.err), outcome.err
 
 
-def test_a_version_of_the_future_says_that_a_newer_program_reads_it(tmp_path):
-    text = STORED["dbb-plan/1"].read_text(encoding="utf-8")
-    later = tmp_path / "plan.yaml"
-    later.write_text(text.replace("dbb-plan/1", "dbb-plan/7"), encoding="utf-8")
-    with pytest.raises(InputError, match=r"it reads dbb-plan/1, dbb-plan/2; a newer dbbstation reads the file"):
-        read_plan(later)
-
-
-def test_what_is_written_has_the_oldest_version_that_has_its_keys(tmp_path):
-    assert format_for(PlanFile, {"name": "a", "tests": [{"ball": "b"}]}) == "dbb-plan/1"
-    assert format_for(PlanFile, {"name": "a", "largest_loss_percent": 1.0}) == "dbb-plan/2"
-    assert format_for(MachineFile, {"travel": {"greatest_feed_mm_min": 1000.0}}) == "dbb-machine/2"
-    record(tmp_path / "s", seed=1, rate_hz=4.0)
-    assert len(read_session(tmp_path / "s").runs) > 0
-    assert read_machine(STORED["dbb-machine/2"]).greatest_feed_mm_min is not None
-
-
-def test_the_schema_of_an_older_version_is_that_of_the_newest():
-    assert json_schema("dbb-plan/1") == json_schema("dbb-plan/2")
-    with pytest.raises(KeyError):
-        json_schema("dbb-plan/3")
+def test_a_plan_of_a_later_program_may_be_read_by_that(tmp_path):
+    plan = tmp_path / "plan.yaml"
+    shipped = (shipped_folder("protocols") / "plans" / "table2.yaml").read_text(encoding="utf-8")
+    plan.write_text(shipped.replace("dbb-plan/1", "dbb-plan/2"), encoding="utf-8")
+    with pytest.raises(InputError, match="a newer dbbstation may read the file"):
+        read_plan(plan)

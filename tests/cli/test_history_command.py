@@ -239,7 +239,7 @@ def test_one_session_cannot_tell(tmp_path):
 
 
 def test_a_damaged_session_is_named_and_left_out(few):
-    (few / "w002" / "session.yaml").write_text("format: dbb-session/2\nruns: 7\n", encoding="utf-8")
+    (few / "w002" / "session.yaml").write_text("format: dbb-session/1\nruns: 7\n", encoding="utf-8")
     run = few / "w003" / "runs" / "a-cw-2.csv"
     run.write_bytes(run.read_bytes()[:-40])
     outcome = call("history", few, "--json")

@@ -82,7 +82,7 @@ def test_runs_that_turn_round_in_one_file_are_asked_about_and_parted(run, tmp_pa
     runs, session = runs_of(tmp_path / "s")
     assert list(runs) == ["a-ccw-1", "a-cw-1", "a-ccw-2"]
     np.testing.assert_allclose(session.load(runs["a-cw-1"]).recording.theta_deg[0], 359.0, atol=1.01)
-    assert "dbb-mapping/2" in (tmp_path / "m.yaml").read_text("utf-8")
+    assert "dbb-mapping/1" in (tmp_path / "m.yaml").read_text("utf-8")
     assert run("check", tmp_path / "m.yaml").code == DONE
 
 

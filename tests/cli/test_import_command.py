@@ -150,7 +150,7 @@ def test_a_mapping_is_kept_for_the_next_time_and_decides_then(run, tmp_path):
 
 def settings(tmp_path, decimal, separator):
     path = tmp_path / "shop.yaml"
-    path.write_text(f'format: dbb-settings/2\nnumbers: {{decimal: "{decimal}", separator: "{separator}"}}\n', "utf-8")
+    path.write_text(f'format: dbb-settings/1\nnumbers: {{decimal: "{decimal}", separator: "{separator}"}}\n', "utf-8")
     return path
 
 

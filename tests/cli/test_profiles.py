@@ -70,7 +70,7 @@ def test_instruments_shows_the_profile_and_names_the_others(run):
 
 def settings(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "own.yaml"
-    path.write_text(f"format: dbb-settings/2\n{text}")
+    path.write_text(f"format: dbb-settings/1\n{text}")
     return path
 
 

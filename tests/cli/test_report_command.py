@@ -193,7 +193,7 @@ def test_traces_can_be_read_off(session, written):
 def settings(tmp_path, *limits):
     path = tmp_path / "settings.yaml"
     lines = [f"  - {{quantity: {name}, largest: {largest}, unit: µm}}\n" for name, largest in limits]
-    path.write_text("format: dbb-settings/2\ntolerances:\n" + "".join(lines), "utf-8")
+    path.write_text("format: dbb-settings/1\ntolerances:\n" + "".join(lines), "utf-8")
     return path
 
 

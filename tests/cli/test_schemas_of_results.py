@@ -18,5 +18,5 @@ def test_a_wrong_document_is_noticed(run):
 def test_a_command_without_a_schema_is_said(run):
     outcome = run("check", "--schema", "calibrat")
     assert outcome.code == 2
-    assert "dbb-plan/2" in outcome.err
+    assert "dbb-plan/1" in outcome.err
     assert "calibrate" in outcome.err

@@ -1,8 +1,7 @@
-"""Makes the session `virtual` of `fixtures` and `fixtures/models` anew: `python -m tests.files.make_fixtures`.
+"""Makes the recorded sessions `logged`, `begun` and `virtual` of `fixtures`, and `fixtures/models`, anew: `python -m tests.files.make_fixtures`.
 
-The other sessions are of older versions of the format and stay as those wrote them; `make_session` and
-`make_conventional_session` say what they hold. The recordings of `small` and `sealed` come from the independent virtual machine of tests/plant, those of `under-spindle` from that of
-`emulate`; the numbers of the model are made up.
+`small` and `under-spindle` are sessions without a seal, as people write them by hand; their recordings stay. The recordings of `small` and `logged` come from
+the independent virtual machine of tests/plant, those of `under-spindle` from that of `emulate`; the numbers of the model are made up.
 """
 
 from __future__ import annotations
@@ -80,7 +79,7 @@ def make_session(folder: Path) -> None:
                 for t_s, length_mm in zip(samples.t_s, samples.length_mm, strict=True):
                     journal.append((t_s, length_mm, 20.3, "ok"))
                 entry = writer.finish_run(journal, Counts(journal.samples, int(bumped), {}))
-            writer.judge(entry, accepted=not bumped, reason="operator")
+            writer.judge(entry, accepted=not bumped, reason="operator" if bumped else "")
         writer.note(Note(BEGUN + timedelta(minutes=14), "the gate was opened", 20.1))
         with writer.start_run("l", Direction.CW, names, started=started, mounting=3) as journal:
             journal.append((0.0, 151.5, 20.3, "ok"))
@@ -166,25 +165,34 @@ def make_models(folder: Path) -> None:
         {session.name: session.sha256},
     )
     write_model(folder / "small.yaml", model, force=True)
-    faster = replace(machine, greatest_feed_mm_min=20_000.0)
-    model = replace(model, model=MachineModel(faster, fitted))
-    write_model(folder / "greatest-feed.yaml", model, force=True)
     origin = Provenance("dbbstation 0.1.0", "dbbstation calibrate small", {"small/session.yaml": session.sha256})
-    write_model(folder / "provenance.yaml", model, provenance=origin, force=True)
-    unseen = replace(
+    planned = replace(machine, greatest_feed_mm_min=20_000.0, acceleration_mm_s2=1500.0)
+    every = replace(
         model,
+        model=MachineModel(planned, fitted),
         directions_lost=("all six struts together in length",),
         null_space=np.array([[0.08] * 6 + [0.0] * 4]),
         formula_variance=np.array([1e-8] * 6 + [0.0] * 4),
     )
-    write_model(folder / "null-space.yaml", unseen, provenance=origin, force=True)
-    planned = replace(faster, acceleration_mm_s2=1500.0)
-    model = replace(model, model=MachineModel(planned, fitted))
-    write_model(folder / "acceleration.yaml", model, provenance=origin, force=True)
+    write_model(folder / "every-key.yaml", every, provenance=origin, force=True)
+
+
+def make_begun_session(folder: Path) -> None:
+    """A session that ended before its first circle."""
+    whole = read_session(FIXTURES / "sessions" / "logged")
+    plan = read_inline_plan(FIXTURES / "sessions" / "logged" / "plan.yaml")
+    details = SessionDetails(job="order 4711")
+    with SessionWriter.create(folder, whole.machine, plan, details, lambda: BEGUN):
+        pass
+    (folder / ".lock").unlink()
 
 
 if __name__ == "__main__":
-    # The others were written by former versions, and stay: every version is read.
-    shutil.rmtree(FIXTURES / "sessions" / "virtual", ignore_errors=True)
-    make_virtual_session(FIXTURES / "sessions" / "virtual")
+    for name, made in (
+        ("logged", make_session),
+        ("begun", make_begun_session),
+        ("virtual", make_virtual_session),
+    ):
+        shutil.rmtree(FIXTURES / "sessions" / name, ignore_errors=True)
+        made(FIXTURES / "sessions" / name)
     make_models(FIXTURES / "models")

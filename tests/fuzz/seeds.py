@@ -251,7 +251,7 @@ def _seeds() -> list[Seed]:
             1,
         ),
     ]
-    for name, share in (("small", 1.5), ("sealed", 0.7), ("under-spindle", 0.7), ("begun", 1.0)):
+    for name, share in (("small", 1.5), ("logged", 0.7), ("under-spindle", 0.7), ("begun", 1.0)):
         files = _of(FIXTURES / "sessions" / name, "s/")
         commands = {
             "check s": 3,

@@ -146,7 +146,7 @@ def test_stx_is_the_request_and_the_prefix_of_the_reply() -> None:
 def test_without_a_decimal_point_the_resolution_comes_from_the_profile(tmp_path: Path) -> None:
     raw = b"\x02+000150000\r\n"
     assert decode(load_instrument("heidenhain-nd281b", "a0200"), raw).length_mm == pytest.approx(15.0)
-    text = """format: dbb-instrument/3
+    text = """format: dbb-instrument/1
 name: gauge
 title: A display step of 1 µm as the usual one, 0.1 µm as a profile
 profile: micrometre
@@ -259,7 +259,7 @@ def test_a_relative_gauge_needs_the_length_at_its_zero() -> None:
         with_zero(load_instrument("heidenhain-nd281b"), 150.0)
 
 
-NEW = """format: dbb-instrument/3
+NEW = """format: dbb-instrument/1
 name: millimar-c1240
 title: Mahr Millimar C1208, C1216 or C1240, interface protocol OPTORSD
 references:

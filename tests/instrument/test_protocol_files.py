@@ -17,7 +17,7 @@ GOOD = r"""format: dbb-instrument/1
 name: gauge
 title: A gauge
 line: {baud: 9600}
-ask: {mode: request, request: "?"}
+ask: {mode: latch, request: "?"}
 length: {unit: mm, range_mm: [0, 100]}
 frames:
   - parts:
@@ -68,7 +68,7 @@ def test_a_name_that_is_not_known_brings_the_nearest() -> None:
         ("baud: 9600", "baudd: 9600", "gauge.yaml:4:8: line: the key `baudd` is not known; did you mean `baud`?"),
         ("timeout_s: 1", "timeout_s: soon", "gauge.yaml:11:21: timing.timeout_s: a number was expected"),
         ("name: gauge", "name: other", "gauge.yaml:2:7: the name 'other' is not the file's; rename the file"),
-        ("mode: request", "mode: stream", "gauge.yaml:5:6: ask: value error, mode request has request bytes"),
+        ("mode: latch", "mode: stream", "gauge.yaml:5:6: ask: value error, modes poll and latch have request bytes"),
         ("[0, 100]", "[100, 0]", "length: value error, range_mm is [lowest, highest]"),
         ("unit: mm", "unit: count", "length: value error, unit count, and only it, needs mm_per_count"),
         ('value: "\\r"', 'value: "\u20ac"', "characters on a wire are bytes"),
@@ -105,39 +105,18 @@ def test_the_instruments_need_nothing_of_ours_but_errors_and_files() -> None:
     assert set(done.stdout.split()) == {"catalogue", "errors", "files", "instrument", "system", "text"}
 
 
-THIRD = GOOD.replace("dbb-instrument/1", "dbb-instrument/3")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "fault"),
-    [
-        ("mode: request", "mode: poll", "`poll` came with dbb-instrument/3"),
-        (
-            "kind: decimal,",
-            "kind: decimal, scale: 0.001,",
-            "the key `scale` came with dbb-instrument/3, and this file is",
-        ),
-        ("timing:", "profiles: {x: {title: x}}\ntiming:", "the key `profiles` came with dbb-instrument/3"),
-    ],
-)
-def test_what_is_new_needs_the_third_version(tmp_path: Path, old: str, new: str, fault: str) -> None:
-    assert fault in faults_of(tmp_path, GOOD.replace(old, new))
-    (tmp_path / "gauge.yaml").write_text(THIRD.replace(old, new), encoding="utf-8")
-    assert read_protocol(tmp_path / "gauge.yaml").format == "dbb-instrument/3"
-
-
 @pytest.mark.parametrize(
     ("added", "fault"),
     [
         ("profiles: {x: {title: x, line: {baud: -1}}}", "gauge.yaml:12:39: line.baud: "),
         ("profiles: {x: {title: x, lenght: {unit: mm}}}", "the key `lenght` is not known; did you mean `length`?"),
-        ('profiles: {x: {title: x, ask: {request: ""}}}', "mode request has request bytes"),
+        ('profiles: {x: {title: x, ask: {request: ""}}}', "modes poll and latch have request bytes"),
         ("profiles: {X: {title: x}}", "profiles.X"),
         ("profiles: {x: {title: x, length: {range_mm: [5, 1]}}}", "range_mm is [lowest, highest]"),
     ],
 )
 def test_every_profile_is_checked_when_the_file_is_read(tmp_path: Path, added: str, fault: str) -> None:
-    assert fault in faults_of(tmp_path, f"{THIRD}{added}\n")
+    assert fault in faults_of(tmp_path, f"{GOOD}{added}\n")
 
 
 @pytest.mark.parametrize(
@@ -159,11 +138,11 @@ def test_every_profile_is_checked_when_the_file_is_read(tmp_path: Path, added: s
     ],
 )
 def test_frames_that_make_no_sense_are_refused(tmp_path: Path, frame: str, fault: str) -> None:
-    assert fault in faults_of(tmp_path, THIRD.replace("timing:", f"  - {frame}\ntiming:"))
+    assert fault in faults_of(tmp_path, GOOD.replace("timing:", f"  - {frame}\ntiming:"))
 
 
 def test_a_number_may_stand_for_more_than_its_digits(tmp_path: Path) -> None:
-    text = THIRD.replace("width: 8, decimals: 3", 'width: 9, pad: "0", scale: 0.0001')
+    text = GOOD.replace("width: 8, decimals: 3", 'width: 9, pad: "0", scale: 0.0001')
     (tmp_path / "gauge.yaml").write_text(text, encoding="utf-8")
     protocol = read_protocol(tmp_path / "gauge.yaml")
     assert encode(protocol, 15.00031) == b"000150003\r"
@@ -171,8 +150,8 @@ def test_a_number_may_stand_for_more_than_its_digits(tmp_path: Path) -> None:
 
 
 def test_bounds_of_the_latch_stand_instead_of_its_delay(tmp_path: Path) -> None:
-    both = THIRD.replace("timeout_s: 1", "timeout_s: 1, latch_delay_s: 0.1, latch_bounds_s: [0, 0.1]")
+    both = GOOD.replace("timeout_s: 1", "timeout_s: 1, latch_delay_s: 0.1, latch_bounds_s: [0, 0.1]")
     assert "stands instead of latch_delay_s" in faults_of(tmp_path, both)
     assert "[earliest, latest]" in faults_of(
-        tmp_path, THIRD.replace("timeout_s: 1", "timeout_s: 1, latch_bounds_s: [0.2, 0.1]")
+        tmp_path, GOOD.replace("timeout_s: 1", "timeout_s: 1, latch_bounds_s: [0.2, 0.1]")
     )

@@ -52,7 +52,7 @@ format: dbb-instrument/1
 name: laser-head
 title: Laser displacement head
 line: {baud: 38400, parity: odd}
-ask: {mode: request, request: "M1\r"}
+ask: {mode: latch, request: "M1\r"}
 length: {unit: um, range_mm: [-10, 10]}
 frames:
   - parts:

@@ -40,7 +40,7 @@ bar: {serial_number: DBB-0042, calibrated_length_mm: 150.0, calibrator_uncertain
 
 def settings_in(folder):
     path = folder / "settings.yaml"
-    path.write_text("format: dbb-settings/3\ntolerances:\n" + "".join(f"  - {one}\n" for one in LIMITS), "utf-8")
+    path.write_text("format: dbb-settings/1\ntolerances:\n" + "".join(f"  - {one}\n" for one in LIMITS), "utf-8")
     return path
 
 
@@ -48,7 +48,7 @@ def complete(folder):
     path = folder / "session.yaml"
     head, runs = path.read_text("utf-8").split("runs:\n")
     kept = [line for line in head.splitlines() if line.partition(":")[0] in {"machine", "plan"}]
-    path.write_text("\n".join(["format: dbb-session/5", *kept, KNOWN]) + "runs:\n" + runs, "utf-8")
+    path.write_text("\n".join(["format: dbb-session/1", *kept, KNOWN]) + "runs:\n" + runs, "utf-8")
     outcome = call("session", "seal", folder)
     assert outcome.code == DONE, outcome.err
     return folder

@@ -54,7 +54,7 @@ def _report(folder):
         "{quantity: mean-radial-error, largest: 5.3, unit: µm, tests: [a], directions: [ccw]}",
     )
     settings = folder / "settings.yaml"
-    settings.write_text("format: dbb-settings/2\ntolerances:\n" + "".join(f"  - {one}\n" for one in limits), "utf-8")
+    settings.write_text("format: dbb-settings/1\ntolerances:\n" + "".join(f"  - {one}\n" for one in limits), "utf-8")
     out = folder / "report.html"
     outcome = call(
         "--settings", settings, "report", sealed, "--before", SMALL, "--model", MODEL, "--job", "12", "--out", out

@@ -374,7 +374,7 @@ def test_what_the_command_line_says_holds_for_the_virtual_machine_too(front: Fro
 
 def test_a_temperature_is_never_noted_before_what_was_noted_already(tmp_path: Path) -> None:
     folder = tmp_path / "session"
-    shutil.copytree(SMALL.parent / "sealed", folder)
+    shutil.copytree(SMALL.parent / "logged", folder)
     ahead = datetime.now(UTC) + timedelta(minutes=5)
     with SessionWriter.open(folder) as writer:
         writer.note(Note(ahead, ambient_temp_c=20.0))

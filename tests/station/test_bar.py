@@ -113,7 +113,7 @@ def test_places_on_a_plate_need_a_bar_that_was_read_lately(bar: Bar | None, why:
 def test_the_shop_sets_the_age(tmp_path: Path) -> None:
     check_bar_known(replace(BAR, calibrated=NOW - timedelta(hours=99)), PLATE, NOW, largest_age_h=100.0)
     settings = tmp_path / "own.yaml"
-    settings.write_text("format: dbb-settings/2\nlimits: {largest_bar_age_h: 1}\n", encoding="utf-8")
+    settings.write_text("format: dbb-settings/1\nlimits: {largest_bar_age_h: 1}\n", encoding="utf-8")
     bar = (shipped_folder("fixtures") / "bars" / "zerodur.yaml").read_text(encoding="utf-8")
     then = datetime.now(UTC) - timedelta(hours=2)
     file = tmp_path / "bar.yaml"
@@ -160,7 +160,7 @@ def test_a_bar_that_reads_long_by_its_calibration_changes_no_result(tmp_path: Pa
     text = text.replace(
         f"calibrated_length_mm: {length}", f"calibrated_length_mm: {length}, reading_mm: {float(length) + 0.010}"
     )
-    file.write_text(text.replace("dbb-session/1", "dbb-session/3"), encoding="utf-8")
+    file.write_text(text.replace("dbb-session/1", "dbb-session/1"), encoding="utf-8")
     assert call("session", "seal", shifted).code == 0
     assert read_session(shifted).bar.reads_long_mm(None)[0] == pytest.approx(0.010)
     values = []

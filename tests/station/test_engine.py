@@ -278,4 +278,4 @@ def test_what_is_noted_is_kept_with_its_time(plan_file: Path, tmp_path: Path) ->
     assert [(note.text, note.ambient_temp_c) for note in notes] == [("a draught from the gate", None), ("", 21.5)]
     assert all(before - timedelta(seconds=1) <= note.made <= datetime.now(UTC) for note in notes)
     text = (tmp_path / "session" / "session.yaml").read_text(encoding="utf-8")
-    assert text.startswith("format: dbb-session/5")
+    assert text.startswith("format: dbb-session/1")

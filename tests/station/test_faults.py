@@ -129,7 +129,7 @@ def test_a_run_that_lost_more_than_the_plan_allows_is_measured_again(one_circle:
 
 def test_a_plan_may_allow_more(one_circle: Path, tmp_path: Path) -> None:
     out = tmp_path / "session"
-    text = one_circle.read_text(encoding="utf-8").replace("dbb-plan/1", "dbb-plan/2")
+    text = one_circle.read_text(encoding="utf-8").replace("dbb-plan/1", "dbb-plan/1")
     one_circle.write_text(text + "largest_loss_percent: 5\n", encoding="utf-8")
     with bench(one_circle, scale=30.0) as place:
         code, said = spoilt(place, out, lambda: place.wire.drop_samples(60))

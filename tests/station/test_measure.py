@@ -211,7 +211,7 @@ def test_a_session_goes_on_with_its_micrometer_readings(tmp_path: Path) -> None:
     shutil.copytree(source, out)
     text = (out / "session.yaml").read_text(encoding="utf-8")
     # It says that it is of a virtual machine; as an older program wrote it, it takes no virtual circles.
-    virtual = "format: dbb-session/6\ninstrument: {name: streaming-encoder, virtual: true}"
+    virtual = "format: dbb-session/1\ninstrument: {name: streaming-encoder, virtual: true}"
     text = re.sub("format: dbb-session/.", virtual, text)
     kept = [line for line in text.splitlines() if not line.startswith("  - {test: g, direction: cw")]
     (out / "runs" / "g-cw-1.csv").unlink()

@@ -72,7 +72,7 @@ def test_session_and_runs_say_what_read_them(plan_file: Path, tmp_path: Path) ->
     assert (session.instrument, session.virtual) == (REAL, False)
     assert [run.instrument for run in session.runs] == [REAL]
     text = (session.folder / "session.yaml").read_text(encoding="utf-8")
-    assert text.startswith("format: dbb-session/6\n")
+    assert text.startswith("format: dbb-session/1\n")
     assert text.count("virtual: false") == 2
     stored = read_session(SESSIONS / "virtual")
     assert stored.virtual is True

@@ -23,7 +23,7 @@ def machines(folder, count, tests="abd", seed=36):
         plan = subset(table_ii_plan(seed + k), list(tests))
         record(session, seed=seed + k, plan=plan, mechanisms=[errors], rate_hz=10.0)
         path = session / "session.yaml"
-        text = path.read_text("utf-8").replace("dbb-session/1", "dbb-session/5", 1)
+        text = path.read_text("utf-8").replace("dbb-session/1", "dbb-session/1", 1)
         path.write_text(text.replace("ambient_temp_c:", f"serial_number: M{k:02d}\nambient_temp_c:", 1), "utf-8")
     return folder
 

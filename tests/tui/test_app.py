@@ -427,7 +427,7 @@ def test_the_temperature_after_circles_is_asked_for_before_the_session_is_left()
 
 def test_behind_the_last_circle_it_is_written_into_the_session(tmp_path: Path) -> None:
     folder = tmp_path / "session"
-    shutil.copytree(shipped_folder("fixtures") / "sessions" / "sealed", folder)
+    shutil.copytree(shipped_folder("fixtures") / "sessions" / "logged", folder)
     happening = finished()
     opened = replace(happening.events[0], session=str(folder))
 
@@ -451,7 +451,7 @@ def test_the_footer_names_results_when_the_plan_is_through(
     tmp_path: Path, happening: Callable[[], Happening], *, shown: bool
 ) -> None:
     folder = tmp_path / "session"
-    shutil.copytree(shipped_folder("fixtures") / "sessions" / "sealed", folder)
+    shutil.copytree(shipped_folder("fixtures") / "sessions" / "logged", folder)
     happens = happening()
     happens.events[0] = replace(happens.events[0], session=str(folder))
     found: list[bool] = []
@@ -466,7 +466,7 @@ def test_the_footer_names_results_when_the_plan_is_through(
 
 def test_a_session_that_another_process_writes_into_says_so_and_can_be_left(tmp_path: Path) -> None:
     folder = tmp_path / "session"
-    shutil.copytree(shipped_folder("fixtures") / "sessions" / "sealed", folder)
+    shutil.copytree(shipped_folder("fixtures") / "sessions" / "logged", folder)
     happening = finished()
     happening.events[0] = replace(happening.events[0], session=str(folder))
 

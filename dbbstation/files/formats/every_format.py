@@ -14,12 +14,12 @@ from dbbstation.files.formats.plan import PlanFile
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.formats.simulator import SimulatorFile
-from dbbstation.files.yaml.schema import format_of, versions_of
+from dbbstation.files.yaml.schema import format_of
 
 if TYPE_CHECKING:
     from dbbstation.files.yaml.schema import Schema
 
-_NEWEST = (
+_SCHEMAS = (
     BarFile,
     JigFile,
     JobFile,
@@ -32,19 +32,18 @@ _NEWEST = (
     SimulatorFile,
 )
 
-SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _NEWEST}
-"""Schema of each format by its name with its newest version, which has all keys of those before."""
+SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _SCHEMAS}
+"""Schema of each format by its name with its version."""
 
 
 def json_schema(name: str) -> dict[str, object]:
     """Return the JSON Schema of a format, with units and plausible ranges.
 
     Args:
-        name: with any version that is read.
+        name: such as `dbb-plan/1`.
 
     Raises:
         KeyError: no format has this name.
     """
-    newest = next((known for known, schema in SCHEMAS.items() if name in versions_of(schema)), name)
-    schema = SCHEMAS[newest].model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": newest}
+    schema = SCHEMAS[name].model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": name}

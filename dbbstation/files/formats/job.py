@@ -1,4 +1,4 @@
-"""`dbb-job/2`, which has all of `/1`: a measurement that an operator runs again and again, with everything that was decided about it beforehand."""
+"""`dbb-job/1`: a measurement that an operator runs again and again, with everything that was decided about it beforehand."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -23,7 +23,7 @@ MayChange = Literal["operator", "order", "port", "temperature"]
 class JobFile(Schema):
     """A measurement with its limits: what, on what, by what, and what the operator may change."""
 
-    format: Literal["dbb-job/1", "dbb-job/2"]
+    format: Literal["dbb-job/1"]
     """Name and version of this format."""
     name: _Text
     """What the operator reads."""

@@ -1,4 +1,4 @@
-"""`dbb-machine/3`, which has all of `dbb-machine/2` and `/1`: the nominal machine, as its controller believes it."""
+"""`dbb-machine/1`: the nominal machine, as its controller believes it."""
 
 import math
 from dataclasses import asdict
@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import Schema, format_for, read_document, validate
+from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
 from dbbstation.machine.geometry import Compliance, Hexapod, JointAxes, Machine, Masses, StrutMasses, Travel
 from dbbstation.machine.rotation import Rotation
 
@@ -200,7 +200,7 @@ def machine_parts(machine: Machine) -> MachineParts:
 def machine_text(machine: Machine) -> str:
     """Return the text of a machine's file."""
     data = machine_data(machine_parts(machine))
-    return yaml_text({"format": format_for(MachineFile, data), **data})
+    return yaml_text({"format": format_of(MachineFile), **data})
 
 
 def machine_data(parts: MachineParts) -> dict[str, object]:
@@ -211,7 +211,7 @@ def machine_data(parts: MachineParts) -> dict[str, object]:
 class MachineFile(MachineParts):
     """A hexapod machine tool as its controller believes it: joints, travel, screws, masses."""
 
-    format: Literal["dbb-machine/1", "dbb-machine/2", "dbb-machine/3"]
+    format: Literal["dbb-machine/1"]
     """Name and version of this format."""
 
 

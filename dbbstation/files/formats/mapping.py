@@ -1,4 +1,4 @@
-"""`dbb-mapping/2`, which has all of `/1`: what the columns of a recording made elsewhere mean, written once and used for every file of its kind."""
+"""`dbb-mapping/1`: what the columns of a recording made elsewhere mean, written once and used for every file of its kind."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.number_language import PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import Schema, format_for, read_document, validate
+from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
 from dbbstation.trace import columns
 from dbbstation.trace.columns import ColumnKind
 
@@ -113,7 +113,7 @@ class AngleSchema(Schema):
 class MappingFile(Schema):
     """What the columns of recordings made elsewhere mean."""
 
-    format: Literal["dbb-mapping/1", "dbb-mapping/2"]
+    format: Literal["dbb-mapping/1"]
     """Name and version of this format."""
     name: Annotated[str, Field(min_length=1)] | None = None
     """What people call the program that wrote the files."""
@@ -207,7 +207,7 @@ def read_mapping(path: Path) -> MappingFile:
 def mapping_text(mapping: MappingFile) -> str:
     """Return the text of a mapping's file."""
     data = mapping.model_dump(exclude_none=True, exclude_defaults=True)
-    return yaml_text({**data, "format": format_for(MappingFile, data)})
+    return yaml_text({**data, "format": format_of(MappingFile)})
 
 
 def write_mapping(path: Path, mapping: MappingFile) -> None:

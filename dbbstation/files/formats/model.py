@@ -16,7 +16,7 @@ from dbbstation.files.formats.machine import machine_data, machine_parts
 from dbbstation.files.formats.model_schema import CovarianceSchema, ModelFile, SourceSchema
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import dotted, format_for, read_document, validate
+from dbbstation.files.yaml.schema import dotted, format_of, read_document, validate
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import ErrorSource, Fitted, Owner
@@ -254,7 +254,7 @@ def model_text(model: IdentifiedModel, provenance: Provenance | None = None) -> 
     data = model_data(model)
     if provenance is not None:
         data["provenance"] = provenance.data()
-    return yaml_text({**data, "format": format_for(ModelFile, data)})
+    return yaml_text({**data, "format": format_of(ModelFile)})
 
 
 def model_data(model: IdentifiedModel) -> dict[str, object]:
@@ -282,7 +282,7 @@ def model_data(model: IdentifiedModel) -> dict[str, object]:
         "report": dict(model.report),
         "sessions": dict(model.sessions),
     }
-    return {"format": format_for(ModelFile, data), **data}
+    return {"format": format_of(ModelFile), **data}
 
 
 def _source_data(fitted: Fitted, machine: Machine) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""`dbb-model/4`, which has all of the versions before: an identified machine model with the uncertainty and provenance of its numbers."""
+"""`dbb-model/1`: an identified machine model with the uncertainty and provenance of its numbers."""
 
 from typing import Annotated, Literal
 
@@ -44,7 +44,7 @@ class CovarianceSchema(Schema):
     variance."""
     formula_variance: tuple[float, ...] | None = None
     """Part of each row's variance that is what the formula of its source may be off by, the same in every session of a machine;
-    absent where none is, and in files of older programs, whose matrix is without it."""
+    absent where none is."""
 
 
 class ProvenanceSchema(Schema):
@@ -64,7 +64,7 @@ class ModelFile(Schema):
     Every key but `null_space` and `provenance` is required, empty where there is nothing to say, so that a file that was cut short is noticed.
     """
 
-    format: Literal["dbb-model/1", "dbb-model/2", "dbb-model/3", "dbb-model/4"]
+    format: Literal["dbb-model/1"]
     """Name and version of this format."""
     machine: MachineParts
     """The nominal machine, as in a `dbb-machine/1` file."""
@@ -78,10 +78,10 @@ class ModelFile(Schema):
     """What the recordings could not determine, in words; held at nominal, or prescribed parameters in its place."""
     null_space: tuple[tuple[float, ...], ...] | None = None
     """The same in numbers: combinations of the covariance's rows, each at its plausible size in the parameters' units; absent
-    where nothing was lost, and in files of older programs."""
+    where nothing was lost."""
     report: dict[str, object]
     """What the fit reported, by name."""
     sessions: dict[str, Sha256Hex]
     """SHA-256 of each session file that the model comes from, by folder name."""
     provenance: ProvenanceSchema | None = None
-    """Where the model comes from; absent in files of older programs and in models that were written by hand."""
+    """Where the model comes from; absent in models that were written by hand."""

@@ -1,4 +1,4 @@
-"""`dbb-plan/2`, which has all of `dbb-plan/1`: which circles are measured, about which balls."""
+"""`dbb-plan/1`: which circles are measured, about which balls."""
 
 import math
 from dataclasses import dataclass
@@ -109,7 +109,7 @@ class TestSchema(Schema):
 class PlanFile(Schema):
     """Circles to be measured: jig, holders, balls and tests."""
 
-    format: Literal["dbb-plan/1", "dbb-plan/2"]
+    format: Literal["dbb-plan/1"]
     """Name and version of this format."""
     name: Annotated[str, Field(min_length=1)]
     """What people call the plan."""

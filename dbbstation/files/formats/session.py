@@ -1,4 +1,4 @@
-"""`dbb-session/6`, which has all of `dbb-session/1` to `/5`: what was done in a session, one entry per run."""
+"""`dbb-session/1`: what was done in a session, one entry per run."""
 
 from datetime import datetime
 from pathlib import PurePosixPath
@@ -129,7 +129,7 @@ class RunSchema(Schema):
     counts: CountsSchema | None = None
     """Samples received, rejected and lost; absent where the recording was made elsewhere."""
     instrument: InstrumentSchema | None = None
-    """What read it; absent in runs of older programs and in recordings made elsewhere."""
+    """What read it; absent in recordings made elsewhere."""
     program: ProgramSchema | None = None
     """What was commanded, where that was not the plan's nominal circle."""
     centre_mm: Point | None = None
@@ -185,7 +185,7 @@ class SealSchema(Schema):
     chain_sha256: Sha256Hex | None = None
     """`chain_sha256` of the last of them; absent where there is none."""
     log: LogSchema | None = None
-    """The event log that covers everything in this file; absent in sessions of older programs."""
+    """The event log that covers everything in this file; every seal that is read names one."""
 
 
 class AmendmentSchema(Schema):
@@ -219,9 +219,7 @@ class NoteSchema(Schema):
 class SessionFile(Schema):
     """What was done: where the machine and plan stand, the bar, one entry per run."""
 
-    format: Literal[
-        "dbb-session/1", "dbb-session/2", "dbb-session/3", "dbb-session/4", "dbb-session/5", "dbb-session/6"
-    ]
+    format: Literal["dbb-session/1"]
     """Name and version of this format."""
     machine: InsidePath
     """The nominal model that the controller had while measuring, `dbb-machine/1`."""
@@ -236,13 +234,13 @@ class SessionFile(Schema):
     ambient_temp_c: TemperatureDegc | None = None
     """Temperature of the shop [degC]."""
     instrument: InstrumentSchema | None = None
-    """What the session was begun with; all its runs are virtual, or none. Absent in sessions of older programs."""
+    """What the session was begun with; all its runs are virtual, or none."""
     bar: BarSchema | None = None
     """The bar."""
     bar_waiver: str = ""
     """Why it was measured without a fresh calibration of the bar."""
     seal: SealSchema | None = None
-    """What was sealed; absent in sessions of older programs and in those that were written by hand."""
+    """What was sealed; absent in sessions that were written by hand."""
     amendments: tuple[AmendmentSchema, ...] = ()
     """What was changed on purpose after it was sealed, oldest first."""
     notes: tuple[NoteSchema, ...] = ()

@@ -1,4 +1,4 @@
-"""`dbb-settings/4`, which has all of its former versions: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
+"""`dbb-settings/1`: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
 
 from typing import Annotated, Literal
 
@@ -109,7 +109,7 @@ class ToleranceSettings(Schema):
 class SettingsFile(Schema):
     """What holds in a shop where the command line says nothing else; every key but the format may be absent."""
 
-    format: Literal["dbb-settings/1", "dbb-settings/2", "dbb-settings/3", "dbb-settings/4"]
+    format: Literal["dbb-settings/1"]
     """Name and version of this format."""
     instrument: _Word | None = None
     """Name of an instrument, or path of a protocol file from this file's folder."""

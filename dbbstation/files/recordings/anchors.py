@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
 from dbbstation.files.recordings.event_log import read_event_log
-from dbbstation.files.recordings.session_name import SESSION_FILE
-from dbbstation.files.yaml.text import load_yaml
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,17 +17,14 @@ SHORTEST = 16
 
 
 def anchor_of(seal: Seal | None) -> str:
-    """Return a session's anchor: its last event, else the end of its chain of runs; empty without a seal."""
-    return "" if seal is None else seal.anchor or seal.chain_sha256
+    """Return a session's anchor, its last event; empty without a seal."""
+    return "" if seal is None else seal.anchor
 
 
 def links_of(folder: Path) -> tuple[str, ...]:
     """Return every anchor that a session has had, by its files."""
     log = read_event_log(folder, [])
-    document = load_yaml(folder / SESSION_FILE, [])
-    runs = () if document is None else document.entries("runs")
-    chain = tuple(str(run["chain_sha256"]) for _, run in runs if "chain_sha256" in run)
-    return (*chain, *(() if log is None else log.links))
+    return () if log is None else log.links
 
 
 def anchor_told(folder: Path, anchor: str) -> Problem:
@@ -45,8 +40,5 @@ def anchor_told(folder: Path, anchor: str) -> Problem:
             when = "" if event.at is None else f", {event.at:%Y-%m-%d %H:%M %Z}"
             what = f"the anchor {anchor[:SHORTEST]} is event {number} of {len(events)}{when}: nothing before it was changed"
             return Problem(str(folder), 0, 0, what)
-    if any(link.startswith(anchor) for link in links_of(folder)):
-        what = f"the anchor {anchor[:SHORTEST]} is in the chain of its runs: no recording before it was changed"
-        return Problem(str(folder), 0, 0, what)
     what = f"the anchor {anchor[:SHORTEST]} is not in this session: it is another one, or was written anew since"
     return Problem(str(folder), 0, 0, what, "compare it with a backup")

@@ -31,7 +31,7 @@ from dbbstation.files.recordings.session_store import SessionStore, log_faults
 from dbbstation.files.recordings.session_text import seal_data
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import format_for, validate
+from dbbstation.files.yaml.schema import validate
 from dbbstation.files.yaml.text import parse_yaml
 
 if TYPE_CHECKING:
@@ -195,18 +195,14 @@ def _with_links(text: str, path: Path, runs: Sequence[RunEntry]) -> tuple[str, t
 
 
 def _with_seal(text: str, seal: Seal) -> str:
-    """Return the text with the seal above the runs, in the oldest version with all keys."""
-    yaml = YAML(typ="safe", pure=True)
-    root = yaml.compose(text)
+    """Return the text with the seal above the runs."""
+    root = YAML(typ="safe", pure=True).compose(text)
     starts = {name.value: name.start_mark.index for name, _ in root.value}
     begin = starts.get("seal", starts.get("set_up_errors", starts["runs"]))
     after = [start for start in starts.values() if start > begin]
     end = begin if "seal" not in starts else min(after, default=len(text))
     line = yaml_text({"seal": seal_data(seal)})
-    given = next(value for name, value in root.value if name.value == "format")
-    text = text[:begin] + line + text[end:]
-    version = format_for(SessionFile, yaml.load(text))
-    return text[: given.start_mark.index] + version + text[given.end_mark.index :]
+    return text[:begin] + line + text[end:]
 
 
 def _runs(text: str, path: Path) -> Sequence[MappingNode]:

@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 READINGS = "set_up_errors"
 """The one list that people write into a session file: what is added to it is no change of what was sealed."""
 
-BEGUN, SEALED = "log begun", "sealed"
-"""First events of a session that had no log: it was sealed by an older program; it had no seal."""
+SEALED = "sealed"
+"""First event of a session that had no seal."""
+
+NO_MARK = "the seal names no event log"
+"""A seal is written with the log that covers it: somebody took the log away."""
 
 _MOST_NAMED = 6
 """Changes that are named; a session file that was exchanged has hundreds."""
@@ -50,7 +53,7 @@ class Stands(Enum):
     """Relation of a session file to its event log."""
 
     ALONE = auto()
-    """There is no log: a session of an older program, or one without a seal."""
+    """There is no log: it has no seal."""
     SAME = auto()
     """The file says what the log says."""
     BEHIND = auto()
@@ -81,8 +84,10 @@ def standing(data: Mapping[str, Any], log: EventLog | None, *, but_runs: bool = 
     """
     mark, state = mark_of(data), session_state(data)
     events = () if log is None else log.events
+    if mark is None and log is not None and events:
+        return _unmarked(state, log)
     if mark is None:
-        return Standing(Stands.ALONE) if log is None or not events else _unmarked(state, log)
+        return Standing(Stands.UNLIKE, (NO_MARK,)) if "seal" in state else Standing(Stands.ALONE)
     if log is None or mark[0] > len(events) or log.links[mark[0] - 1] != mark[1]:
         return Standing(Stands.UNLIKE, (_log_fault(mark[0], log),), log_sound=False)
     found = differences(log.state(mark[0]), state, but_runs=but_runs)
@@ -103,8 +108,6 @@ def _log_fault(count: int, log: EventLog | None) -> str:
 def _unmarked(state: Mapping[str, Any], log: EventLog) -> Standing:
     """Judge a log unknown to its file: the writer died at the start, or the seal was removed."""
     first = log.state(1)
-    if len(log.events) == 1 and log.events[0].what == BEGUN and not differences(first, state):
-        return Standing(Stands.BEHIND)
     if len(log.events) == 1 and log.events[0].what == SEALED and not differences(_unsealed(first), _unsealed(state)):
         return Standing(Stands.BEHIND)
     what = "the seal was taken out" if "seal" not in state else f"the seal does not cover {EVENTS_FILE} any more"

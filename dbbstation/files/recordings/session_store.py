@@ -28,7 +28,6 @@ from dbbstation.files.recordings.event_log import (
 from dbbstation.files.recordings.seal import AMEND, copy_name
 from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.files.recordings.session_state import (
-    BEGUN,
     READINGS,
     SEALED,
     Stands,
@@ -176,9 +175,6 @@ class SessionStore:
             OutputError: the file has changed since it was read, or the disk refuses; both are restored.
         """
         state = session_state(data)
-        if not self.log.events and "seal" in self.state and what != SEALED:
-            # Sealed by an older program: what it is now is the first thing that is known.
-            self._write_both(self.state, self.state, BEGUN, change({}, self.state), text_of)
         if not self.log.events and "seal" in state:
             self._write_both(data, state, SEALED, change({}, state), text)
         elif members := change(self.state, state):

@@ -1,4 +1,4 @@
-"""A session file's data and text, in the oldest version that has all keys."""
+"""A session file's data and text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import format_for
+from dbbstation.files.yaml.schema import format_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -52,7 +52,7 @@ def session_data(
 def text_of(data: Mapping[str, object]) -> str:
     """Return the text of a session file, keys in their usual order."""
     ordered = {key: data[key] for key in SessionFile.model_fields if key in data}
-    return yaml_text({"format": format_for(SessionFile, ordered), **ordered})
+    return yaml_text({"format": format_of(SessionFile), **ordered})
 
 
 def seal_data(seal: Seal) -> dict[str, object]:

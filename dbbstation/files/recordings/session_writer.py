@@ -274,7 +274,7 @@ class SessionWriter:
         return CommandedProgram(path, digest, model_sha256)
 
     def _seal(self) -> None:
-        """Seal a session of an older program before recording more."""
+        """Seal a session that was written by hand before recording more."""
         session = self._session
         found = hashes(session.folder, sealed_names(session.folder, session.names))
         keep_copies(session.folder, found)

@@ -1,7 +1,7 @@
 """Common base of schemas, strict and frozen; complaints become placed problems."""
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -27,61 +27,8 @@ FORMATS = {
 """Every format by the name before its version, with what it is called in messages."""
 
 
-_OF_MACHINES = {"greatest_feed_mm_min": 2, "greatest_turn_deg_min": 2}
-
-_OF_INSTRUMENTS = dict.fromkeys(
-    (
-        "bare",
-        "feature",
-        "features",
-        "follow_up",
-        "latch_bounds_s",
-        "leading_zero",
-        "min_width",
-        "profile",
-        "profiles",
-        "refused",
-        "relative",
-        "request_end",
-        "scale",
-        "zero_mm",
-        "prefix",
-        "end",
-    ),
-    3,
-)
-
-_OF_BARS = ("reading_mm", "temp_uncertainty_k", "calibrator_serial_number", "bar_waiver")
-
-SINCE: dict[str, dict[str, int]] = {
-    "dbb-plan": {"largest_loss_percent": 2},
-    "dbb-session": {
-        "stroke_mm": 2,
-        "seal": 3,
-        "amendments": 3,
-        "chain_sha256": 3,
-        "counts": 3,
-        "notes": 3,
-        "job": 4,
-        "log": 5,
-        "instrument": 6,
-        **dict.fromkeys(_OF_BARS, 3),
-    },
-    "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},
-    "dbb-settings": {"largest_bar_age_h": 2, "profile": 2, "filter": 3, "simulators": 4},
-    "dbb-job": {"filter": 2},
-    "dbb-mapping": {"split": 2, "zone": 2},
-    "dbb-machine": {**_OF_MACHINES, "acceleration_mm_s2": 3},
-    "dbb-model": {
-        **_OF_MACHINES,
-        "provenance": 3,
-        "acceleration_mm_s2": 4,
-        "null_space": 4,
-        "formula_variance": 4,
-    },
-}
-"""Keys that came after the first version of a format, with the version. A file of an older version must not have them: a
-program of that time would refuse it without saying that a newer one reads it."""
+BEFORE_FIRST = "24b5a22b"
+"""Commit that reads what was written before the first release, in formats with a version of 2 or more."""
 
 
 class Schema(BaseModel):
@@ -108,15 +55,11 @@ def read_document(path: Path, schema: type[Schema], faults: list[Problem]) -> Ya
         what = "the file holds no `key: value` lines"
         faults.append(document.problem((), what, "compare it with the example of its format"))
         return None
-    return document if _has_format(document, versions_of(schema), faults) else None
+    return document if _has_format(document, format_of(schema), faults) else None
 
 
 def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> S | None:
     """Return a document by its schema; None with faults added to `faults`."""
-    newer = _newer_keys(document, schema)
-    if newer:
-        faults.extend(newer)
-        return None
     try:
         return schema.model_validate(document.data)
     except ValidationError as error:
@@ -127,50 +70,11 @@ def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> 
 
 
 def format_of(schema: type[Schema]) -> str:
-    """Return the newest format name, such as `dbb-plan/2`."""
-    return versions_of(schema)[-1]
+    """Return the name of a format with its version, such as `dbb-plan/1`."""
+    return str(schema.model_fields["format"].annotation.__args__[0])  # type: ignore[union-attr]  # a Literal
 
 
-def versions_of(schema: type[Schema]) -> tuple[str, ...]:
-    """Return the format names that are read, oldest first."""
-    return tuple(map(str, schema.model_fields["format"].annotation.__args__))  # type: ignore[union-attr]  # a Literal
-
-
-def format_for(schema: type[Schema], data: Mapping[str, Any]) -> str:
-    """Return the oldest format name with all keys of some data."""
-    versions = versions_of(schema)
-    since = SINCE.get(versions[0].partition("/")[0], {})
-    return versions[max((since[key] for key in _keys(data) if key in since), default=1) - 1]
-
-
-def _keys(data: object) -> Iterator[str]:
-    if isinstance(data, Mapping):
-        for key, value in data.items():
-            yield str(key)
-            yield from _keys(value)
-    elif isinstance(data, list | tuple):
-        for value in data:
-            yield from _keys(value)
-
-
-def _newer_keys(document: YamlDocument, schema: type[Schema]) -> list[Problem]:
-    """Return faults of keys newer than the file's version."""
-    given = document.data.get("format") if isinstance(document.data, dict) else None
-    if "format" not in schema.model_fields or given not in versions_of(schema):
-        return []
-    name, _, version = str(given).partition("/")
-    found = []
-    for location in document.key_places:
-        since = SINCE.get(name, {}).get(str(location[-1]), 1)
-        if since > int(version):
-            what = f"the key `{location[-1]}` came with {name}/{since}, and this file is {given}"
-            remedy = f"write `format: {name}/{since}`"
-            found.append(document.problem(location, what, remedy, at_key=True))
-    return few(found)
-
-
-def _has_format(document: YamlDocument, known: Sequence[str], faults: list[Problem]) -> bool:
-    expected = known[-1]
+def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) -> bool:
     name = expected.partition("/")[0]
     wanted = FORMATS[name]
     if "format" not in document.data:
@@ -178,12 +82,12 @@ def _has_format(document: YamlDocument, known: Sequence[str], faults: list[Probl
         faults.append(document.problem((), what, f"begin it with `format: {expected}`"))
         return False
     given = document.data["format"]
-    if given in known:
+    if given == expected:
         return True
     given_name = str(given).partition("/")[0]
     if given_name == name:
         what = f"`{shortened(str(given))}` is a version that this program does not know"
-        remedy = f"it reads {', '.join(known)}; a newer dbbstation reads the file"
+        remedy = f"it reads {expected}; a newer dbbstation may read the file, commit {BEFORE_FIRST} one of before the first release"
     elif given_name in FORMATS:
         what = f"this file is {FORMATS[given_name]} (`{shortened(str(given))}`), {wanted} (`{expected}`) was expected"
         remedy = "check which file is given where"

@@ -17,19 +17,19 @@ from dbbstation.files.yaml.text import load_yaml
 FIXTURES = shipped_folder("fixtures")
 SESSIONS = FIXTURES / "sessions"
 EXAMPLES = {
-    "dbb-machine/3": [FIXTURES / "machines" / "every-key.yaml"],
+    "dbb-machine/1": [FIXTURES / "machines" / "every-key.yaml"],
     "dbb-jig/1": [FIXTURES / "jigs" / "reference-plate.yaml"],
-    "dbb-job/2": [FIXTURES / "jobs" / name for name in ("daily-check.yaml", "virtual.yaml")],
-    "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
-    "dbb-settings/4": [FIXTURES / "settings" / "every-key.yaml"],
-    "dbb-mapping/2": [FIXTURES / "mappings" / "every-key.yaml"],
+    "dbb-job/1": [FIXTURES / "jobs" / name for name in ("daily-check.yaml", "virtual.yaml")],
+    "dbb-plan/1": [FIXTURES / "plans" / "every-key.yaml"],
+    "dbb-settings/1": [FIXTURES / "settings" / "every-key.yaml"],
+    "dbb-mapping/1": [FIXTURES / "mappings" / "every-key.yaml"],
     "dbb-simulator/1": [
         *(FIXTURES / "simulators" / name for name in ("pendulum.yaml", "tank.yaml")),
         Path(__file__).parents[2] / "simulators" / "tank-fmu.yaml",
     ],
     "dbb-bar/1": [FIXTURES / "bars" / "zerodur.yaml"],
-    "dbb-model/4": [FIXTURES / "models" / name for name in ("null-space.yaml", "acceleration.yaml")],
-    "dbb-session/6": [SESSIONS / name / "session.yaml" for name in ("virtual", "logged", "begun", "under-spindle")],
+    "dbb-model/1": [FIXTURES / "models" / "every-key.yaml"],
+    "dbb-session/1": [SESSIONS / name / "session.yaml" for name in ("virtual", "logged", "begun", "under-spindle")],
 }
 UNITS = ("_mm", "_deg", "_um", "_kg", "_temp_c", "_mm_min", "_um_m_k", "_mm_per_n")
 

@@ -148,7 +148,7 @@ def test_a_log_that_is_gone_or_another_one_is_told(folder: Path) -> None:
 
 def test_a_seal_that_was_taken_out_is_told(folder: Path) -> None:
     text = (folder / "session.yaml").read_text(encoding="utf-8")
-    bare = re.sub(r"seal:\n(  .*\n)+", "", text).replace("dbb-session/5", "dbb-session/3")
+    bare = re.sub(r"seal:\n(  .*\n)+", "", text).replace("dbb-session/1", "dbb-session/1")
     (folder / "session.yaml").write_text(re.sub(r", chain_sha256: [0-9a-f]{64}", "", bare), encoding="utf-8")
     assert "the seal was taken out: events.log has 25 events of this session" in told(folder)
     with pytest.raises(InputError, match="the seal was taken out"):
@@ -253,25 +253,21 @@ def test_without_locks_a_log_that_has_gone_on_is_not_written_behind(folder: Path
     assert len(read_event_log(folder, []).events) == 26
 
 
-def test_a_session_of_an_older_program_begins_its_log_with_what_it_was(tmp_path: Path) -> None:
-    folder = Path(shutil.copytree(SESSIONS / "sealed", tmp_path / "sealed"))
-    assert "without an event log" in call("check", folder).out
-    before = read_session(folder)
-    with SessionWriter.open(folder) as writer:
-        writer.judge(writer.runs[0], accepted=False, reason="chip")
-    log = read_event_log(folder, [])
-    assert [event.what for event in log.events] == ["log begun", "rejected"]
-    assert log.state(1)["runs"][0]["state"] == "accepted"
-    assert read_session(folder).runs[1:] == before.runs[1:]
+def test_a_seal_without_its_log_is_a_fault(folder: Path) -> None:
+    (folder / EVENTS_FILE).unlink()
+    edit(folder / "session.yaml", re.search(r"  log: .*\n", (folder / "session.yaml").read_text())[0], "")
+    outcome = call("check", folder)
+    assert outcome.code == FAILED
+    assert "the seal names no event log" in outcome.err
 
 
 def test_sealing_begins_a_log_and_leaves_the_text_as_it_is(tmp_path: Path) -> None:
-    folder = Path(shutil.copytree(SESSIONS / "sealed", tmp_path / "sealed"))
+    folder = Path(shutil.copytree(SESSIONS / "small", tmp_path / "small"))
     edit(folder / "session.yaml", "runs:\n  - {test", "runs:\n  # the first of the day\n  - {test")
     assert seal_session(folder).anything
     text = (folder / "session.yaml").read_text(encoding="utf-8")
     assert "  # the first of the day\n" in text
-    assert text.startswith("format: dbb-session/5\n")
+    assert text.startswith("format: dbb-session/1\n")
     assert not seal_session(folder).anything
     assert sound(folder)
 

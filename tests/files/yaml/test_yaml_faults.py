@@ -61,7 +61,7 @@ def changed(text: str, old: str, new: str) -> tuple[str, str]:
         (b"- 1\n- 2\n", ":1:1: the file holds no `key: value` lines"),
         (b"just words\n", ":1:1: the file holds no `key: value` lines"),
         (b"name: x\n", ":1:1: the file does not say what format it has, a test plan was expected"),
-        (b"format: dbb-machine/1\n", ":1:9: this file is a machine (`dbb-machine/1`), a test plan (`dbb-plan/2`) was"),
+        (b"format: dbb-machine/1\n", ":1:9: this file is a machine (`dbb-machine/1`), a test plan (`dbb-plan/1`) was"),
         (b"format: dbb-plan/9\n", ":1:9: `dbb-plan/9` is a version that this program does not know"),
         (b"format: dbb-plam/1\n", ":1:9: `dbb-plam/1` is no format that this program knows"),
         (b"name: x\nformat: 1\n", ":2:9: `1` is no format that this program knows"),

@@ -190,7 +190,7 @@ def _stranger(one: Path, other: Path, rng: random.Random) -> None:
     )
     place = rng.choice([one, other]).parent / rng.choice((*names, f".{one.name}.{rng.randrange(99)}.new"))
     if not place.is_dir():
-        content = (b"", b"{}", b"[" * 900, b"format: dbb-settings/4\n", rng.randbytes(40), one.read_bytes()[:200])
+        content = (b"", b"{}", b"[" * 900, b"format: dbb-settings/1\n", rng.randbytes(40), one.read_bytes()[:200])
         place.write_bytes(rng.choice(content))
 
 

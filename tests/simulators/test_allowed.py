@@ -65,7 +65,7 @@ def test_once_allowed_it_runs_until_a_file_of_it_changes(here):
 
 def test_settings_of_ones_own_allow_it_and_those_of_the_folder_do_not(here, tmp_path, monkeypatch):
     key = re.search(r"put (\w{64}) into", ask(here, "pendulum.yaml")[1])[1]
-    text = f"format: dbb-settings/4\nsimulators: [{key}]\n"
+    text = f"format: dbb-settings/1\nsimulators: [{key}]\n"
     own = tmp_path / "ci.yaml"
     own.write_text(text, encoding="utf-8")
     assert ask(here, "pendulum.yaml", "--settings", own)[0]

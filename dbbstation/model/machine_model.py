@@ -221,7 +221,10 @@ class Actual:
         for other in self.model.acting(self.motion):
             if other.source.loads_struts and other.values.any():
                 stretch += self.by(other)
-        return own if stretch.strut_mm is None else own + Effect(strut_mm=stretch.strut_mm[:, :, None] / values)
+        if stretch.strut_mm is None:
+            return own
+        by_compliance = np.eye(len(values))[0] / values[0]
+        return own + Effect(strut_mm=stretch.strut_mm[:, :, None] * by_compliance)
 
     def tool_frames(self) -> Frames:
         """Return actual tool tip frames."""

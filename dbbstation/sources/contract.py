@@ -554,7 +554,7 @@ class ErrorSource(ABC):
         return Need.CURRENT in self.needs
 
     def found_compliance(self, machine: Machine, values: NDArray[np.float64]) -> Compliance | None:  # noqa: ARG002
-        """Return the struts' compliance by these values, or None."""
+        """Return the struts' compliance by these values, in proportion to the first, or None."""
         return None
 
     def current_per_load(

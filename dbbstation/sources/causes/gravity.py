@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dbbstation.machine.statics import platform_weight, stretch_mm, strut_tensions
 from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
@@ -13,10 +15,12 @@ from dbbstation.sources.laws.weights import MM_PER_N, platform_masses, strut_com
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Compliance, Machine
+    from dbbstation.sources.contract import ErrorSource
+
+PER_KN = 1e-3
 
 
 class Gravity(LinearSource):
@@ -26,7 +30,7 @@ class Gravity(LinearSource):
     loose poses (A = -25 degrees, Y = 100 mm) by parts in a hundred. Tensions are signed.
 
     c(L) = c_1000 (1 - s + s L / 1000 mm) is common to all struts; the share s is the machine file's. Circles show only
-    compliance times weight: 1 % more weight reads as 1 % softer struts.
+    compliance times weight: 1 % more weight reads as 1 % softer struts. Joints and bearings that stiffen under load: `_Contacts`.
     """
 
     name = "gravity"
@@ -43,9 +47,15 @@ class Gravity(LinearSource):
         confirm="Repeat one circle at growing tilt: the deformation grows steeply with the tilt. Hang a known mass "
         "on the spindle: all of it grows by the ratio of the weights.",
         cure="Fit gravity together with the joints, never after them, and export compensated programs.",
-        equation="actual minus driven length = c(L) T; J^T T = [W, r_G x W]; c(L) = c_1000 (1 - s + s L / 1000 mm)",
-        origin="[GRAV eq 1, 6, 7, 8] with the platform's own mass, signed forces and no strut weights",
+        equation="actual minus driven length = c(L) T; J^T T = [W, r_G x W]; c(L) = c_1000 (1 - s + s L / 1000 mm); "
+        "or, where contacts stiffen, less h T ln(hypot(T, 0.1 kN) / 1 kN)",
+        origin="[GRAV eq 1, 6, 7, 8] with the platform's own mass, signed forces and no strut weights; contacts: a roller between "
+        "flats (Johnson, Contact Mechanics, 1985, sec. 5.6)",
     )
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        """The one with contacts that stiffen."""
+        return (_Contacts(),)
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         """Return one compliance, of the design's size if stated.
@@ -65,11 +75,7 @@ class Gravity(LinearSource):
             ModelError: the machine file has no masses.
             KinematicsError: a pose where the struts cannot hold the platform.
         """
-        masses = platform_masses(self.name, machine)
-        frames, struts = motion.frames(machine), motion.struts(machine)
-        tension = strut_tensions(struts, platform_weight(frames, masses))
-        unit = replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N)
-        return Effect(strut_mm=stretch_mm(struts, unit, tension)[:, :, None])
+        return Effect(strut_mm=_stretched(motion, machine)[1][:, :, None])
 
     def found_compliance(self, machine: Machine, values: NDArray[np.float64]) -> Compliance | None:
         """Return the fitted compliance; None while zero."""
@@ -84,3 +90,75 @@ platform_load(at, load);
 tensions(at, load, t);
 EACH e->strut[i] += stretch(at, i, 1e-6 * v[0]) * t[i];"""
         )
+
+
+class _Contacts(Gravity):
+    """Struts on contacts, each e-fold of whose load takes h off their compliance: c(L) T - h T ln(hypot(T, 0.1 kN) / 1 kN).
+
+    So rollers do, and a contact by a power of its load does nearly so.
+    """
+
+    @property
+    def law(self) -> str:
+        return "contacts"
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        """None beside the one it belongs to."""
+        return ()
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Return the compliance at 1 kN, and how it falls.
+
+        Raises:
+            ModelError: the machine file has no masses.
+        """
+        (compliance,) = super().parameters(machine)
+        meaning = "compliance that a strut loses as its force grows 2.72 times; the other value is that at 1 kN"
+        return (compliance, Parameter("stiffening_um_kn", "µm/kN", STIFFENING * compliance.plausible, meaning))
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """By the compliance, and by what contacts take off it.
+
+        Raises:
+            ModelError: the machine file has no masses.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        tension, stretch = _stretched(motion, machine)
+        return Effect(strut_mm=np.stack([stretch, -MM_PER_N * tension * _folds(tension, ACROSS_N)], axis=2))
+
+    def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """By another load across, and by contacts that are softer where the strut is longer, as all of it is.
+
+        Raises:
+            ModelError: the machine file has no masses.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        tension, stretch = _stretched(motion, machine)
+        own, folds = MM_PER_N * tension, _folds(tension, ACROSS_N)
+        changes = [own * (folds - _folds(tension, 3.0 * ACROSS_N)), (own - stretch) * folds]
+        return Effect(strut_mm=values[1] * np.stack(changes, axis=2))
+
+    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:
+        springs = super().c_form(machine, values, thermometers).body
+        return CForm(f"{springs}\nEACH e->strut[i] -= 1e-6 * v[1] * t[i] * log(1e-3 * hypot(t[i], {ACROSS_N}));")
+
+
+def _folds(tension: NDArray[np.float64], across_n: float) -> NDArray[np.float64]:
+    """Return e-folds of contact loads above 1 kN, shape (n, 6)."""
+    return np.log(PER_KN * np.hypot(tension, across_n))
+
+
+ACROSS_N = 100.0
+"""Load across a strut on its joints: half of its own weight where that is 20 kg [N]."""
+
+STIFFENING = 0.1
+"""Usual size of what an e-fold of load takes off a compliance: rollers deflect by about the 0.9th power of their load."""
+
+
+def _stretched(motion: Motion, machine: Machine) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return tensions [N] and elongations per compliance [mm per µm/kN], shape (n, 6)."""
+    masses = platform_masses(Gravity.name, machine)
+    frames, struts = motion.frames(machine), motion.struts(machine)
+    tension = strut_tensions(struts, platform_weight(frames, masses))
+    unit = replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N)
+    return tension, stretch_mm(struts, unit, tension)

@@ -16,6 +16,7 @@ from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.gravity import Gravity
 from dbbstation.sources.contract import Fitted, Motion
+from dbbstation.sources.registry import sources_named
 from dbbstation.trace.analysis import best_circle
 from tests.plant.mechanisms.gravity import Gravity as PlantGravity
 from tests.plant.plan import gravity_plan
@@ -165,3 +166,61 @@ def test_a_machine_without_masses_is_told_what_its_file_lacks(reference):
         GRAVITY.parameters(bare)
     with lacks:
         GRAVITY.effect(Motion(np.zeros((1, 6))), bare, COMPLIANCE_UM_KN)
+
+
+CONTACTS = GRAVITY.other_laws()[0]
+
+
+def tensions_n(reference, motion):
+    """From the elongation of struts of no growing share: 1 µm/kN."""
+    stiff = replace(reference, compliance=Compliance(at_1000mm_mm_per_n=1e-6, growing_share=0.0))
+    return 1e6 * GRAVITY.effect(motion, stiff, np.array([1.0])).strut_mm
+
+
+def test_rollers_between_flats_stretch_as_contacts_do(reference):
+    # Johnson, Contact Mechanics, 1985, sec. 5.6: two opposed line contacts bring a roller's ends together by
+    # 2 P (1 - nu²) / (pi E) (2 ln(4 R / a) - 1), a² = 4 P R (1 - nu²) / (pi E), P the force per length; two rollers of
+    # steel, 4 mm across, over 20 mm.
+    reduced_mm2_n, radius_mm, length_mm = (1.0 - 0.3**2) / (np.pi * 210e3), 2.0, 20.0
+
+    def roller_mm(force_n):
+        per_mm = force_n / length_mm
+        half_mm = np.sqrt(4.0 * per_mm * radius_mm * reduced_mm2_n)
+        return 2.0 * per_mm * reduced_mm2_n * (2.0 * np.log(4.0 * radius_mm / half_mm) - 1.0)
+
+    machine = replace(reference, compliance=Compliance(at_1000mm_mm_per_n=1e-6, growing_share=0.0))
+    motion = in_condition("A")
+    force_n = tensions_n(reference, motion)
+    loaded = np.abs(force_n) > 1000.0
+    # At 1 kN the logarithm is nearly none; there its slope by the load's e-folds is the other value.
+    values = 1e6 * np.array([roller_mm(1000.0) / 1000.0, 2.0 * reduced_mm2_n / length_mm])
+    stretch_mm = CONTACTS.effect(motion, machine, values).strut_mm
+    expected_mm = np.sign(force_n) * roller_mm(np.abs(force_n))
+    assert loaded.any(axis=0).all()
+    # The load across a joint, a tenth of the load along it at the most, is no more than half a percent of a logarithm.
+    np.testing.assert_allclose(stretch_mm[loaded], expected_mm[loaded], rtol=1e-3)
+
+
+def test_contacts_that_do_not_stiffen_are_springs(reference):
+    motion = in_condition("D")
+    firm = CONTACTS.effect(motion, reference, np.array([9.68, 0.0])).strut_mm
+    np.testing.assert_allclose(1e3 * firm, strut_um(reference, motion), rtol=1e-12)
+
+
+def test_other_weights_follow_the_compliance_alone_where_contacts_stiffen(reference):
+    shift = sources_named(["cog-shift"])[0]
+    values = np.array([9.68, 0.8])
+    motion = in_condition("C")
+    shifted = Fitted(shift, np.full(len(shift.parameters(reference)), 5.0))
+
+    def length_mm(one):
+        model = MachineModel(reference, (Fitted(CONTACTS, one), shifted))
+        return model.actual(motion).effect.strut_mm
+
+    model = MachineModel(reference, (Fitted(CONTACTS, values), shifted))
+    derivative = model.actual(motion).derivative(Fitted(CONTACTS, values)).strut_mm
+    step = 1e-4
+    for k, more in enumerate(step * np.eye(2)):
+        differences = (length_mm(values + more) - length_mm(values - more)) / (2.0 * step)
+        # Where weights take the machine by itself is left out of the derivative: a thousandth, near loose poses more.
+        assert np.abs(derivative[:, :, k] - differences).max() < 0.01 * np.abs(differences).max()

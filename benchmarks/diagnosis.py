@@ -24,7 +24,7 @@ from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.sources.registry import known_sources, sources_named
-from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import Recorded, load_sessions
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics

@@ -6,14 +6,16 @@ changes.
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
+from types import ModuleType
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
     "StationError": "dbbstation.errors",
     "calibrate": "dbbstation.tasks.calibrate",
-    "circle_figures": "dbbstation.tasks.circles",
+    "circles": "dbbstation.tasks.circles",
     "compensate": "dbbstation.tasks.compensate",
     "diagnose": "dbbstation.tasks.diagnose",
     "evaluate": "dbbstation.tasks.evaluate",
@@ -25,13 +27,13 @@ _PUBLIC = {
     "read_model": "dbbstation.tasks.models",
     "write_model": "dbbstation.tasks.models",
 }
-"""Public names, and the module of each; their types stand in `__init__.pyi`. `circles` and `sources` are folders of the package, so these tasks have longer names."""
+"""Public names, and the module of each; their types stand in `__init__.pyi`."""
 
 __all__ = [
     "StationError",
     "__version__",
     "calibrate",
-    "circle_figures",
+    "circles",
     "compensate",
     "diagnose",
     "evaluate",
@@ -52,6 +54,17 @@ def __getattr__(name: str) -> object:
     found = getattr(import_module(_PUBLIC[name]), name)
     globals()[name] = found
     return found
+
+
+class _Package(ModuleType):
+    """Keeps a public name that a folder has too: importing `dbbstation.circles.path` would replace the function `circles`."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name in _PUBLIC and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 
 
 def __dir__() -> list[str]:

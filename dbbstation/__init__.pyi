@@ -1,7 +1,7 @@
 from dbbstation.errors import StationError as StationError
 from dbbstation.instrument.library import known_instruments as known_instruments
 from dbbstation.tasks.calibrate import calibrate as calibrate
-from dbbstation.tasks.circles import circle_figures as circle_figures
+from dbbstation.tasks.circles import circles as circles
 from dbbstation.tasks.compensate import compensate as compensate
 from dbbstation.tasks.diagnose import diagnose as diagnose
 from dbbstation.tasks.evaluate import evaluate as evaluate

@@ -1,6 +1,7 @@
 """The one exception family: every error that a user can cause, and what the program says about it.
 
 StationError                what is wrong, where, what to do; exit code 1
+├── ArgumentError           a script or command gives a value that a task does not take; a ValueError too
 ├── InputError              a file's content is wrong; carries every `Problem` found in it
 ├── OutputError             a result cannot be written (exists already, no room, no permission)
 ├── MachineError            a pose or path the machine cannot take
@@ -113,6 +114,13 @@ class InputError(StationError):
         if len(self.problems) > MOST_LISTED:
             lines.append(f"and {len(self.problems) - MOST_LISTED} more faults")
         super().__init__("\n".join(lines))
+
+
+class ArgumentError(StationError, ValueError):
+    """A value that a task does not take; `where` is the parameter."""
+
+    def __init__(self, parameter: str, what: str, remedy: str = "") -> None:
+        super().__init__(what, where=parameter, remedy=remedy)
 
 
 class OutputError(StationError):

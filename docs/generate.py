@@ -18,7 +18,7 @@ from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.sources.registry import known_sources
-from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.diagnosed import default_candidates
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

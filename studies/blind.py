@@ -17,7 +17,7 @@ from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.atomic import write_text
 from dbbstation.system.memory import forget_largest_memory, largest_memory_mb
 from dbbstation.system.signals import starting
-from dbbstation.tasks.diagnose import diagnose_sessions
+from dbbstation.tasks.diagnosed import diagnose_sessions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -17,7 +17,7 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Plan, PlannedTest
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources, sources_named
-from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import draw_session
 

@@ -20,7 +20,7 @@ from dbbstation.results.drive import drive_result
 from dbbstation.results.of_comparison import comparison_result
 from dbbstation.results.of_mismatch import mismatch_result
 from dbbstation.sources.registry import known_sources, sources_named
-from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import load_sessions
 from dbbstation.tasks.tables import TableOptions, load_tables
 

@@ -38,8 +38,9 @@ def signatures():
         found = inspect.signature(one)
         parameters = ", ".join(_parameter(each) for each in found.parameters.values())
         lines.append(f"{name}({parameters}) -> {found.return_annotation}")
-        if found.return_annotation in kinds:
-            results[found.return_annotation] = kinds[found.return_annotation]
+        for returned in str(found.return_annotation).split(" | "):
+            if returned in kinds:
+                results[returned] = kinds[returned]
     for name, kind in sorted(results.items()):
         fields = {field.name for field in dataclasses.fields(kind)}
         lines += [f"{name}.{each}" for each in sorted(fields | {each for each in dir(kind) if each[0] != "_"})]

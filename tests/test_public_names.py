@@ -87,7 +87,7 @@ def test_a_compensated_program_is_text_or_a_file(tmp_path):
 
 
 def test_circles_as_a_table():
-    found = dbb.circle_figures(SMALL, tests=["a"])
+    found = dbb.circles(SMALL, tests=["a"])
     rows = found.rows()
     assert {row["test"] for row in rows} == {"a"}
     assert rows[0]["g_um"] == found.to_dict()["runs"][0]["g_um"]
@@ -95,7 +95,7 @@ def test_circles_as_a_table():
 
 
 def test_a_frame_needs_pandas_and_says_so():
-    found = dbb.circle_figures(SMALL, tests=["a"])
+    found = dbb.circles(SMALL, tests=["a"])
     try:
         import pandas  # noqa: F401, ICN001, PLC0415
     except ImportError:

@@ -2,127 +2,27 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
-from dbbstation.cli.chosen_tests import chosen_tests_options
-from dbbstation.cli.figure_option import figure_option, format_of
+from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.output import echo
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.tasks.calibrate import calibrate as task
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from dbbstation.calibration.checks.plan_check import PlanCheck
     from dbbstation.calibration.checks.scatter import ScatterCheck
     from dbbstation.results.calibration import CalibrationResult
+    from dbbstation.tasks.models import HasModel
 
 
-@click.command()
-@click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
-@click.option(
-    "--sources", metavar="A,B,...", help="Error sources to fit [default: strut-reference-length,base-joints]."
-)
-@source_file_option
-@click.option(
-    "--law-over-time",
-    is_flag=True,
-    help="Fit thermal growth as a function of time, even where temperatures were logged.",
-)
-@click.option(
-    "--method",
-    type=click.Choice(["jig", "conv-a", "conv-b"]),
-    default="jig",
-    show_default=True,
-    help="How ball positions are known: from a CMM sheet (jig); not at all (conv-a); from micrometer readings (conv-b).",
-)
-@click.option(
-    "--prescribe",
-    metavar="SOURCE.PARAMETER,...",
-    help="Parameters to hold at nominal, as many as the tests cannot identify.",
-)
-@chosen_tests_options
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the calibrated model here.")
-@figure_option()
-@click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def calibrate(
-    sessions: tuple[Path, ...],
-    *,
-    sources: str | None,
-    source_files: tuple[Path, ...],
-    law_over_time: bool,
-    method: str,
-    prescribe: str | None,
-    tests: tuple[str, ...],
-    exclude: tuple[str, ...],
-    out: Path | None,
-    figure: Path | None,
-    force: bool,
-    as_json: bool,
-) -> None:
-    r"""Fit the machine's errors to the raw circles of one or more sessions.
-
-    Fits 24 kinematic parameters: the reference lengths of the struts and the positions of the base joints. The scatter of
-    mountings, CMM and bar enters as random effects. Combinations of parameters that the tests cannot identify are named
-    and held at nominal. Balls and runs that are outliers are named and kept out of the fit.
-
-    With --method conv-a or conv-b the balls were put up under the spindle, and their positions are unknown. Six
-    combinations cannot be identified then. Six parameters are held at nominal instead; the program chooses them, or
-    --prescribe names them.
-
-    \b
-    Examples:
-      dbbstation calibrate 2026-11-20-hexapod-7
-      dbbstation calibrate 2026-11-20-hexapod-7 --out model.yaml --figure circles.svg
-      dbbstation calibrate monday tuesday --exclude h --json
-      dbbstation calibrate standard-test --method conv-a
-      dbbstation calibrate monday --sources strut-reference-length,base-joints,gravity,cog-shift,drive-friction
-      dbbstation calibrate monday --source-file scale_bow.py --sources strut-reference-length,base-joints,scale-bow
-
-    With drive-friction among the sources, recorded motor currents are fitted too. They give gains and friction of the
-    drives, and with cog-shift the centre of gravity.
-    """
-    from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import task_bar
+def write_model(result: HasModel, path: Path, *, force: bool) -> None:
+    """Write the model with its provenance."""
     from dbbstation.cli.provenance import provenance
-    from dbbstation.files.atomic import refuse_outputs, write_bytes
-    from dbbstation.files.formats.model import write_model
-    from dbbstation.files.own_sources import every_source, sources_of
-    from dbbstation.tasks.calibrate import STAGES
-    from dbbstation.tasks.calibrate import calibrate as calibrated
+    from dbbstation.files.formats.model import write_model as write
 
-    refuse_outputs((out, figure), force=force)
-    chosen = names_in(sources)
-    every = every_source(source_files)
-    for name in set(sources_of(source_files, every)) - set(chosen or ()):
-        say(f"note: {name} is known now, but not fitted: name it with --sources")
-    with task_bar("calibration", STAGES) as progress:
-        result = calibrated(
-            sessions,
-            sources=chosen,
-            method=method,
-            prescribe=names_in(prescribe),
-            tests=tests,
-            exclude=exclude,
-            law_over_time=law_over_time,
-            known=every,
-            progress=progress,
-            say=lambda text: say(f"note: {text}"),
-        )
-    if out is not None:
-        write_model(out, result.model, provenance=provenance(), force=force)
-    if figure is not None and result.drawing is not None:
-        write_bytes(figure, result.drawing(format_of(figure)), force=force)
-        say(f"figure written to {figure}")
-    for outlier in result.outliers:
-        say(f"outlier, kept out of the fit: {outlier.text}")
-    if as_json:
-        print_result(result)
-    else:
-        _print(result)
-        if out is not None:
-            say(f"model written to {out}")
+    write(path, result.model, provenance=provenance(), force=force)
 
 
 def names_in(text: str | None) -> list[str] | None:
@@ -140,7 +40,8 @@ NOT_THIS_MACHINE = 10.0
 """Residual over noise above which the machine file itself is in doubt."""
 
 
-def _print(result: CalibrationResult) -> None:
+def show(result: CalibrationResult) -> None:
+    """Print the parameters, and what the fit leaves."""
     from dbbstation.cli.figures import print_runs
     from dbbstation.cli.motors import print_currents
 
@@ -240,3 +141,12 @@ def _print_scatter(check: ScatterCheck, *, missing_physics: bool) -> None:
     if missing_physics and check.finding == "more":
         said = BESIDE_MISSING_PHYSICS
     echo(f"{stated} scatter by {check.found_um:.2f} ({low:.2f} to {high:.2f}) µm, {said}")
+
+
+calibrate = command(
+    task,
+    show,
+    CommandOutput("out", "Write the calibrated model here.", write_model, said="model written to {path}"),
+    figure(said="figure written to {path}"),
+    remarks=lambda result: (f"outlier, kept out of the fit: {one.text}" for one in result.outliers),
+)

@@ -2,105 +2,50 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
-
-from dbbstation.cli.chosen_tests import chosen_tests_options
-from dbbstation.cli.filter_option import filter_of, filter_option
+from dbbstation.cli.declared import CommandOutput, command
 from dbbstation.cli.output import echo
+from dbbstation.tasks.circles import circles as task
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from dbbstation.results.circle_figures import CircleFiguresResult, PairFigures, QuickLookResult, RunWithoutCircle
     from dbbstation.results.circles import CirclesResult
 
 
-@click.command()
-@click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
-@filter_option
-@click.option("--findings", is_flag=True, help="Judge every run too: number, limit, verdict.")
-@click.option(
-    "--model", type=click.Path(path_type=Path), help="Expect circles where this model has them; with --findings."
-)
-@click.option("--budget", is_flag=True, help="Print the uncertainty budget of every figure, term by term.")
-@click.option(
-    "--quick-look", is_flag=True, help="Look for the classical signatures of serial axes: symptoms, no causes here."
-)
-@chosen_tests_options
-@click.option("--csv", "out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table here, as CSV.")
-@click.option("--force", is_flag=True, help="Replace an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def circles(
-    sessions: tuple[Path, ...],
+def show(
+    result: CirclesResult,
+    sessions: Sequence[Path],
     *,
-    cut_off: str,
     findings: bool,
-    model: Path | None,
-    budget: bool,
-    quick_look: bool,
-    tests: tuple[str, ...],
-    exclude: tuple[str, ...],
-    out: Path | None,
-    force: bool,
-    as_json: bool,
+    budget: Annotated[bool, Option("Print the uncertainty budget of every figure, term by term.")] = False,
 ) -> None:
-    r"""Work out the figures of measured circles, in the words of ISO 230-4:2005; no model is needed.
-
-    G is the circular deviation of the minimum zone, G(LS) about the least-squares circle, which is permitted too. F is the
-    radial deviation about the least-squares centre. X and Y are the centre less the commanded one: reported, never taken
-    out of calibration data. G(b), D and H are of both directions together. U is 2 u; --budget shows its terms.
-
-    \b
-    Examples:
-      dbbstation circles session
-      dbbstation circles session --filter 50 --csv circles.csv
-      dbbstation circles session --findings --model model.yaml
-      dbbstation circles session --test a --budget --json
-      dbbstation circles session --test a --quick-look
-    """
-    from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import count_bar
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.files.provenance import refuse_existing_table, write_table
-    from dbbstation.files.recordings.table_csv import table_csv
-    from dbbstation.tasks.circles import circle_figures
-
-    if model is not None and not findings:
-        raise click.UsageError("--model says where circles are expected: give --findings too")
-    if out is not None:
-        refuse_existing_table(out, force=force)
-    with count_bar("circles") as progress:
-        result = circle_figures(
-            sessions,
-            undulations=filter_of(cut_off),
-            tests=tests,
-            exclude=exclude,
-            findings=findings,
-            quick_look=quick_look,
-            model=model,
-            progress=lambda _, done=0, of=0: progress(done, of),
-            say=lambda text: say(f"note: {text}"),
-        )
-    if out is not None:
-        rows = result.rows()
-        names = list(dict.fromkeys(name for row in rows for name in row))
-        columns = [[row.get(name, "") for name in names] for row in rows]
-        write_table(out, table_csv(names, list(zip(*columns, strict=True))), provenance(), force=force)
-        result = replace(result, csv=str(out))
-    if as_json:
-        print_result(result)
-        return
+    """Print the figures, and what else was asked for."""
     _print(result, several=len(sessions) > 1)
     if budget:
         _print_budgets(result)
     if findings:
         _print_findings(result.runs)
-    if quick_look:
-        _print_quick_looks(result.quick_look or ())
+    if result.quick_look is not None:
+        _print_quick_looks(result.quick_look)
+
+
+def _write_table(result: CirclesResult, path: Path, *, force: bool) -> None:
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.files.provenance import write_table
+    from dbbstation.files.recordings.table_csv import table_csv
+
+    rows = result.rows()
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    columns = [[row.get(name, "") for name in names] for row in rows]
+    write_table(path, table_csv(names, list(zip(*columns, strict=True))), provenance(), force=force)
+
+
+circles = command(task, show, CommandOutput("csv", "Write the table here, as CSV.", _write_table, table=True))
 
 
 def _print(result: CirclesResult, *, several: bool) -> None:

@@ -2,81 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
-from dbbstation.cli.chosen_tests import chosen_tests_options
+from dbbstation.cli.declared import command, figure
 from dbbstation.cli.effects import cancelling_text, parts_with_gain
-from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.output import echo, echo_line
+from dbbstation.tasks.compare import compare as task
 
 if TYPE_CHECKING:
     from dbbstation.results.comparison import ComparisonResult
 
 
-@click.command()
-@click.argument("a", type=click.Path(path_type=Path), metavar="A")
-@click.argument("b", type=click.Path(path_type=Path), metavar="B")
-@chosen_tests_options
-@click.option(
-    "--no-held-out", is_flag=True, help="Leave out the held-out tests: causes are then not asked to predict others."
-)
-@figure_option()
-@click.option("--force", is_flag=True, help="Overwrite the figure.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def compare(
-    a: Path,
-    b: Path,
-    *,
-    tests: tuple[str, ...],
-    exclude: tuple[str, ...],
-    no_held_out: bool,
-    figure: Path | None,
-    force: bool,
-    as_json: bool,
-) -> None:
-    r"""Put two sessions side by side: where they differ, in what form, and by which cause. Differences are B less A.
-
-    For last year against today, or a simulation against a recording. The readings of A are the simulation of B. What is
-    stated of noise, mountings, CMM sheets and bars is no difference. Error sources that may have changed, balls and bars that
-    sit elsewhere, and effects without a name compete by their probability, as in `diagnose`.
-
-    \b
-    Examples:
-      dbbstation compare 2025-11-18-hexapod-7 2026-11-20-hexapod-7
-      dbbstation compare predicted 2026-11-20-hexapod-7 --figure difference.svg
-      dbbstation compare predicted 2026-11-20-hexapod-7 --json
-    """
-    from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import task_bar
-    from dbbstation.files.atomic import refuse_existing, write_bytes
-    from dbbstation.tasks.compare import STAGES
-    from dbbstation.tasks.compare import compare as compared
-
-    if figure is not None:
-        refuse_existing(figure, force=force)
-    with task_bar("comparison", STAGES) as progress:
-        result = compared(
-            a,
-            b,
-            tests=tests,
-            exclude=exclude,
-            hold_out=not no_held_out,
-            progress=progress,
-            say=lambda text: say(f"note: {text}"),
-        )
-    if figure is not None and result.drawing is not None:
-        write_bytes(figure, result.drawing(format_of(figure)), force=force)
-        say(f"figure written to {figure}")
-    if as_json:
-        print_result(result)
-    else:
-        _print(result)
-
-
-def _print(result: ComparisonResult) -> None:
+def show(result: ComparisonResult) -> None:
+    """Print where the sessions differ."""
     if result.held_out_worse:
         echo("Held-out tests are predicted worse than by the first session alone. Nothing is identified.\n")
     echo(result.text)
@@ -170,3 +108,6 @@ def _print_causes(result: ComparisonResult) -> None:
         if names:
             echo(f"{verdict}: {', '.join(dict.fromkeys(names))}")
     echo(f"`dbbstation diagnose {result.b}` looks for causes in one session by itself.")
+
+
+compare = command(task, show, figure(said="figure written to {path}"))

@@ -2,119 +2,53 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_tests_options
+from dbbstation.cli.calibrate import write_model
+from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.effects import cancelling_text
-from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.output import echo
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.tasks.declare import Option
+from dbbstation.tasks.diagnose import diagnose as task
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
-    from dbbstation.results.diagnosis import CauseResult, DiagnosisFigures, UnexplainedCurve, WorkspaceGain
+    from dbbstation.results.diagnosis import (
+        CauseResult,
+        DiagnosisFigures,
+        DiagnosisResult,
+        UnexplainedCurve,
+        WorkspaceGain,
+    )
+
+EFFECTS = "Rank the causes by what each contributes to the circles, with its cure and the circles as they would be without it."
 
 
-@click.command()
-@click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
-@click.option("--sources", metavar="A,B,...", help="Error sources to compare [default: all].")
-@source_file_option
-@chosen_tests_options
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")
-@click.option(
-    "--keep-unexplained",
-    is_flag=True,
-    help="Keep an unmodelled effect in that model, as a curve over strut length or force: compensated, cause unknown.",
-)
-@click.option(
-    "--no-held-out", is_flag=True, help="Leave out the held-out tests: causes are then not asked to predict others."
-)
-@figure_option()
-@click.option(
-    "--effects",
-    is_flag=True,
-    help="Rank the causes by what each contributes to the circles, with its cure and the circles as they would be without it.",
-)
-@click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def diagnose(
-    sessions: tuple[Path, ...],
-    *,
-    sources: str | None,
-    source_files: tuple[Path, ...],
-    tests: tuple[str, ...],
-    exclude: tuple[str, ...],
-    out: Path | None,
-    keep_unexplained: bool,
-    no_held_out: bool,
-    figure: Path | None,
-    effects: bool,
-    force: bool,
-    as_json: bool,
-) -> None:
-    r"""Find the physics that a kinematic calibration of these recordings leaves out, name it and model it.
-
-    A calibration can hide gravity, drift or play in its joints: the residual is then small here, and the machine is
-    wrong elsewhere. This command compares sets of causes. It fits each set together with the kinematic parameters and
-    gives the probability of each cause, given the catalogue of causes. Verdicts: identified (probability 0.95 or more,
-    five standard deviations out, and a gain in tests that were held back), happened (acts once), does-not-predict,
-    ambiguous, ruled-out, not-testable.
-
-    \b
-    Examples:
-      dbbstation diagnose 2026-11-20-hexapod-7
-      dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml --figure diagnosis.svg
-      dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
-      dbbstation diagnose 2026-11-20-hexapod-7 --effects
-      dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
-      dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
-    """
-    from dbbstation.cli.calibrate import names_in
-    from dbbstation.cli.model_warnings import say_model_warnings
-    from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import task_bar
-    from dbbstation.cli.provenance import provenance
+def show(result: DiagnosisResult, *, effects: Annotated[bool, Option(EFFECTS)] = False) -> None:
+    """Print what was found, and with `effects` what each cause contributes."""
     from dbbstation.cli.ranked_causes import print_effects
-    from dbbstation.files.atomic import refuse_outputs, write_bytes
-    from dbbstation.files.formats.model import write_model
-    from dbbstation.files.own_sources import every_source
-    from dbbstation.tasks.diagnose import STAGES
-    from dbbstation.tasks.diagnose import diagnose as diagnosed
 
-    if keep_unexplained and out is None:
+    _print(result)
+    if effects:
+        print_effects(result.effects)
+
+
+def _further() -> dict[str, object]:
+    given = click.get_current_context().params
+    if given.get("keep_unexplained") and given.get("out") is None:
         raise click.UsageError("--keep-unexplained keeps it in the model of --out: give that too")
-    refuse_outputs((out, figure), force=force)
-    with task_bar("diagnosis", STAGES) as progress:
-        result = diagnosed(
-            sessions,
-            sources=names_in(sources or None),
-            tests=tests,
-            exclude=exclude,
-            keep_unexplained=keep_unexplained,
-            hold_out=not no_held_out,
-            until_interrupted=True,
-            known=every_source(source_files),
-            progress=progress,
-            say=lambda text: say(f"note: {text}"),
-        )
-    if out is not None:
-        write_model(out, result.model, provenance=provenance(), force=force)
-        say_model_warnings(result.model)
-    if figure is not None and result.drawing is not None:
-        write_bytes(figure, result.drawing(format_of(figure)), force=force)
-        say(f"figure written to {figure}")
-    if as_json:
-        print_result(result)
-    else:
-        _print(result)
-        if effects:
-            print_effects(result.effects)
-        if out is not None:
-            say(f"joint model written to {out}")
+    return {"until_interrupted": True}
+
+
+def _write(result: DiagnosisResult, path: Path, *, force: bool) -> None:
+    from dbbstation.cli.model_warnings import say_model_warnings
+
+    write_model(result, path, force=force)
+    say_model_warnings(result.model)
 
 
 UNPREDICTABLE_UM = 1000.0
@@ -290,3 +224,12 @@ def _probable(source: CauseResult) -> str:
         return ""
     surest = 0.999
     return f"> {surest}" if source.probability > surest else f"{source.probability:.3f}"
+
+
+diagnose = command(
+    task,
+    show,
+    CommandOutput("out", "Write the joint model here.", _write, said="joint model written to {path}"),
+    figure(said="figure written to {path}"),
+    more=_further,
+)

@@ -2,105 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
+from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.effects import cancelling_text
-from dbbstation.cli.figure_option import figure_option, format_of
-from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
+from dbbstation.tasks.drive import drive as task
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from dbbstation.diagnosis.drive.findings import DriveFinding, ForceLocation, HeldOutForce
     from dbbstation.facts.value import Value
     from dbbstation.results.drive import DriveResult
 
 
-@click.command()
-@click.argument("recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING.csv...")
-@click.option(
-    "--force-per-ampere", type=Finite(), metavar="N/A", help="Force of the drive at 1 A, for motor_current_a."
-)
-@click.option("--sources", metavar="A,B,...", help="Causes to compare [default: all].")
-@click.option(
-    "--cutoff-hz",
-    type=Finite(),
-    metavar="HZ",
-    help="Bandwidth in which force and model are compared [default: chosen from the recording].",
-)
-@click.option(
-    "--no-held-out", is_flag=True, help="Skip the check on parts that causes were not chosen from: much faster."
-)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write what was compared here, as CSV.")
-@figure_option("Draw force and friction here")
-@click.option("--force", is_flag=True, help="Overwrite these files.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def drive(
-    recordings: tuple[Path, ...],
-    *,
-    force_per_ampere: float | None,
-    sources: str | None,
-    cutoff_hz: float | None,
-    no_held_out: bool,
-    out: Path | None,
-    figure: Path | None,
-    force: bool,
-    as_json: bool,
-) -> None:
-    r"""Identify one strut drive from position and force, and find the physics that mass and viscous friction leave out.
-
-    The recording is a CSV file with the columns t_s, position_mm and force_n, or motor_current_a. Record strokes to and
-    fro at several speeds. Several recordings of one drive are taken together. Verdicts: identified, happened, does-not-predict,
-    ambiguous, not-testable, ruled-out.
-
-    \b
-    Examples:
-      dbbstation drive strut3.csv
-      dbbstation drive slow.csv fast.csv
-      dbbstation drive strut3.csv --force-per-ampere 410 --figure strut3.svg
-      dbbstation drive strut3.csv --sources coulomb-friction,friction-asymmetry --json
-    """
-    from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import stage_bar
+def _write(result: DriveResult, path: Path, *, force: bool) -> None:
     from dbbstation.cli.provenance import provenance
-    from dbbstation.files.atomic import refuse_existing, write_bytes
-    from dbbstation.files.provenance import refuse_existing_table, write_table
+    from dbbstation.files.provenance import write_table
     from dbbstation.files.recordings.drive_csv import compared_csv
-    from dbbstation.tasks.drive import STAGES
-    from dbbstation.tasks.drive import drive as identified
 
-    if out is not None:
-        refuse_existing_table(out, force=force)
-    if figure is not None:
-        refuse_existing(figure, force=force)
-    with stage_bar("identification", STAGES) as progress:
-        result = identified(
-            recordings,
-            force_per_ampere=force_per_ampere,
-            sources=[name.strip() for name in sources.split(",")] if sources else None,
-            cutoff_hz=cutoff_hz,
-            hold_out=not no_held_out,
-            progress=progress,
-            say=lambda text: say(f"note: {text}"),
-        )
-    if out is not None:
-        write_table(out, compared_csv(result.table), provenance(), force=force)
-        result = replace(result, compared=str(out))
-    if figure is not None and result.drawing is not None:
-        write_bytes(figure, result.drawing(format_of(figure)), force=force)
-        result = replace(result, figure=str(figure))
-    if as_json:
-        print_result(result)
-    else:
-        _print(result)
+    write_table(path, compared_csv(result.table), provenance(), force=force)
 
 
-def _print(result: DriveResult) -> None:
+def show(result: DriveResult) -> None:
+    """Print what was identified."""
     _print_if_worse(result.held_out_rms_n)
     if result.mismatch:
         echo(
@@ -211,3 +138,11 @@ def _number(number: Value) -> str:
     if not number.is_known:
         return f"{number.value:#.4g} {number.unit}"
     return f"{number.value:#.4g} ± {number.uncertainty:.2g} {number.unit}"
+
+
+drive = command(
+    task,
+    show,
+    CommandOutput("out", "Write what was compared here, as CSV.", _write, table=True, field="compared"),
+    figure("Draw force and friction here"),
+)

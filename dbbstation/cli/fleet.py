@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -79,7 +79,7 @@ def fleet(
     sources: str | None,
     source_files: tuple[Path, ...],
     law_over_time: bool,
-    method: str,
+    method: Literal["jig", "conv-a", "conv-b"],
     findings: bool,
     tests: tuple[str, ...],
     exclude: tuple[str, ...],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from dbbstation.cli.number_options import SEPARATOR, number_language, shops_numbers
+from dbbstation.cli.number_options import SEPARATOR, shops_numbers
 from dbbstation.cli.number_types import Finite
 
 if TYPE_CHECKING:
@@ -131,9 +131,10 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
     """
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.formats.mapping import read_mapping
+    from dbbstation.files.formats.number_language import number_language
 
     decimal, separator = options.decimal, options.separator
-    language = number_language(decimal, separator) if decimal or separator else None
+    language = number_language(decimal, separator)
     encoding = options.encoding or "utf-8"
     kept = options.kept
     if kept is not None:

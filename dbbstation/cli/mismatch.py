@@ -1,13 +1,10 @@
-"""`dbbstation mismatch`: any simulation against any recording, given as a table."""
+"""`dbbstation mismatch`: any simulation against any recording, given as a table or a simulator."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
+from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.effects import (
     LIKELY,
     SURELY_FOUND,
@@ -17,222 +14,69 @@ from dbbstation.cli.effects import (
     parts_with_gain,
     residual_text,
 )
-from dbbstation.cli.figure_option import figure_option, format_of
-from dbbstation.cli.number_options import number_language, number_options
-from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
+from dbbstation.cli.shop import shop_settings
+from dbbstation.tasks.mismatch import mismatch as task
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
+    from pathlib import Path
 
+    from dbbstation.errors import OutputError
     from dbbstation.results.mismatch import EffectResult, MismatchResult
+    from dbbstation.results.simulator import SimulatorResult
 
 
-@click.command()
-@click.argument("data", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="DATA.csv...")
-@click.option("--measured", metavar="COLUMN", help="Column of the measured values.")
-@click.option("--simulated", metavar="COLUMN", help="Column of the simulated values.")
-@click.option(
-    "--simulator",
-    type=click.Path(path_type=Path),
-    metavar="model.yaml",
-    help="Simulator of your own, which is executed: it is refitted, and asked at its ports what it lacks.",
-)
-@click.option(
-    "--most-runs",
-    type=click.IntRange(min=1),
-    help="With --simulator: simulations that may be run [default: what ten minutes hold].",
-)
-@click.option(
-    "--anew",
-    is_flag=True,
-    help="With --simulator: run all simulations anew; those run before, of the same files and values, are kept in the user's cache "
-    "folder and not run again otherwise.",
-)
-@click.option(
-    "--allow",
-    is_flag=True,
-    help="With --simulator: run this simulator from now on, until one of its files changes. A simulator file runs a program.",
-)
-@click.option(
-    "--corrected",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="With --simulator: write measured, simulated, refitted and corrected values here.",
-)
-@click.option(
-    "--variables",
-    metavar="A,B=UNIT,...",
-    help="Columns that the difference may follow, each with its unit or kind if its name does not say it; NAME:result or NAME=UNIT:result results "
-    "from what is simulated and is no cause [default: all].",
-)
-@click.option("--run", metavar="COLUMN", help="Column that tells runs apart; several files are several runs anyway.")
-@click.option(
-    "--time",
-    metavar="COLUMN",
-    help="Column that says when; `rows`: the rows stand in the order of measuring [default: guessed].",
-)
-@click.option(
-    "--source-file",
-    "source_files",
-    multiple=True,
-    type=click.Path(path_type=Path),
-    metavar="FILE.py",
-    help="Python file with physics of your own. It is executed. May be given more than once.",
-)
-@click.option(
-    "--known",
-    metavar="NAME=U,...",
-    help="Standard uncertainty to which parameters of columns d_NAME were known [default: what moves the simulated value twice as "
-    "far as it is off].",
-)
-@click.option("--free", metavar="NAME,...", help="Parameters of which nothing is known, such as initial states.")
-@click.option(
-    "--matters",
-    type=Finite(),
-    metavar="SIZE",
-    help='Smallest effect that you care about, rms in the unit of the measured values: "no" is answered only where it would have been '
-    "found [default: what refitted parameters leave].",
-)
-@click.option("--no-offset", is_flag=True, help="Let no constant lie between measured and simulated values.")
-@click.option("--no-held-out", is_flag=True, help="Leave out the held-out test, which takes most of the time.")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Write the table here, with the corrected simulation as a further column; with --simulator, the missing terms as Python code.",
-)
-@number_options
-@figure_option("Draw what differs here")
-@click.option("--force", is_flag=True, help="Overwrite these files.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def mismatch(
-    data: tuple[Path, ...],
-    *,
-    measured: str | None,
-    simulated: str | None,
-    simulator: Path | None,
-    most_runs: int | None,
-    anew: bool,
-    allow: bool,
-    corrected: Path | None,
-    variables: str | None,
-    run: str | None,
-    time: str | None,
-    source_files: tuple[Path, ...],
-    known: str | None,
-    free: str | None,
-    matters: float | None,
-    no_offset: bool,
-    no_held_out: bool,
-    decimal: str | None,
-    separator: str | None,
-    out: Path | None,
-    figure: Path | None,
-    force: bool,
-    as_json: bool,
-) -> None:
-    r"""Find where a simulation and a recording differ, in what form, and what was left out of the simulation.
+def show(result: MismatchResult | SimulatorResult) -> None:
+    """Print what was found."""
+    from dbbstation.cli.mismatch_simulator import show_simulator
+    from dbbstation.results.simulator import SimulatorResult
 
-    A row of the table is one measured value beside the simulated one, with everything that was known then: joint angles,
-    positions, loads, temperatures, the time. Units stand at the end of names (x_mm, q1_deg, t_s, oil_temp_c) or in --variables.
-    Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then fitted anew.
-
-    With --simulator the recordings have inputs and measured outputs, and the program runs your simulator itself: it says at which
-    of its ports which term is missing.
-
-    \b
-    Examples:
-      dbbstation mismatch run.csv --measured measured_mm --simulated model_mm
-      dbbstation mismatch day1.csv day2.csv --measured y_um --simulated y_sim_um --figure where.svg
-      dbbstation mismatch excel.csv --measured y_um --simulated y_sim_um --decimal ,
-      dbbstation mismatch arm.csv --measured z_mm --simulated fk_mm --variables q1=deg,q2=deg,temperature --json
-      dbbstation mismatch run.csv --simulator model.yaml --out missing.py --figure before_after.svg
-      dbbstation mismatch tank.csv --measured level_m --simulated level_sim_m --known valve=0.02 --free level_at_start
-    """
-    from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import stage_bar
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.files.atomic import refuse_existing, write_bytes
-    from dbbstation.files.provenance import refuse_existing_table, write_table
-    from dbbstation.files.recordings.table_csv import table_csv
-    from dbbstation.tasks.mismatch import STAGES, STAGES_WHOLE, require_size
-    from dbbstation.tasks.mismatch import mismatch as compared
-    from dbbstation.tasks.tables import stated_uncertainties, stated_variables
-
-    numbers = number_language(decimal, separator) if decimal or separator else None
-    _refuse_mixed(
-        simulator,
-        {"--measured": measured, "--simulated": simulated, "--variables": variables, "--run": run, "--time": time}
-        | {"--known": known, "--free": free, "--no-offset": no_offset or None},
-        {"--most-runs": most_runs, "--corrected": corrected, "--anew": anew or None, "--allow": allow or None},
-    )
-    require_size(matters)
-    if simulator is not None:
-        from dbbstation.cli.mismatch_simulator import mismatch_with_simulator, refuse_unallowed
-
-        refuse_unallowed(simulator, allow=allow)
-        mismatch_with_simulator(
-            data,
-            simulator,
-            source_files,
-            numbers,
-            matters=matters,
-            most_runs=most_runs,
-            hold_out=not no_held_out,
-            keeps=not anew,
-            out=out,
-            corrected=corrected,
-            figure=figure,
-            force=force,
-            as_json=as_json,
-        )
-        return
-    if measured is None or simulated is None:
-        raise click.UsageError("give --measured and --simulated, columns of the table, or --simulator")
-    if out is not None:
-        refuse_existing_table(out, force=force)
-    if figure is not None:
-        refuse_existing(figure, force=force)
-    with stage_bar("comparison", STAGES_WHOLE if no_held_out else STAGES) as progress:
-        result = compared(
-            data,
-            measured,
-            simulated,
-            variables=stated_variables(variables) if variables else None,
-            run=run,
-            time=time,
-            source_files=source_files,
-            known_u=stated_uncertainties(known) if known else None,
-            free=tuple(name.strip() for name in free.split(",")) if free else (),
-            has_offset=not no_offset,
-            matters=matters,
-            hold_out=not no_held_out,
-            numbers=numbers,
-            progress=progress,
-            say=lambda text: say(f"note: {text}"),
-        )
-    offered = result.levels.correction is not False
-    if out is not None and offered:
-        write_table(out, table_csv(list(result.table), list(result.table.values())), provenance(), force=force)
-        result = replace(result, out=str(out))
-    if figure is not None and result.drawing is not None:
-        write_bytes(figure, result.drawing(format_of(figure)), force=force)
-        result = replace(result, figure=str(figure))
-    if as_json:
-        print_result(result)
+    if isinstance(result, SimulatorResult):
+        show_simulator(result)
     else:
         _print(result)
-    if out is not None and not offered:
-        raise not_written(out, result.levels)
 
 
-def _refuse_mixed(simulator: Path | None, of_tables: Mapping[str, object], of_simulators: Mapping[str, object]) -> None:
-    """Refuse options of the other kind of recordings."""
-    given = [name for name, value in (of_simulators if simulator is None else of_tables).items() if value is not None]
-    if given:
-        what = (
-            "belongs to --simulator" if simulator is None else "belongs to a table: model.yaml says it for a simulator"
-        )
-        raise click.UsageError(f"{given[0]} {what}")
+def _write(result: MismatchResult | SimulatorResult, path: Path, *, force: bool) -> None:
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.files.atomic import write_text
+    from dbbstation.files.provenance import write_table
+    from dbbstation.files.recordings.table_csv import table_csv
+    from dbbstation.results.simulator import SimulatorResult
+
+    if isinstance(result, SimulatorResult):
+        write_text(path, result.code, force=force)
+    else:
+        write_table(path, table_csv(list(result.table), list(result.table.values())), provenance(), force=force)
+
+
+def _write_rows(result: SimulatorResult, path: Path, *, force: bool) -> None:
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.files.provenance import write_table
+
+    write_table(path, result.rows_csv, provenance(), force=force)
+
+
+def _refused(result: MismatchResult | SimulatorResult, path: Path) -> OutputError | None:
+    return not_written(path, result.levels) if result.levels.correction is False else None
+
+
+def _allowed() -> dict[str, object]:
+    setting = shop_settings().values.get("simulators")
+    return {"allowed": setting.value} if setting else {}
+
+
+OUT = "Write the table here, with the corrected simulation as a further column; with --simulator, the missing terms as Python code."
+ROWS = "With --simulator: write measured, simulated, refitted and corrected values here."
+mismatch = command(
+    task,
+    show,
+    CommandOutput("out", OUT, _write, table=True, refused=_refused),
+    CommandOutput("corrected", ROWS, _write_rows, table=True, only_with="simulator"),
+    figure("Draw what differs here"),
+    more=_allowed,
+)
 
 
 def _print(result: MismatchResult) -> None:

@@ -5,155 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dbbstation.cli.effects import LIKELY, SURELY_FOUND, first_names, not_written, parts_with_gain, residual_text
+from dbbstation.cli.effects import LIKELY, SURELY_FOUND, first_names, parts_with_gain, residual_text
 from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
-    from dbbstation.diagnosis.simulator.answer import SimulatorComparison
-    from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.results.simulator import PortTerm, SimulatorParameterResult, SimulatorResult
 
 
-def refuse_unallowed(simulator: Path, *, allow: bool) -> None:
-    """Refuse to run a simulator that neither the user nor the user's settings have allowed."""
-    from dbbstation.cli.output import say
-    from dbbstation.cli.shop import shop_settings
-    from dbbstation.simulators.allowed import require_allowed
-
-    setting = shop_settings().values.get("simulators")
-    problem = require_allowed(simulator, setting.value if setting else (), allow=allow)
-    if problem:
-        say(f"note: {problem}")
-
-
-def mismatch_with_simulator(
-    recordings: Sequence[Path],
-    simulator: Path,
-    own_files: Sequence[Path],
-    numbers: NumberLanguage | None,
-    *,
-    matters: float | None,
-    most_runs: int | None,
-    hold_out: bool,
-    keeps: bool,
-    out: Path | None,
-    corrected: Path | None,
-    figure: Path | None,
-    force: bool,
-    as_json: bool,
-) -> None:
-    """Compare a simulator with recordings; print and write the results."""
-    from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import stage_bar
-    from dbbstation.diagnosis.simulator.answer import find
-    from dbbstation.diagnosis.simulator.model import SimulationRequest
-    from dbbstation.files.atomic import refuse_existing
-    from dbbstation.files.provenance import refuse_existing_table
-    from dbbstation.results.of_simulator import simulator_result
-    from dbbstation.results.simulator import SimulationsRun
-    from dbbstation.simulators.loading import load_simulator
-    from dbbstation.simulators.running import MOST_SECONDS, Runs
-
-    for path in (out, figure):
-        if path is not None:
-            refuse_existing(path, force=force)
-    if corrected is not None:
-        refuse_existing_table(corrected, force=force)
-    loaded = load_simulator(simulator, recordings, own_files, numbers)
-    model = loaded.model
-    with Runs(loaded, most=most_runs, keeps=keeps) as runs:
-        values = [parameter.value for parameter in model.parameters]
-        one_s = runs.allow([SimulationRequest(k, model.of_run(k, values)) for k in range(len(model.runs))])
-        limit = f"{runs.most} are allowed at the most"
-        if most_runs is None:
-            limit = f"{MOST_SECONDS / 60.0:.0f} minutes are allowed, which about {runs.most} fit into"
-        say(f"note: a simulation takes {one_s:.2g} s, {limit} (--most-runs)")
-        with stage_bar("comparison", STAGES if hold_out else STAGES_WHOLE) as progress:
-
-            def told(text: str, done: int = 0, of: int = 0) -> None:
-                left = runs.left_s
-                spent = (
-                    f"{text}, {runs.ran} of {runs.most} simulations, {left:.0f} s at the most left" if left else text
-                )
-                progress(spent, done, of)
-
-            answer = find(model, runs, own=loaded.own, hold_out=hold_out, matters=matters, progress=told)
-        result = simulator_result(answer, SimulationsRun(runs.ran, runs.most, one_s, runs.found))
-    offered = result.levels.correction is not False
-    result = _written(answer, result, out if offered else None, corrected, figure, force=force)
-    if as_json:
-        print_result(result)
-    else:
-        _print(result)
-    if out is not None and not offered:
-        raise not_written(out, result.levels)
-
-
-def _written(
-    answer: SimulatorComparison,
-    result: SimulatorResult,
-    out: Path | None,
-    corrected: Path | None,
-    figure: Path | None,
-    *,
-    force: bool,
-) -> SimulatorResult:
-    """Write what is asked for, and return the result with the names of the files."""
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.files.atomic import write_bytes, write_text
-    from dbbstation.files.provenance import write_table
-    from dbbstation.simulators.code import missing_code
-
-    if out is not None:
-        write_text(out, missing_code(answer), force=force)
-        result = replace(result, out=str(out))
-    if corrected is not None:
-        write_table(corrected, _corrected(answer), provenance(), force=force)
-        result = replace(result, corrected=str(corrected))
-    if figure is not None:
-        from dbbstation.cli.figure_option import format_of
-        from dbbstation.report.simulator_figure import simulator_figure
-
-        write_bytes(figure, simulator_figure(answer, format_of(figure)), force=force)
-        result = replace(result, figure=str(figure))
-    return result
-
-
-STAGES = {"refit": 0, "look": 5, "sets of causes": 10, "held-out part": 40}
-STAGES_WHOLE = {"refit": 0, "look": 5, "sets of causes": 20}
-"""Stages of a comparison with the held-out test and without it, and the share of its time that has passed by then [%]."""
-
-
-def _corrected(answer: SimulatorComparison) -> str:
-    """Return a table of run, time, and each output's measured, simulated, refitted and corrected values."""
-    from dbbstation.files.recordings.table_csv import table_csv
-
-    work, model = answer.work, answer.model
-    names, columns = ["run", "t_s"], [[], []]  # type: ignore[var-annotated]  # texts and numbers
-    for k, run in enumerate(model.runs):
-        columns[0] += [str(k + 1)] * len(run)
-        columns[1] += run.inputs["t"].tolist()
-    outputs = len(model.outputs)
-    left = {
-        "simulated": answer.as_simulated,
-        "refitted": answer.base.fitted.residual,
-        "corrected": answer.found.residual,
-    }
-    for o, output in enumerate(model.outputs):
-        own = [rows for b, rows in enumerate(work.blocks) if b % outputs == o]
-        names.append(f"{output.name}_measured")
-        columns.append([value for rows in own for value in work.measured[rows].tolist()])
-        for name, rows_left in left.items():
-            values = work.measured - rows_left * work.scale
-            names.append(f"{output.name}_{name}")
-            columns.append([value for rows in own for value in values[rows].tolist()])
-    return table_csv(names, columns)
-
-
-def _print(result: SimulatorResult) -> None:
+def show_simulator(result: SimulatorResult) -> None:
+    """Print what was found with a simulator."""
     unit, held_out = result.unit, result.held_out_rms
     _print_whether(result)
     findings = result.findings

@@ -49,6 +49,8 @@ def shops_numbers() -> NumberLanguage | None:
 
     For commands in which a file decides first.
     """
+    from dbbstation.files.formats.number_language import number_language
+
     values = shop_settings().values
     found = {key: values[name] for key in ("decimal", "separator") if (name := f"numbers.{key}") in values}
     if not found:
@@ -56,16 +58,3 @@ def shops_numbers() -> NumberLanguage | None:
     texts = ", ".join(f"--{key} {setting.value}" for key, setting in found.items())
     say(f"settings: {texts} (from {next(iter(found.values())).file})")
     return number_language(*(str(found[key].value) if key in found else None for key in ("decimal", "separator")))
-
-
-def number_language(decimal: str | None, separator: str | None) -> NumberLanguage:
-    """Return the number format of a table.
-
-    Raises:
-        InputError: decimal sign and separator are equal.
-    """
-    from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
-
-    decimal = decimal or PLAIN.decimal
-    usual = ";" if decimal == "," else PLAIN.separator
-    return NumberLanguage(decimal, usual if separator is None else _BY_NAME.get(separator, separator))

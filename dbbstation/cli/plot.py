@@ -56,7 +56,7 @@ def plot(
     from dbbstation.cli.progress import count_bar
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.report.plot import PlotKind, Plotted, plot_figure
-    from dbbstation.tasks.circles import load_circles
+    from dbbstation.tasks.circle_runs import load_circles
 
     refuse_outputs([out], force=force)
     chosen = filter_of(cut_off)

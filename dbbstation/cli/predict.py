@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from dbbstation.cli.number_options import number_language, number_options
+from dbbstation.cli.number_options import number_options
 from dbbstation.cli.source_files import source_file_option
 
 
@@ -45,6 +45,7 @@ def predict(
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_result, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
+    from dbbstation.files.formats.number_language import PLAIN, number_language
     from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.tasks.models import model_of
@@ -60,7 +61,7 @@ def predict(
             poses,
             out=out,
             force=force,
-            numbers=number_language(decimal, separator),
+            numbers=number_language(decimal, separator) or PLAIN,
             provenance=provenance,
             progress=progress,
         )

@@ -20,7 +20,23 @@ if TYPE_CHECKING:
 PROGRAM = f"dbbstation {__version__}"
 
 _NO_CONTENT = frozenset(
-    {"out", "page", "pdf", "rebuild", "figure", "log", "force", "as_json", "jobs", "out_table", "scheduler", "anew"}
+    {
+        "out",
+        "csv",
+        "corrected",
+        "allow",
+        "page",
+        "pdf",
+        "rebuild",
+        "figure",
+        "log",
+        "force",
+        "as_json",
+        "jobs",
+        "out_table",
+        "scheduler",
+        "anew",
+    }
 )
 """Parameters that say where and in which form results go, or how fast: their content is the same without them. Left out, so
 that the same inputs give the same bytes under every name."""

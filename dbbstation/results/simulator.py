@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from dbbstation.facts.serialise import Absent
+from dbbstation.facts.serialise import Absent, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
@@ -214,6 +214,8 @@ class SimulatorResult(Framed):
     out: Annotated[str | None, Absent] = None
     corrected: Annotated[str | None, Absent] = None
     figure: Annotated[str | None, Absent] = None
+    code: Annotated[str, Kept] = ""
+    rows_csv: Annotated[str, Kept] = ""
 
     def sentences(self) -> list[str]:
         """The answer in three levels, in words; a notebook shows it above the table."""

@@ -112,7 +112,7 @@ def _fitted(job: SessionJob) -> object:
 
 def _programs(job: SessionJob, settings: Settings) -> object:
     """Write the circles' NC programs in the shop's dialect."""
-    from dbbstation.tasks.circle_programs import write_circle_programs  # noqa: PLC0415 - the same
+    from dbbstation.tasks.circle_programs import program  # noqa: PLC0415 - the same
 
     plan, machine = _needed(job.plan, "plan"), _needed(job.machine, "machine")
     chosen = {
@@ -129,10 +129,10 @@ def _programs(job: SessionJob, settings: Settings) -> object:
         word for option, value in chosen.items() for word in (f"--{option.replace('_', '-')}", str(value))
     ]
     of_model: list[str | Path] = [] if job.model is None else ["--model", job.model]
-    return write_circle_programs(
-        plan,
-        machine,
-        job.out,
+    return program(
+        plan=plan,
+        machine=machine,
+        out=job.out,
         model=job.model,
         **chosen,
         force=job.force,

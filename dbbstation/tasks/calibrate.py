@@ -4,88 +4,113 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from dbbstation.calibration.fit.calibrate import (
-    KINEMATIC_SOURCES,
-    MEASUREMENT_SOURCES,
-    Calibration,
-    machine_sources,
-)
-from dbbstation.calibration.fit.calibrate import calibrate as fit
-from dbbstation.calibration.fit.methods import Method, as_known
-from dbbstation.calibration.outliers.robust import calibrate_robust
-from dbbstation.calibration.reporting.evaluation import evaluate
-from dbbstation.calibration.reporting.figures import calibration_figures, covariance_of, report_of
-from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.errors import ModelError
-from dbbstation.files.own_sources import every_source
-from dbbstation.model.observation import Motions
-from dbbstation.results.calibration import CalibrationResult
-from dbbstation.sources.laws.by_temperature import following_thermometers
-from dbbstation.sources.registry import sources_named
-from dbbstation.tasks.load import loaded
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Names, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.calibration.fit.methods import Method
     from dbbstation.calibration.fit.prescription import Name
     from dbbstation.model.observation import Observation
+    from dbbstation.results.calibration import CalibrationResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.load import Recorded, Sessions
+    from dbbstation.tasks.load import Recorded
     from dbbstation.tasks.telling import Progress
 
 STAGES = {"fit": 0, "figures": 36, "observability": 53}
 """Stages of a calibration once runs are read, and the share of its time that has passed by then [%]; fits are one or several."""
 
 
+@task("calibrate", label="calibration", stages=STAGES)
 def calibrate(
-    sessions: Sessions | Recorded,
+    sessions: o.RecordedSessions,
     *,
-    sources: Sequence[str] | None = None,
-    method: str = "jig",
-    prescribe: Sequence[str] | None = None,
-    tests: Sequence[str] = (),
-    exclude: Sequence[str] = (),
-    law_over_time: bool = False,
+    sources: Annotated[
+        Names | None,
+        Option("Error sources to fit [default: strut-reference-length,base-joints].", metavar="A,B,..."),
+    ] = None,
+    source_files: o.SourceFiles = (),
+    law_over_time: Annotated[
+        bool, Option("Fit thermal growth as a function of time, even where temperatures were logged.")
+    ] = False,
+    method: Annotated[
+        Literal["jig", "conv-a", "conv-b"],
+        Option(
+            "How ball positions are known: from a CMM sheet (jig); not at all (conv-a); from micrometer readings (conv-b)."
+        ),
+    ] = "jig",
+    prescribe: Annotated[
+        Names | None,
+        Option("Parameters to hold at nominal, as many as the tests cannot identify.", metavar="SOURCE.PARAMETER,..."),
+    ] = None,
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
     known: Mapping[str, ErrorSource] | None = None,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> CalibrationResult:
-    """Fit the machine's errors to the raw circles of one or more sessions.
+    r"""Fit the machine's errors to the raw circles of one or more sessions.
 
-    Scatter of mountings, CMM and bar enters as random effects. Unidentifiable combinations of parameters are named and
-    held at nominal. Outlying balls and runs are named and left out.
+    Fits 24 kinematic parameters: the reference lengths of the struts and the positions of the base joints. The scatter of
+    mountings, CMM and bar enters as random effects. Combinations of parameters that the tests cannot identify are named
+    and held at nominal. Balls and runs that are outliers are named and kept out of the fit.
+
+    With --method conv-a or conv-b the balls were put up under the spindle, and their positions are unknown. Six
+    combinations cannot be identified then. Six parameters are held at nominal instead; the program chooses them, or
+    --prescribe names them.
+
+    With drive-friction among the sources, recorded motor currents are fitted too. They give gains and friction of the
+    drives, and with cog-shift the centre of gravity.
+
+    \b
+    Examples:
+      dbbstation calibrate 2026-11-20-hexapod-7
+      dbbstation calibrate 2026-11-20-hexapod-7 --out model.yaml --figure circles.svg
+      dbbstation calibrate monday tuesday --exclude h --json
+      dbbstation calibrate standard-test --method conv-a
+      dbbstation calibrate monday --sources strut-reference-length,base-joints,gravity,cog-shift,drive-friction
+      dbbstation calibrate monday --source-file scale_bow.py --sources strut-reference-length,base-joints,scale-bow
 
     Args:
-        sessions: folders, or the result of `load`.
-        sources: names; None: reference lengths of the struts and base joints.
-        method: ball positions: from a CMM sheet (`jig`), unknown (`conv-a`), from micrometer readings (`conv-b`).
-        prescribe: parameters to hold, as `source.parameter`, as many as are unidentifiable; None: `jig` holds the directions
-            themselves, else the program chooses.
-        tests: names; empty for all.
-        exclude: names of tests.
-        law_over_time: fit thermal growth over time, despite logged temperatures.
-        known: error sources by name; None: those of package and installed packages.
-        progress: called with each stage.
-        stop: asked at each stage.
-        say: called with notes.
+        known: error sources by name; None: those of package, installed packages and `source_files`.
 
     Returns:
         The model with the figures of its fit; `drawing` draws them.
 
     Raises:
+        ArgumentError: a value that it does not take.
         InputError: faults of files and traces.
         ModelError: an unknown source, or one that belongs to no machine or does not show in circles.
         CalibrationError: too few tests, or the fit does not converge.
         StoppedError: `stop` returned True.
     """
+    from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
+    from dbbstation.calibration.fit.calibrate import calibrate as fit
+    from dbbstation.calibration.fit.methods import Method, as_known
+    from dbbstation.calibration.outliers.robust import calibrate_robust
+    from dbbstation.calibration.reporting.evaluation import evaluate
+    from dbbstation.calibration.reporting.figures import calibration_figures, covariance_of, report_of
+    from dbbstation.calibration.reporting.identified import identified_model
+    from dbbstation.files.own_sources import every_source, sources_of
+    from dbbstation.results.calibration import CalibrationResult
+    from dbbstation.sources.registry import sources_named
+    from dbbstation.tasks.load import loaded, paths_of
+
     telling = Telling(progress, stop, say)
     way = Method(method)
     chosen = KINEMATIC_SOURCES if sources is None else tuple(sources)
-    fitted = sources_named(dict.fromkeys(chosen + MEASUREMENT_SOURCES), every_source() if known is None else known)
+    if known is None:
+        known = every_source(paths_of(source_files))
+        unused = set(sources_of(paths_of(source_files), known)) - set(chosen)
+        telling.note(*(f"{name} is known now, but not fitted: name it with --sources" for name in unused))
+    fitted = sources_named(dict.fromkeys(chosen + MEASUREMENT_SOURCES), known)
     if not machine_sources(fitted):
         raise ModelError(
             "none of the error sources named belongs to the machine and shows in circles: there is nothing to calibrate",
@@ -118,14 +143,16 @@ def calibrate(
 
 
 def _drawn(calibration: Calibration, wanted: object) -> bytes:
-    from dbbstation.report.calibration_figure import calibration_figure  # noqa: PLC0415 - half a second for who draws nothing
-    from dbbstation.report.figure_format import figure_format  # noqa: PLC0415
+    from dbbstation.report.calibration_figure import calibration_figure
+    from dbbstation.report.figure_format import figure_format
 
     return calibration_figure(calibration, figure_format(wanted))
 
 
 def _prescribed(names: Sequence[str] | None, method: Method) -> list[Name] | None:
     """Return named parameters, or by method the directions themselves or the program's choice."""
+    from dbbstation.calibration.fit.methods import Method
+
     if names is None:
         return None if method is Method.JIG else []
     parts = [name.partition(".") for name in names]
@@ -136,6 +163,9 @@ def _following_thermometers(
     fitted: tuple[ErrorSource, ...], recorded: Recorded, telling: Telling
 ) -> tuple[ErrorSource, ...]:
     """Return sources that grow with logged temperatures instead of time, with a note."""
+    from dbbstation.model.observation import Motions
+    from dbbstation.sources.laws.by_temperature import following_thermometers
+
     forms = following_thermometers(fitted, Motions(recorded.observations))
     telling.note(
         *(

@@ -2,78 +2,88 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.files.atomic import write_folder
-from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.inputs import in_a_book
-from dbbstation.files.own_dialects import dialect_given
-from dbbstation.nc.circle_program import Approach
-from dbbstation.nc.export import circle_programs
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
-from dbbstation.results.model_warnings import model_warnings
-from dbbstation.results.programs import programs_result
-from dbbstation.tasks.chosen import chosen_of
-from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
-from dbbstation.tasks.provenance import from_python
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import File, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from os import PathLike
+    from collections.abc import Callable, Mapping
 
     from dbbstation.files.provenance import Provenance
     from dbbstation.results.programs import ProgramsResult
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.telling import Progress
 
-STEP_DEG = 0.1
-"""Angle between points where nobody says another [deg]."""
 
-CLEARANCE_MM = 20.0
-"""Height of rapid moves above the first point where nobody says another [mm]."""
-
-
+@task("program", label="programs")
 @in_a_book
-def write_circle_programs(
-    plan_file: Path,
-    machine_file: Path,
-    out: str | PathLike[str],
+def program(
     *,
-    dialect: str = "linuxcnc",
-    model: Path | None = None,
-    tests: Sequence[str] = (),
-    exclude: Sequence[str] = (),
-    step_deg: float = STEP_DEG,
-    clearance_mm: float | None = CLEARANCE_MM,
-    chord_um: float = 1e3 * CIRCLE_CHORD_MM,
-    prefer: str = "accuracy",
-    strict: bool = False,
-    time_s: float | None = None,
-    largest_correction_mm: float = LARGEST_CORRECTION_MM,
-    force: bool = False,
+    plan: Annotated[File, Option("Test plan.", kind="file")],
+    machine: Annotated[File, Option("Machine file.", kind="file")],
+    out: Annotated[File, Option("Folder to write to.", kind="folder")],
+    dialect: Annotated[
+        str, Option("Language of the control: a name, or FILE.py.", metavar="D", setting="program.dialect")
+    ] = "linuxcnc",
+    model: Annotated[o.Model | None, o.model("Compensate with this calibrated model.")] = None,
+    source_files: o.SourceFiles = (),
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
+    step_deg: Annotated[
+        float, Option("Angle between points [deg].", setting="program.step_deg", least=0.01, most=5.0)
+    ] = 0.1,
+    clearance_mm: Annotated[
+        float, Option("Height of rapid moves above the first point [mm].", setting="program.clearance_mm", least=0.0)
+    ] = 20.0,
+    bar_stays_on: Annotated[bool, Option("Start and end with the bar on its balls: no rapids, no stops.")] = False,
+    chord_um: Annotated[
+        float,
+        Option(
+            "With --model: greatest distance between a straight move and the circle [µm].", least=0.001, most=1000.0
+        ),
+    ] = 1e3 * CIRCLE_CHORD_MM,
+    prefer: o.Prefer = "accuracy",
+    strict: o.Strict = False,
+    time_s: Annotated[
+        float | None,
+        Option("Start of the programs after the session's start [s], for models that depend on time.", metavar="S"),
+    ] = None,
+    largest_correction_mm: o.LargestCorrectionMm = LARGEST_CORRECTION_MM,
+    force: Annotated[bool, Option("Replace existing files.")] = False,
     known: Mapping[str, ErrorSource] | None = None,
-    provenance: Callable[[], Provenance] = from_python,
+    provenance: Callable[[], Provenance] | None = None,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> ProgramsResult:
-    """Write the programs of a plan's circles, all or none, checked against the travel.
+    r"""Write the NC programs of a plan's circles, one for each test and direction, nominal or compensated.
+
+    Every program is checked against the travel of axes, angles and struts before anything is written; all programs
+    are written or none. A program goes above its first point, comes down to it, waits for the bar to be put on, runs
+    the path of a run and waits for the bar to be taken off.
+
+    Points of compensated programs are as far apart as the control needs for the feed, within --chord-um. If that is not
+    far enough, the output states about how much slower the control is. --strict refuses the program instead.
+
+    \b
+    Examples:
+      dbbstation program --plan table2.yaml --machine machine.yaml --out nominal
+      dbbstation program --plan table2.yaml --machine machine.yaml --model model.yaml --out compensated
+      dbbstation program --plan table2.yaml --machine machine.yaml --test a,f --out two --json
 
     Args:
-        dialect: a name, or a Python file.
-        model: file; None: nominal programs.
-        tests: names; empty for all.
-        clearance_mm: height of rapids above the first point; None: the bar stays on, without rapids and stops.
-        chord_um: greatest distance of a compensated move from the circle.
-        prefer: `accuracy`, or `position-only` to leave A, B and C as they are.
-        strict: refuse programs that miss the chord error or a feed.
-        time_s: start of the programs after the session's, for models that depend on time.
-        largest_correction_mm: models that shift a point by more are refused.
+        known: error sources by name; None: those of package, installed packages and `source_files`.
+        provenance: called once all is read; None: from Python.
+        stop: asked after each program.
 
     Raises:
+        ArgumentError: a value that it does not take.
         InputError: every fault of the files.
         TravelError: a program leaves the machine's travel.
         ModelError: the model is of another machine, or has a source that needs what a program lacks.
@@ -81,14 +91,28 @@ def write_circle_programs(
         OutputError: a program exists without `force`.
         StoppedError: `stop` returned True; nothing was written.
     """
+    from dbbstation.files.atomic import write_folder
+    from dbbstation.files.formats.machine import read_machine
+    from dbbstation.files.formats.plan import read_plan
+    from dbbstation.files.own_dialects import dialect_given
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.nc.circle_program import Approach
+    from dbbstation.nc.export import circle_programs
+    from dbbstation.results.model_warnings import model_warnings
+    from dbbstation.results.programs import programs_result
+    from dbbstation.tasks.chosen import chosen_of
+    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
+    from dbbstation.tasks.provenance import from_python
+
     telling = Telling(progress, stop, say)
-    written_in = dialect_given(dialect)
-    plan, machine = read_plan(plan_file), read_machine(machine_file)
+    written_in, plan_file, machine_file, folder = dialect_given(dialect), Path(plan), Path(machine), Path(out)
+    tests_of, hexapod = read_plan(plan_file), read_machine(machine_file)
     inverse = None
     if model is not None:
         inverse = inverse_of(
             model,
-            known,
+            every_source(paths_of(source_files)) if known is None else known,
             time_s=time_s,
             largest_mm=largest_correction_mm,
             prefer=prefer,
@@ -97,21 +121,22 @@ def write_circle_programs(
     warnings = () if inverse is None or inverse.identified is None else model_warnings(inverse.identified)
     telling.note(*warnings)
     programs = circle_programs(
-        plan,
-        machine,
+        tests_of,
+        hexapod,
         written_in,
         inverse=inverse,
-        origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse, provenance()),
-        tests=chosen_of(plan.name, plan.tests, tests, exclude),
+        origin=origin_of(
+            {"plan file": plan_file, "machine file": machine_file}, inverse, (provenance or from_python)()
+        ),
+        tests=chosen_of(tests_of.name, tests_of.tests, tests, exclude),
         step_deg=step_deg,
         chord_mm=chord_um / 1e3,
-        approach=None if clearance_mm is None else Approach(clearance_mm),
+        approach=None if bar_stays_on else Approach(clearance_mm),
         progress=telling.counted("programs"),
     )
-    folder = Path(out)
     write_folder(folder, {each.name: each.text for each in programs}, force=force)
     written = [(str(folder / each.name), each) for each in programs]
-    digest = None if model is None else sha256_of(model)
+    digest = sha256_of(Path(model)) if isinstance(model, str | PathLike) else None
     return programs_result(
-        written, written_in, None if inverse is None else machine, digest, tuple(telling.notes), warnings
+        written, written_in, None if inverse is None else hexapod, digest, tuple(telling.notes), warnings
     )

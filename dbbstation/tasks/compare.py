@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import os
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.diagnosis.compare.comparison import compare as put_side_by_side
-from dbbstation.diagnosis.compare.notes import notes_of
-from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.errors import InputError, Problem
-from dbbstation.results.of_comparison import comparison_result
-from dbbstation.sources.registry import known_sources, sources_named
-from dbbstation.tasks.diagnose import default_candidates
-from dbbstation.tasks.load import load
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import File, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from os import PathLike
+    from collections.abc import Callable
 
     from dbbstation.diagnosis.compare.comparison import Comparison
     from dbbstation.results.comparison import ComparisonResult
@@ -28,32 +22,47 @@ STAGES = {"candidates": 1, "sets of causes": 30, "look": 60, "held-out tests": 8
 """Stages of a comparison once both sessions are read, and the share of its time that has passed by then [%]."""
 
 
+@task("compare", label="comparison", stages=STAGES)
 def compare(
-    a: str | PathLike[str],
-    b: str | PathLike[str],
+    a: Annotated[File, Option("session whose readings are the simulation of B.", kind="argument", metavar="A")],
+    b: Annotated[File, Option("session.", kind="argument", metavar="B")],
     *,
-    tests: Sequence[str] = (),
-    exclude: Sequence[str] = (),
-    hold_out: bool = True,
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
+    held_out: o.HeldOut = True,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> ComparisonResult:
-    """Compare two sessions: where they differ, in what form, by which cause, as B less A.
+    r"""Put two sessions side by side: where they differ, in what form, and by which cause. Differences are B less A.
 
-    Args:
-        a: its readings serve as the simulation of B.
-        tests: names; empty for all.
-        hold_out: choose anew without each group of tests, to check predictions.
+    For last year against today, or a simulation against a recording. The readings of A are the simulation of B. What is
+    stated of noise, mountings, CMM sheets and bars is no difference. Error sources that may have changed, balls and bars that
+    sit elsewhere, and effects without a name compete by their probability, as in `diagnose`.
+
+    \b
+    Examples:
+      dbbstation compare 2025-11-18-hexapod-7 2026-11-20-hexapod-7
+      dbbstation compare predicted 2026-11-20-hexapod-7 --figure difference.svg
+      dbbstation compare predicted 2026-11-20-hexapod-7 --json
 
     Returns:
         What was found; `drawing` draws it.
 
     Raises:
+        ArgumentError: a value that it does not take.
         InputError: faults of files; one session twice.
         TraceError: no common run; circles with removed centres.
         StoppedError: `stop` returned True.
     """
+    from dbbstation.diagnosis.compare.comparison import compare as put_side_by_side
+    from dbbstation.diagnosis.compare.notes import notes_of
+    from dbbstation.diagnosis.diagnose import usable_sources
+    from dbbstation.results.of_comparison import comparison_result
+    from dbbstation.sources.registry import known_sources, sources_named
+    from dbbstation.tasks.diagnosed import default_candidates
+    from dbbstation.tasks.load import load
+
     telling = Telling(progress, stop, say)
     one, other = (load(each, tests=tests, exclude=exclude, progress=progress, stop=stop) for each in (a, b))
     if set(one.sessions.values()) == set(other.sessions.values()):
@@ -64,7 +73,7 @@ def compare(
     candidates = sources_named(default_candidates(known_sources()))
     usable, lacking = usable_sources(one.machine, [*one.observations, *other.observations], candidates)
     found = put_side_by_side(
-        one.machine, one.observations, other.observations, usable, lacking, telling.stage, hold_out=hold_out
+        one.machine, one.observations, other.observations, usable, lacking, telling.stage, hold_out=held_out
     )
     return comparison_result(
         found,
@@ -77,7 +86,7 @@ def compare(
 
 
 def _drawn(found: Comparison, wanted: object) -> bytes:
-    from dbbstation.report.compare_figure import compare_figure  # noqa: PLC0415 - half a second for who draws nothing
-    from dbbstation.report.figure_format import figure_format  # noqa: PLC0415
+    from dbbstation.report.compare_figure import compare_figure
+    from dbbstation.report.figure_format import figure_format
 
     return compare_figure(found, figure_format(wanted))

@@ -2,38 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-
-from dbbstation.calibration.fit.calibrate import default_sources
-from dbbstation.calibration.reporting.evaluation import evaluate
-from dbbstation.calibration.reporting.figures import calibration_figures, report_of
-from dbbstation.calibration.reporting.identified import identified_model
-from dbbstation.diagnosis import diagnose as search
-from dbbstation.diagnosis.diagnose import usable_sources
-from dbbstation.diagnosis.effects import effects_of
-from dbbstation.diagnosis.unexplained_model import keep_unexplained as keeping
 from dbbstation.errors import ModelError
-from dbbstation.facts.serialise import plain
-from dbbstation.files.own_sources import every_source
-from dbbstation.results.effects import effect_results
-from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result, kept_of
-from dbbstation.sources.registry import known_sources, sources_named
-from dbbstation.tasks.load import loaded
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Names, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
+    from collections.abc import Callable, Mapping
 
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.diagnosis.unexplained_model import JointFitWithCurve
     from dbbstation.results.diagnosis import DiagnosisResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.load import Recorded, Sessions
     from dbbstation.tasks.telling import Progress
 
 STAGES = {
@@ -48,108 +31,75 @@ STAGES = {
 """Stages of a diagnosis once runs are read, and the share of its time that has passed by then [%]; joint fits are none or several."""
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosed:
-    """Recorded sessions with their diagnosis.
-
-    Attributes:
-        lacking: reasons against further candidates, by name.
-    """
-
-    recorded: Recorded
-    diagnosis: Diagnosis
-    lacking: Mapping[str, str]
-
-    def summary(self) -> dict[str, object]:
-        """Return all results as plain numbers."""
-        return plain(diagnosis_figures(self.diagnosis, self.lacking))
-
-
-def default_candidates(known: Mapping[str, ErrorSource]) -> list[str]:
-    """Return the error sources that are not always fitted."""
-    fitted = {source.name for source in default_sources()}
-    return [name for name, source in known.items() if name not in fitted and source.candidate]
-
-
-def diagnose_sessions(
-    paths: Sequence[Path],
-    candidates: Sequence[str] | None,
-    exclude: Sequence[str],
-    say: Callable[[str], None],
-    known: Mapping[str, ErrorSource] | None = None,
-    progress: Callable[[str], None] = lambda _: None,
-    reading: Callable[[int, int], None] = lambda _done, _of: None,
-    only: Sequence[str] = (),
-) -> Diagnosed:
-    """Read sessions of one machine and find physics beyond a kinematic calibration.
-
-    Args:
-        paths: folders or session files.
-        candidates: source names; None: all.
-        known: sources by name; None: the package's.
-        only: names of tests; empty for all.
-
-    Raises:
-        InputError: faults of files and traces.
-        ModelError: an unknown source, or one that is no cause.
-        CalibrationError: the kinematic model cannot be fitted.
-    """
-    telling = Telling(_staged(progress, reading), say=lambda text: say(f"note: {text}"))
-    return _diagnosed(paths, candidates, (tuple(only), tuple(exclude)), known or known_sources(), telling)
-
-
-def _staged(progress: Callable[[str], None], reading: Callable[[int, int], None]) -> Progress:
-    def tell(text: str, done: int = 0, of: int = 0) -> None:
-        if of:
-            reading(done, of)
-        else:
-            progress(text)
-
-    return tell
-
-
+@task("diagnose", label="diagnosis", stages=STAGES)
 def diagnose(
-    sessions: Sessions | Recorded,
+    sessions: o.RecordedSessions,
     *,
-    sources: Sequence[str] | None = None,
-    tests: Sequence[str] = (),
-    exclude: Sequence[str] = (),
-    keep_unexplained: bool = False,
-    hold_out: bool = True,
+    sources: Annotated[Names | None, Option("Error sources to compare [default: all].", metavar="A,B,...")] = None,
+    source_files: o.SourceFiles = (),
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
+    keep_unexplained: Annotated[
+        bool,
+        Option(
+            "Keep an unmodelled effect in that model, as a curve over strut length or force: compensated, cause unknown."
+        ),
+    ] = False,
+    held_out: o.HeldOut = True,
     until_interrupted: bool = False,
     known: Mapping[str, ErrorSource] | None = None,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> DiagnosisResult:
-    """Find, name and model the physics that a kinematic calibration leaves out.
+    r"""Find the physics that a kinematic calibration of these recordings leaves out, name it and model it.
+
+    A calibration can hide gravity, drift or play in its joints: the residual is then small here, and the machine is
+    wrong elsewhere. This command compares sets of causes. It fits each set together with the kinematic parameters and
+    gives the probability of each cause, given the catalogue of causes. Verdicts: identified (probability 0.95 or more,
+    five standard deviations out, and a gain in tests that were held back), happened (acts once), does-not-predict,
+    ambiguous, ruled-out, not-testable.
+
+    \b
+    Examples:
+      dbbstation diagnose 2026-11-20-hexapod-7
+      dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml --figure diagnosis.svg
+      dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
+      dbbstation diagnose 2026-11-20-hexapod-7 --effects
+      dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
+      dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
 
     Args:
-        sessions: folders, or the result of `load`.
-        sources: names; None: all.
-        tests: names; empty for all.
-        exclude: names of tests.
-        hold_out: choose anew without each group of tests, to check predictions.
         until_interrupted: a KeyboardInterrupt ends the comparison with the best set so far.
-        keep_unexplained: keep an unmodelled effect as a compensated curve.
-        known: error sources by name; None: those of package and installed packages.
-        progress: called with each stage.
-        stop: asked at each stage.
-        say: called with notes.
+        known: error sources by name; None: those of package, installed packages and `source_files`.
 
     Returns:
         Causes with their verdicts, and the joint model; `drawing` draws them.
 
     Raises:
+        ArgumentError: a value that it does not take.
         InputError: faults of files and traces.
         ModelError: an unknown source, or one that is no cause.
         CalibrationError: the kinematic model cannot be fitted.
         StoppedError: `stop` returned True.
     """
+    import numpy as np
+
+    from dbbstation.calibration.reporting.evaluation import evaluate
+    from dbbstation.calibration.reporting.figures import calibration_figures, report_of
+    from dbbstation.calibration.reporting.identified import identified_model
+    from dbbstation.diagnosis import diagnose as search
+    from dbbstation.diagnosis.effects import effects_of
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.results.effects import effect_results
+    from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result, kept_of
+    from dbbstation.tasks.diagnosed import diagnosed_of
+    from dbbstation.tasks.load import paths_of
+
     telling = Telling(progress, stop, say)
-    every = every_source() if known is None else known
-    how = partial(search.diagnose, hold_out=hold_out, until_interrupted=until_interrupted)
-    diagnosed = _diagnosed(sessions, sources, (tuple(tests), tuple(exclude)), every, telling, how)
+    every = every_source(paths_of(source_files)) if known is None else known
+    how = partial(search.diagnose, hold_out=held_out, until_interrupted=until_interrupted)
+    diagnosed = diagnosed_of(sessions, sources, (tuple(tests), tuple(exclude)), every, telling, how)
     found = diagnosed.diagnosis
     unnamed = _kept(found, telling) if keep_unexplained else None
     fit = found.after if unnamed is None else unnamed.fit
@@ -171,27 +121,10 @@ def diagnose(
     )
 
 
-def _diagnosed(
-    sessions: Sessions | Recorded,
-    candidates: Sequence[str] | None,
-    chosen: tuple[Sequence[str], Sequence[str]],
-    known: Mapping[str, ErrorSource],
-    telling: Telling,
-    how: Callable[..., Diagnosis] = search.diagnose,
-) -> Diagnosed:
-    named = sources_named(default_candidates(known) if candidates is None else candidates, known)
-    for source in named:
-        if not source.candidate:
-            what = f"{source.name} is no cause: it only keeps in a model what a diagnosis left without a name"
-            raise ModelError(what, remedy="leave it out; --keep-unexplained keeps what is left")
-    recorded = loaded(sessions, *chosen, telling)
-    usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
-    found = how(recorded.machine, recorded.observations, usable, telling.stage)
-    return Diagnosed(recorded, found, lacking)
-
-
 def _kept(found: Diagnosis, telling: Telling) -> JointFitWithCurve | None:
     """Return the unmodelled effect to keep, or None with a note."""
+    from dbbstation.diagnosis.unexplained_model import keep_unexplained as keeping
+
     try:
         return keeping(found.unexplained.curve, found.after)
     except ModelError as error:
@@ -200,7 +133,7 @@ def _kept(found: Diagnosis, telling: Telling) -> JointFitWithCurve | None:
 
 
 def _drawn(diagnosis: Diagnosis, wanted: object) -> bytes:
-    from dbbstation.report.diagnosis_figure import diagnosis_figure  # noqa: PLC0415 - half a second for who draws nothing
-    from dbbstation.report.figure_format import figure_format  # noqa: PLC0415
+    from dbbstation.report.diagnosis_figure import diagnosis_figure
+    from dbbstation.report.figure_format import figure_format
 
     return diagnosis_figure(diagnosis, figure_format(wanted))

@@ -3,68 +3,76 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.calibration.reporting import evaluation
-from dbbstation.calibration.reporting.evaluation import LowPassedCircularity, plane_figures, plane_uncertainty_um
-from dbbstation.calibration.reporting.prediction import predicted_circles
-from dbbstation.calibration.reporting.tolerances import evaluated_tolerances
-from dbbstation.machine.difference import check_model_is_of
-from dbbstation.results.evaluation import EvaluationResult
-from dbbstation.results.model_warnings import model_warnings
-from dbbstation.tasks.load import loaded
-from dbbstation.tasks.models import model_of
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from dbbstation.plan.tolerance import Tolerance
+    from dbbstation.results.evaluation import EvaluationResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.load import Recorded, Sessions
-    from dbbstation.tasks.models import Model
     from dbbstation.tasks.telling import Progress
 
 STAGES = {"predicting runs": 0}
 """Stages of an evaluation once runs are read, and the share of its time that has passed by then [%]."""
 
 
+@task("evaluate", label="evaluation", stages=STAGES)
 def evaluate(
-    sessions: Sessions | Recorded,
-    model: Model,
+    sessions: o.RecordedSessions,
+    model: Annotated[o.Model, o.model("Model file of `calibrate`.")],
     *,
-    tests: Sequence[str] = (),
-    exclude: Sequence[str] = (),
+    source_files: o.SourceFiles = (),
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
     tolerances: Sequence[Tolerance] = (),
     known: Mapping[str, ErrorSource] | None = None,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> EvaluationResult:
-    """Compare recordings with the nominal machine (before) and a model of it (after).
+    r"""Compare recordings with the nominal machine (before) and with a model (after), which must be of the same machine.
 
-    After is a residual, not a new measurement.
+    After is what the model leaves of the recordings, not a new measurement. The second table shows the circular
+    deviation G that was measured and the one that the model predicts. In both tables G is that of readings low-passed at
+    30 undulations per revolution. Flatness over X, Y = ±190 mm and parallelism of a move along X are what the model
+    predicts of programs that are not compensated. Tolerances of the shop's settings are held against every circle.
+
+    \b
+    Examples:
+      dbbstation evaluate check-session --model model.yaml
+      dbbstation evaluate check-session --model model.yaml --json
 
     Args:
-        sessions: folders, or the result of `load`.
-        model: a model, its file, or the result of `calibrate` or `diagnose`.
-        tests: names; empty for all.
-        exclude: names of tests.
         tolerances: for every circle.
-        known: error sources by name, for a file; None: those of package and installed packages.
-        progress: called with each stage.
+        known: error sources by name, for a file; None: those of package, installed packages and `source_files`.
         stop: asked after each run.
-        say: called with notes.
 
     Raises:
+        ArgumentError: a value that it does not take.
         InputError: faults of files and traces.
         TraceError: a run that is no circle.
         ModelError: the model is of another machine; a source needs unknown data.
         KinematicsError: the plane of flatness lies outside the workspace.
         StoppedError: `stop` returned True.
     """
+    from dbbstation.calibration.reporting import evaluation
+    from dbbstation.calibration.reporting.evaluation import LowPassedCircularity, plane_figures, plane_uncertainty_um
+    from dbbstation.calibration.reporting.prediction import predicted_circles
+    from dbbstation.calibration.reporting.tolerances import evaluated_tolerances
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.machine.difference import check_model_is_of
+    from dbbstation.results.evaluation import EvaluationResult
+    from dbbstation.results.model_warnings import model_warnings
+    from dbbstation.tasks.load import loaded, paths_of
+    from dbbstation.tasks.models import model_of
+
     telling = Telling(progress, stop, say)
-    identified = model_of(model, known)
+    identified = model_of(model, every_source(paths_of(source_files)) if known is None else known)
     telling.note(*model_warnings(identified))
     recorded = loaded(sessions, tests, exclude, telling)
     check_model_is_of(recorded.machine, identified.model.machine)

@@ -122,7 +122,7 @@ def _is_killed(error: Exception) -> bool:
 @contextmanager
 def _of_dask(address: str) -> Iterator[Executor]:
     try:
-        from distributed import Client  # noqa: PLC0415 - an extra that only this needs
+        from distributed import Client
     except ImportError as error:
         remedy = "install it with `pip install 'dbbstation[dask]'`"
         raise SchedulerError("distributed, Dask's scheduler, is not installed", remedy=remedy) from error

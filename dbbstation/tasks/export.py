@@ -270,8 +270,8 @@ def write_parquet(
         OutputError: pyarrow is missing; or as `write_csv`.
     """
     try:
-        import pyarrow as pa  # noqa: PLC0415 - an extra of 100 MB that only this needs
-        from pyarrow import parquet  # noqa: PLC0415
+        import pyarrow as pa
+        from pyarrow import parquet
     except ImportError as error:
         remedy = "install it with `pip install 'dbbstation[parquet]'`, or name a .csv file"
         raise OutputError(

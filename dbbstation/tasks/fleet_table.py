@@ -39,8 +39,8 @@ def write_fleet_table(path: Path, result: FleetResult, provenance: Provenance, *
     if path.suffix.lower() != FORMATS[1]:
         raise OutputError("a table is written as .csv or .parquet", where=str(path), remedy="name such a file")
     try:
-        import pyarrow as pa  # noqa: PLC0415 - an extra of 100 MB that only this needs
-        from pyarrow import parquet  # noqa: PLC0415
+        import pyarrow as pa
+        from pyarrow import parquet
     except ImportError as error:
         remedy = "install it with `pip install 'dbbstation[parquet]'`, or name a .csv file"
         raise OutputError(

@@ -7,7 +7,7 @@ import tempfile
 from collections import defaultdict
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from dbbstation.files.provenance import Provenance
 from dbbstation.files.recordings.folder_of_sessions import reason_of
 from dbbstation.results.fleet import FleetCause, FleetFound, FleetValue
 from dbbstation.tasks.calibrate import calibrate
-from dbbstation.tasks.circles import circle_figures
+from dbbstation.tasks.circles import circles
 from dbbstation.tasks.diagnose import diagnose
 from dbbstation.tasks.executors import refuse_other_program
 from dbbstation.tasks.report import report
@@ -48,7 +48,7 @@ class FleetOptions:
     """
 
     sources: tuple[str, ...] | None = None
-    method: str = "jig"
+    method: Literal["jig", "conv-a", "conv-b"] = "jig"
     law_over_time: bool = False
     findings: bool = False
     tests: tuple[str, ...] = ()
@@ -187,7 +187,7 @@ def _diagnosed(piece: FleetPiece) -> Done:
 
 def _circles(piece: FleetPiece) -> Done:
     options = piece.options
-    result = circle_figures(piece.folder, tests=options.tests, exclude=options.exclude, findings=options.findings)
+    result = circles(piece.folder, tests=options.tests, exclude=options.exclude, findings=options.findings)
     runs = run_figures(result.circles.circles)
     worst = max(
         (one for run in runs for one in run.figures if one.name == "G"), key=lambda one: one.value_um, default=None

@@ -236,7 +236,7 @@ def _processes_for(sessions: Sequence[Path]) -> int:
 
 def _session_data(path: Path) -> SessionFigures | _Unreadable:
     """Return the kept facts of a session, or its fault."""
-    from dbbstation.tasks.session_figures import session_figures  # noqa: PLC0415 - whoever opens an index does not wait for the compiler
+    from dbbstation.tasks.session_figures import session_figures
 
     try:
         return session_figures(path.parent)
@@ -245,7 +245,7 @@ def _session_data(path: Path) -> SessionFigures | _Unreadable:
 
 
 def _model_data(path: Path, source_files: Sequence[Path]) -> ModelFigures | _Unreadable:
-    from dbbstation.tasks.session_figures import model_figures  # noqa: PLC0415 - the same
+    from dbbstation.tasks.session_figures import model_figures
 
     try:
         return model_figures(path, source_files)

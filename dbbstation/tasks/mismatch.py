@@ -2,140 +2,234 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
-from dbbstation.diagnosis.table.mismatch import find_mismatch
-from dbbstation.errors import StationError
-from dbbstation.results.of_mismatch import mismatch_result
-from dbbstation.tasks.load import paths_of
-from dbbstation.tasks.tables import TableOptions, load_sources, load_tables, stated_variables
+from dbbstation.errors import ArgumentError
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import File, Files, Names, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from os import PathLike
+    from collections.abc import Callable, Collection, Iterable, Mapping
 
     from dbbstation.diagnosis.table.mismatch import Mismatch
     from dbbstation.diagnosis.table.units import Meaning
-    from dbbstation.files.formats.number_language import NumberLanguage
+    from dbbstation.files.recordings.table_csv import Columns
     from dbbstation.results.mismatch import MismatchResult
-    from dbbstation.tasks.load import Sessions
+    from dbbstation.results.simulator import SimulatorResult
     from dbbstation.tasks.tables import Tabulated
     from dbbstation.tasks.telling import Progress
+
+    Tables = Files | Columns | Iterable[Columns]
+    Variables = str | Mapping[str, Meaning | str | None] | Names
+    Uncertainties = str | Mapping[str, float]
+else:
+    Tables, Variables, Uncertainties = Files, Any, Any
 
 STAGES = {"look": 0, "sets of causes": 8, "held-out part": 15}
 STAGES_WHOLE = {"look": 0, "sets of causes": 50}
 """Stages of a comparison with the held-out test and without it, and the share of its time that has passed by then [%]."""
 
-MATTERS = "state the smallest effect that you care about, as root mean square in the unit of the measured values"
+SIMULATOR_STAGES = {"refit": 0, "look": 5, "sets of causes": 10, "held-out part": 40}
+SIMULATOR_STAGES_WHOLE = {"refit": 0, "look": 5, "sets of causes": 20}
+"""The same with a simulator."""
 
 CORRECTED, LEFT = "corrected", "left"
 """Columns that are added to the table."""
 
 
+def stages(given: Mapping[str, Any]) -> Mapping[str, int]:
+    """Return the stages of what is asked for."""
+    whole = not given.get("held_out", True)
+    if given.get("simulator") is None:
+        return STAGES_WHOLE if whole else STAGES
+    return SIMULATOR_STAGES_WHOLE if whole else SIMULATOR_STAGES
+
+
+@task("mismatch", label="comparison", stages=stages)
 def mismatch(
-    data: Sessions,
-    measured: str,
-    simulated: str,
+    data: Annotated[
+        Tables,
+        Option(
+            "CSV files; scripts may give DataFrames, mappings of arrays, or arrays with named fields.",
+            kind="argument",
+            metavar="DATA.csv...",
+            objects=True,
+        ),
+    ],
+    measured: Annotated[str | None, Option("Column of the measured values.", metavar="COLUMN")] = None,
+    simulated: Annotated[str | None, Option("Column of the simulated values.", metavar="COLUMN")] = None,
     *,
-    variables: Mapping[str, Meaning | str | None] | Sequence[str] | None = None,
-    run: str | None = None,
-    time: str | None = None,
-    source_files: Sequence[str | PathLike[str]] = (),
-    known_u: Mapping[str, float] | None = None,
-    free: Sequence[str] = (),
-    has_offset: bool = True,
-    matters: float | None = None,
-    hold_out: bool = True,
-    numbers: NumberLanguage | None = None,
+    simulator: Annotated[
+        File | None,
+        Option(
+            "Simulator of your own, which is executed: it is refitted, and asked at its ports what it lacks.",
+            kind="path",
+            metavar="model.yaml",
+            not_with=("measured", "simulated", "variables", "run", "time", "known", "free", "offset"),
+        ),
+    ] = None,
+    most_runs: Annotated[
+        int | None,
+        Option(
+            "With --simulator: simulations that may be run [default: what ten minutes hold].",
+            least=1,
+            only_with="simulator",
+        ),
+    ] = None,
+    anew: Annotated[
+        bool,
+        Option(
+            "With --simulator: run all simulations anew; those run before, of the same files and values, are kept in the user's "
+            "cache folder and not run again otherwise.",
+            only_with="simulator",
+        ),
+    ] = False,
+    allow: Annotated[
+        bool,
+        Option(
+            "With --simulator: run this simulator from now on, until one of its files changes. A simulator file runs a program.",
+            only_with="simulator",
+        ),
+    ] = False,
+    variables: Annotated[
+        Variables | None,
+        Option(
+            "Columns that the difference may follow, each with its unit or kind if its name does not say it; NAME:result or "
+            "NAME=UNIT:result results from what is simulated and is no cause [default: all].",
+            metavar="A,B=UNIT,...",
+        ),
+    ] = None,
+    run: Annotated[
+        str | None,
+        Option("Column that tells runs apart; several files are several runs anyway.", metavar="COLUMN"),
+    ] = None,
+    time: Annotated[
+        str | None,
+        Option(
+            "Column that says when; `rows`: the rows stand in the order of measuring [default: guessed].",
+            metavar="COLUMN",
+        ),
+    ] = None,
+    source_files: Annotated[
+        Files,
+        Option(
+            "Python file with physics of your own. It is executed. May be given more than once.",
+            kind="path",
+            flag="--source-file",
+            metavar="FILE.py",
+        ),
+    ] = (),
+    known: Annotated[
+        Uncertainties | None,
+        Option(
+            "Standard uncertainty to which parameters of columns d_NAME were known [default: what moves the simulated value "
+            "twice as far as it is off].",
+            metavar="NAME=U,...",
+        ),
+    ] = None,
+    free: Annotated[
+        Names, Option("Parameters of which nothing is known, such as initial states.", metavar="NAME,...")
+    ] = (),
+    matters: Annotated[
+        float | None,
+        Option(
+            'Smallest effect that you care about, rms in the unit of the measured values: "no" is answered only where it would '
+            "have been found [default: what refitted parameters leave].",
+            metavar="SIZE",
+            above=0.0,
+        ),
+    ] = None,
+    offset: Annotated[bool, Option("Let no constant lie between measured and simulated values.")] = True,
+    held_out: Annotated[bool, Option("Leave out the held-out test, which takes most of the time.")] = True,
+    decimal: o.Decimal = None,
+    separator: o.Separator = None,
+    allowed: Collection[str] = (),
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
-) -> MismatchResult:
-    """Find where simulation and recording differ, in what form, and what the simulation lacks.
+) -> MismatchResult | SimulatorResult:
+    r"""Find where a simulation and a recording differ, in what form, and what was left out of the simulation.
 
-    Each row has a measured and a simulated value with known conditions. Columns `d_NAME` are derivatives of the simulated
-    value by NAME, which is refitted.
+    A row of the table is one measured value beside the simulated one, with everything that was known then: joint angles,
+    positions, loads, temperatures, the time. Units stand at the end of names (x_mm, q1_deg, t_s, oil_temp_c) or in --variables.
+    Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then fitted anew.
+
+    With --simulator the recordings have inputs and measured outputs, and the program runs your simulator itself: it says at which
+    of its ports which term is missing.
+
+    \b
+    Examples:
+      dbbstation mismatch run.csv --measured measured_mm --simulated model_mm
+      dbbstation mismatch day1.csv day2.csv --measured y_um --simulated y_sim_um --figure where.svg
+      dbbstation mismatch excel.csv --measured y_um --simulated y_sim_um --decimal ,
+      dbbstation mismatch arm.csv --measured z_mm --simulated fk_mm --variables q1=deg,q2=deg,temperature --json
+      dbbstation mismatch run.csv --simulator model.yaml --out missing.py --figure before_after.svg
+      dbbstation mismatch tank.csv --measured level_m --simulated level_sim_m --known valve=0.02 --free level_at_start
 
     Args:
-        data: CSV files.
-        measured: column.
-        simulated: column, in the same unit.
-        variables: columns that the difference may follow, each with unit or kind if its name has none; None: all.
-        run: column that separates runs; several files are several runs anyway.
-        time: column of time; `rows`: in the order of rows; None: guess.
-        source_files: own physics as Python, which is executed.
-        known_u: prior standard uncertainty of parameters by name, in their units.
-        free: parameters without prior, such as initial states.
-        has_offset: allow a constant difference of no interest.
-        matters: rms size that matters, in the unit of the values; None: what refitted parameters leave.
-        hold_out: repeat for each held-out part; takes most of the time.
-        numbers: notation; None: decimal point and the header's most frequent separator.
-        progress: called with each stage.
-        stop: asked at each stage.
-        say: called with notes.
+        allowed: hashes of simulators that may run.
 
     Returns:
-        What was found; `drawing` draws it, and `table` has the corrected simulation.
+        What was found; `drawing` draws it, and `table` or `code` has the corrected simulation.
 
     Raises:
+        ArgumentError: a value that it does not take, or neither columns nor a simulator.
         InputError: every fault of every file; too few rows.
-        StationError: `matters` is not above zero.
+        StationError: the simulator is not allowed to run.
         CalibrationError: rounding hides what so large a difference follows.
         StoppedError: `stop` returned True.
     """
-    require_size(matters)
+    from dbbstation.diagnosis.table.mismatch import find_mismatch
+    from dbbstation.files.formats.number_language import number_language
+    from dbbstation.results.of_mismatch import mismatch_result
+    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.tables import TableOptions, load_sources, load_tables, stated_uncertainties, stated_variables
+
     telling = Telling(progress, stop, say)
+    numbers = number_language(decimal, separator)
+    if simulator is not None:
+        from dbbstation.simulators.allowed import require_allowed
+        from dbbstation.tasks.mismatch_simulator import with_simulator
+
+        telling.note(*filter(None, [require_allowed(Path(simulator), allowed, allow=allow)]))
+        return with_simulator(
+            simulator,
+            data,
+            source_files,
+            numbers,
+            telling,
+            matters=matters,
+            most=most_runs,
+            hold_out=held_out,
+            keeps=not anew,
+        )
+    if measured is None or simulated is None:
+        name = "measured" if measured is None else "simulated"
+        raise ArgumentError(name, "give `measured` and `simulated`, columns of the table, or `simulator`")
     asked = TableOptions(
         measured,
         simulated,
-        _meanings(variables),
+        None if variables is None else stated_variables(variables),
         run,
         time,
         numbers,
-        known=known_u or {},
+        known={} if known is None else stated_uncertainties(known),
         free=tuple(free),
-        has_offset=has_offset,
+        has_offset=offset,
     )
-    tabulated = load_tables(paths_of(data), asked)
+    tabulated = load_tables(data if isinstance(data, tuple) else (data,), asked)
     telling.note(*tabulated.notes)
-    sources, lacking = load_sources([Path(file) for file in source_files], tabulated.table)
+    sources, lacking = load_sources(paths_of(source_files), tabulated.table)
     telling.note(*(f"{name} cannot be asked: {why}" for name, why in lacking.items()))
     found = find_mismatch(
-        tabulated.table, sources, hold_out=hold_out, lacking=lacking, matters=matters, progress=telling.stage
+        tabulated.table, sources, hold_out=held_out, lacking=lacking, matters=matters, progress=telling.stage
     )
     return mismatch_result(
         found, table=_corrected(tabulated, found), drawing=partial(_drawn, found), notes=tuple(telling.notes)
     )
-
-
-def require_size(matters: float | None) -> None:
-    """Refuse a size of zero, which no recording could exclude.
-
-    Raises:
-        StationError: it is not above zero.
-    """
-    if matters is not None and not (math.isfinite(matters) and matters > 0.0):
-        raise StationError(
-            f"a size that matters must be above zero, not {matters:g}", where="--matters", remedy=MATTERS
-        )
-
-
-def _meanings(
-    variables: Mapping[str, Meaning | str | None] | Sequence[str] | None,
-) -> dict[str, Meaning | None] | None:
-    """Return meanings of columns by name; None to guess."""
-    if variables is None:
-        return None
-    given = dict(variables) if isinstance(variables, Mapping) else dict.fromkeys(variables)
-    return {
-        name: stated_variables(f"{name}={meaning}")[name] if isinstance(meaning, str) else meaning
-        for name, meaning in given.items()
-    }
 
 
 def _corrected(tabulated: Tabulated, found: Mismatch) -> dict[str, tuple[str | float, ...]]:
@@ -153,7 +247,7 @@ def _unused(name: str, taken: Mapping[str, object]) -> str:
 
 
 def _drawn(found: Mismatch, wanted: object) -> bytes:
-    from dbbstation.report.figure_format import figure_format  # noqa: PLC0415 - half a second for who draws nothing
-    from dbbstation.report.mismatch_figure import mismatch_figure  # noqa: PLC0415
+    from dbbstation.report.figure_format import figure_format
+    from dbbstation.report.mismatch_figure import mismatch_figure
 
     return mismatch_figure(found, figure_format(wanted))

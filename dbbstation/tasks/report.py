@@ -20,7 +20,7 @@ from dbbstation.report.pdf import chromium, printed
 from dbbstation.results.model_warnings import lacks_physics
 from dbbstation.results.ranked import Ranked
 from dbbstation.results.tolerances import TOLERATED
-from dbbstation.tasks.circles import load_circles
+from dbbstation.tasks.circle_runs import load_circles
 from dbbstation.tasks.evaluate import evaluate
 from dbbstation.tasks.load import READING, load_sessions, paths_of
 from dbbstation.tasks.models import model_of

@@ -21,7 +21,7 @@ from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.tolerances import TOLERATED, tolerated_circles
 from dbbstation.sources.contract import Owner
-from dbbstation.tasks.circles import load_circles
+from dbbstation.tasks.circle_runs import load_circles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

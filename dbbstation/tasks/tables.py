@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,18 +14,18 @@ import numpy as np
 from dbbstation.diagnosis.table.contract import TableSource
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.units import PLAIN, Meaning, meaning_of, stated_meaning
-from dbbstation.errors import InputError, Problem
-from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
+from dbbstation.errors import ArgumentError, InputError, Problem
+from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, given_table, read_table
 from dbbstation.files.table_sources import own_table_sources
 from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.files.formats.number_language import NumberLanguage
+    from dbbstation.files.recordings.table_csv import Columns
 
 FEWEST_ROWS = 30
 """Rows that a comparison needs at the least: with fewer, a curve of seven functions beside noise says nothing."""
@@ -87,17 +89,23 @@ RESULT = "result"
 """Marks a driven variable."""
 
 
-def stated_variables(text: str) -> dict[str, Meaning | None]:
-    """Return variables of an option: `q1=deg,temperature,torque=N m:result`; None to guess.
+def stated_variables(
+    given: str | Mapping[str, Meaning | str | None] | Sequence[str],
+) -> dict[str, Meaning | None] | None:
+    """Return variables of an option, `q1=deg,temperature,torque=N m:result`, of a mapping or of names; None to guess.
 
     `:result` marks a variable that results from the simulation.
 
     Raises:
-        InputError: an unknown unit or kind.
+        ArgumentError: an unknown unit or kind.
     """
     found: dict[str, Meaning | None] = {}
-    faults = []
-    for part in (part.strip() for part in text.split(",")):
+    if isinstance(given, Mapping):
+        found = {name: one for name, one in given.items() if not isinstance(one, str)}
+        parts = [f"{name}={one}" for name, one in given.items() if isinstance(one, str)]
+    else:
+        parts = given.split(",") if isinstance(given, str) else list(given)
+    for part in (part.strip() for part in parts):
         what, marked, result = (piece.strip() for piece in part.partition(":"))
         name, has, unit = (piece.strip() for piece in what.partition("="))
         meaning = stated_meaning(unit) if has else None
@@ -107,29 +115,22 @@ def stated_variables(text: str) -> dict[str, Meaning | None]:
             name = ""
         if not name or (has and meaning is None):
             remedy = f"a unit such as mm, deg, s, degC, N, or one of {', '.join(Kind)}"
-            faults.append(
-                Problem(
-                    "--variables",
-                    0,
-                    0,
-                    f"`{part}` is not understood",
-                    f"write NAME, NAME=UNIT or NAME=UNIT:{RESULT}, {remedy}",
-                )
+            raise ArgumentError(
+                "variables", f"`{part}` is not understood", f"write NAME, NAME=UNIT or NAME=UNIT:{RESULT}, {remedy}"
             )
         found[name] = meaning
-    if faults:
-        raise InputError(faults)
-    return found
+    return found or None
 
 
-def stated_uncertainties(text: str) -> dict[str, float]:
-    """Return standard uncertainties of an option: `mass=0.2,stiffness=300`.
+def stated_uncertainties(given: str | Mapping[str, float]) -> dict[str, float]:
+    """Return standard uncertainties of an option, `mass=0.2,stiffness=300`, or of a mapping.
 
     Raises:
-        InputError: one that is no positive number.
+        ArgumentError: one that is no positive number.
     """
-    found, faults = {}, []
-    for part in (part.strip() for part in text.split(",")):
+    found: dict[str, float] = {}
+    parts = [f"{name}={u!r}" for name, u in given.items()] if isinstance(given, Mapping) else given.split(",")
+    for part in (part.strip() for part in parts):
         name, _, number = (piece.strip() for piece in part.partition("="))
         try:
             found[name] = float(number)
@@ -137,14 +138,12 @@ def stated_uncertainties(text: str) -> dict[str, float]:
             found[name] = np.nan
         if not name or not 0.0 < found[name] < np.inf:
             remedy = "write NAME=U, U a positive number in the unit of the parameter"
-            faults.append(Problem("--known", 0, 0, f"`{part}` is not understood", remedy))
-    if faults:
-        raise InputError(faults)
+            raise ArgumentError("known", f"`{part}` is not understood", remedy)
     return found
 
 
-def load_tables(paths: Sequence[Path], asked: TableOptions) -> Tabulated:
-    """Read tables and put them together.
+def load_tables(tables: Sequence[Path | Columns], asked: TableOptions) -> Tabulated:
+    """Read tables, or take columns as `given_table` does, and put them together.
 
     Raises:
         InputError: every fault with its line; different units of measured and simulated values; too few rows.
@@ -153,18 +152,23 @@ def load_tables(paths: Sequence[Path], asked: TableOptions) -> Tabulated:
     needed += [name for name in (asked.run, asked.time) if name is not None and name != ROWS]
     faults: list[Problem] = []
     files: list[TableFile] = []
-    for path in paths:
+    for number, one in enumerate(tables, start=1):
         try:
-            files.append(read_table(path, needed, asked.numbers))
+            files.append(
+                read_table(one, needed, asked.numbers)
+                if isinstance(one, Path)
+                else given_table(one, needed, f"table {number}")
+            )
         except InputError as error:
             faults += error.problems
+    first = str(tables[0]) if isinstance(tables[0], Path) else "table 1"
     units = {name: meaning_of(name).unit for name in (asked.measured, asked.simulated)}
     if len({unit for unit in units.values() if unit}) > 1:
         said = " and ".join(f"`{name}` in {unit}" for name, unit in units.items())
-        faults.append(Problem(str(paths[0]), 0, 0, f"{said} cannot be compared", "give both in one unit"))
+        faults.append(Problem(first, 0, 0, f"{said} cannot be compared", "give both in one unit"))
     if asked.measured == asked.simulated:
         what = f"`{asked.measured}` is named for measured and for simulated values"
-        faults.append(Problem(str(paths[0]), 0, 0, what, "name the column of the simulation"))
+        faults.append(Problem(first, 0, 0, what, "name the column of the simulation"))
     certain = [asked.measured, asked.simulated, *(asked.variables or ())]
     faults += [fault for file in files for name in dict.fromkeys(certain) for fault in file.faults_of(name)]
     faults += [fault for file in files for fault in _faults_of_size(file, certain if asked.variables else file.names)]

@@ -16,7 +16,7 @@ from pathlib import Path
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.report.calibration_figure import calibration_figure
 from dbbstation.report.diagnosis_figure import diagnosis_figure
-from dbbstation.tasks.diagnose import diagnose_sessions
+from dbbstation.tasks.diagnosed import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.gravity import Gravity

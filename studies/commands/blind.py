@@ -60,7 +60,7 @@ def blind(
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.sources.registry import known_sources
-    from dbbstation.tasks.diagnose import default_candidates
+    from dbbstation.tasks.diagnosed import default_candidates
     from studies.blind import cost, judge_sessions, read_answers
     from studies.blind_score import numbers, score
 

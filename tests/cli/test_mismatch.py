@@ -10,7 +10,7 @@ import shutil
 import numpy as np
 import pytest
 
-from dbbstation.cli import DONE, FAILED
+from dbbstation.cli import DONE, FAILED, USAGE
 from dbbstation.files.shipped import shipped_folder
 from tests.diagnosis.table import plant
 from tests.diagnosis.table.plant import Truth, record
@@ -73,8 +73,8 @@ def test_a_size_that_matters_is_held_against_what_is_found(run, tmp_path):
     outcome = run("mismatch", path, *QUICK, "--matters", "0.0001")
     assert outcome.out.startswith("Whether measured and simulated values differ cannot be told: an effect over ")
     outcome = run("mismatch", path, *QUICK, "--matters", "0")
-    assert outcome.code == FAILED
-    assert "a size that matters must be above zero, not 0" in outcome.err
+    assert outcome.code == USAGE
+    assert "0.0 is not in the range x>0.0" in outcome.err
 
 
 def test_a_column_that_is_there_twice_is_taken_once(run, warm, tmp_path):
@@ -230,7 +230,6 @@ def test_runs_are_told_apart_by_a_column(run, warm, tmp_path):
         ),
         (("--measured", "measured_mm", "--simulated", "measured_mm"), "is named for measured and for simulated values"),
         (("--measured", "measured_mm", "--simulated", "other_um"), "cannot be compared; give both in one unit"),
-        ((*COLUMNS, "--variables", "place_mm=furlong"), "`place_mm=furlong` is not understood"),
         ((*COLUMNS, "--variables", "palce_mm"), "there is no column `palce_mm`; did you mean `place_mm`?"),
         ((*COLUMNS, "--run", "day"), "there is no column `day`"),
         (COLUMNS, "x.csv:1: 4 rows with all values are too few to compare, 30 are needed"),
@@ -243,6 +242,12 @@ def test_bad_input_is_answered(run, tmp_path, arguments, said):
     assert outcome.code == FAILED
     assert outcome.out == ""
     assert said in outcome.err
+
+
+def test_an_unknown_unit_is_a_wrong_use(run, warm):
+    outcome = run("mismatch", warm, *COLUMNS, "--variables", "place_mm=furlong")
+    assert outcome.code == USAGE
+    assert "--variables: `place_mm=furlong` is not understood" in outcome.err
 
 
 def test_a_cell_that_is_no_number_is_named_with_its_line(run, warm, tmp_path):

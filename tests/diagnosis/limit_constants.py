@@ -18,7 +18,7 @@ from dbbstation.diagnosis import explain, shape_look, shapes
 from dbbstation.diagnosis.diagnose import judged, usable_sources
 from dbbstation.diagnosis.thinned import sectors_for, thinned
 from dbbstation.sources.registry import known_sources, sources_named
-from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import load_sessions
 
 MOVED: dict[str, tuple[Any, str, tuple[float, ...], int]] = {

@@ -17,7 +17,8 @@ from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.inference.hypotheses import search
 from dbbstation.sources.contract import Effect, Parameter
 from dbbstation.sources.registry import sources_named
-from dbbstation.tasks.diagnose import diagnose, diagnose_sessions
+from dbbstation.tasks.diagnose import diagnose
+from dbbstation.tasks.diagnosed import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.disturbances import WALK_STEP_S, WanderingBar

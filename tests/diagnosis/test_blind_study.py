@@ -10,7 +10,7 @@ from __future__ import annotations
 import pytest
 
 from dbbstation.sources.registry import known_sources
-from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.diagnosed import default_candidates
 from studies.blind import judge_sessions, read_answers
 from studies.blind_score import numbers, score
 from tests.plant.blind.sessions import make_study

@@ -13,7 +13,7 @@ from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.shapes import AWAY_MM, TOWARDS, Spring, ranges, samples_of, shapes
 from dbbstation.diagnosis.verdicts import _CircleJudge
 from dbbstation.sources.registry import sources_named
-from dbbstation.tasks.diagnose import diagnose_sessions
+from dbbstation.tasks.diagnosed import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics

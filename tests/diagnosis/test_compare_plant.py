@@ -12,7 +12,7 @@ from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.inference.verdict import Verdict
 from dbbstation.sources.registry import known_sources, sources_named
-from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.gravity import Gravity

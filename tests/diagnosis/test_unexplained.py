@@ -20,7 +20,7 @@ from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.results.of_diagnosis import diagnosis_figures
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import known_sources, sources_named
-from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.base import Mechanism
 from tests.plant.mechanisms.kinematics import RandomKinematics

@@ -16,7 +16,7 @@ from dbbstation.report.drawing import in_style
 from dbbstation.report.label_places import Box, place_labels
 from dbbstation.report.plot import PlotKind, Plotted, draw_plot
 from dbbstation.report.sheet import width_of_in, wrapped
-from dbbstation.tasks.circles import load_circles
+from dbbstation.tasks.circle_runs import load_circles
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import table_ii_plan
 from tests.plant.session import record

@@ -13,7 +13,7 @@ from dbbstation.circles.path import Filter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.report.polar import BINS, CIRCLE, MOST_DRAWN, REACH, SIZE, _points, polar, step_of
 from dbbstation.results.tolerances import Conformity, Size, conformity
-from dbbstation.tasks.circles import load_circles
+from dbbstation.tasks.circle_runs import load_circles
 
 STYLE = (resources.files("dbbstation.report") / "templates" / "style.css").read_text("utf-8")
 TEXT, LINES = {"ink", "soft", "good", "bad", "open", "link"}, {"ccw", "cw", "former"}

@@ -55,3 +55,18 @@ class NumberLanguage:
 
 PLAIN = NumberLanguage()
 """That of all files that this program writes."""
+
+_BY_NAME = {name: sign for sign, name in SEPARATORS.items()}
+
+
+def number_language(decimal: str | None, separator: str | None) -> NumberLanguage | None:
+    """Return the number format of a table, separators by sign or name; None if neither is stated.
+
+    Raises:
+        InputError: decimal sign and separator are equal.
+    """
+    if not decimal and not separator:
+        return None
+    decimal = decimal or PLAIN.decimal
+    usual = ";" if decimal == "," else PLAIN.separator
+    return NumberLanguage(decimal, usual if separator is None else _BY_NAME.get(separator, separator))

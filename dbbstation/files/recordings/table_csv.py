@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -118,6 +118,53 @@ def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: Numbe
     if language.decimal != PLAIN.decimal:
         columns = {name: _plain(column, values[name], language) for name, column in columns.items()}
     return TableFile(file, header, tuple(names), np.array(places, dtype=np.int64), columns, values)
+
+
+class AnyFrame(Protocol):
+    """A DataFrame of any library."""
+
+    @property
+    def columns(self) -> Any:  # noqa: ANN401 - each library has its own
+        """Return the names."""
+
+    def __getitem__(self, name: Any, /) -> Any:  # noqa: ANN401 - the same
+        """Return a column."""
+
+
+if TYPE_CHECKING:
+    Columns = Mapping[str, Any] | AnyFrame | NDArray[Any]
+    """Columns in memory: arrays by name, a DataFrame, or an array with named fields."""
+
+
+def given_table(given: Columns, needed: Iterable[str] = (), file: str = "table") -> TableFile:
+    """Return columns in memory as a table; times become seconds after the first, rows count from 1.
+
+    Raises:
+        InputError: no rows, a missing column, or columns of several lengths or dimensions.
+    """
+    names: Any = given.dtype.names or () if isinstance(given, np.ndarray) else getattr(given, "columns", given)
+    arrays = {str(name): np.asarray(given[name]) for name in names}
+    length = max((len(one) for one in arrays.values() if one.ndim), default=0)
+    faults = _faults_of_names(list(arrays), needed, file, 0)
+    faults += [
+        Problem(file, 0, 0, f"`{name}` has the shape {one.shape}, not ({length},)", "give columns of one length")
+        for name, one in arrays.items()
+        if one.shape != (length,)
+    ]
+    if faults or not length:
+        raise InputError(faults[:MOST_FAULTS] or [Problem(file, 0, 0, "there are no rows")])
+    for name, one in arrays.items():
+        if one.dtype.kind in "mM":
+            arrays[name] = (one - one[0]) / np.timedelta64(1, "s")
+    cells = {
+        name: tuple("" if value is None or value != value else str(value) for value in one.tolist())  # noqa: PLR0124 - NaN
+        for name, one in arrays.items()
+    }
+    values = {
+        name: one.astype(float) if one.dtype.kind in "biuf" else _numbers(cells[name], PLAIN)
+        for name, one in arrays.items()
+    }
+    return TableFile(file, 0, tuple(arrays), np.arange(1, length + 1), cells, values)
 
 
 def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Problem:

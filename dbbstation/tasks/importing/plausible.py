@@ -207,6 +207,6 @@ def chance_of_centres(centres: Iterable[tuple[Ball, Sequence[NDArray[np.float64]
         logs.append(np.log(max(-np.expm1(-distance2 / (2.0 * variance)), np.finfo(float).tiny)))
     if not logs:
         return None
-    from scipy.stats import chi2  # noqa: PLC0415 - a third of a second for who imports nothing
+    from scipy.stats import chi2
 
     return float(chi2.sf(-2.0 * sum(logs), 2 * len(logs)))

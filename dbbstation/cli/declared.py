@@ -1,0 +1,226 @@
+"""Commands made of tasks: options from the signature, then run, write and print, with one ending for all."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
+
+import click
+
+from dbbstation.cli.figure_option import _known_format, format_of
+from dbbstation.cli.number_types import Finite
+from dbbstation.cli.shop import ShopOption
+from dbbstation.errors import ArgumentError
+from dbbstation.tasks.declare import options_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping
+
+    from dbbstation.errors import StationError
+    from dbbstation.tasks.declare import Declared, TaskParameter
+
+
+@dataclass(frozen=True)
+class CommandOutput:
+    """A file that a command writes of its result.
+
+    Attributes:
+        name: of the option.
+        field: of the result, which gets the file's name; empty: as the option.
+        write: takes result, path and `force`.
+        table: has its provenance in a file beside it.
+        said: printed on standard error once written, with `{path}`.
+        check: of the path, before any work.
+        refused: why the result is not written, raised at the end.
+        only_with: parameter of the task that it needs.
+    """
+
+    name: str
+    help: str
+    write: Callable[..., None]
+    table: bool = False
+    said: str = ""
+    check: Callable[..., Path | None] | None = None
+    refused: Callable[[Any, Path], StationError | None] = lambda _result, _path: None
+    only_with: str = ""
+    field: str = ""
+
+
+def figure(what: str = "Write a figure here", said: str = "") -> CommandOutput:
+    """Return `--figure FILE`: what the result draws."""
+    text = f"{what}, as SVG, PNG or PDF by the ending of its name."
+    return CommandOutput("figure", text, _draw, said=said, check=_known_format)
+
+
+def _draw(result: Any, path: Path, *, force: bool) -> None:  # noqa: ANN401 - any result
+    from dbbstation.files.atomic import write_bytes
+
+    if result.drawing is not None:
+        write_bytes(path, result.drawing(format_of(path)), force=force)
+
+
+def command(
+    function: Callable[..., Any],
+    show: Callable[..., None],
+    *outputs: CommandOutput,
+    remarks: Callable[[Any], Iterable[str]] = lambda _result: (),
+    more: Callable[[], Mapping[str, object]] = dict,
+) -> click.Command:
+    """Make a command of a task.
+
+    Args:
+        show: prints the result; its parameters with an `Option` are options too, others are the task's.
+        remarks: printed on standard error, also beside JSON.
+        more: further arguments of the task.
+    """
+    task: Declared = function.declared  # type: ignore[attr-defined]
+    shown = options_of(show)
+    of_task = [name for name in list(inspect.signature(show).parameters)[1:] if name not in shown]
+    with_force = "force" in task.parameters
+
+    def run(**given: Any) -> None:  # noqa: ANN401 - each option has a type of its own
+        from dbbstation.cli.output import print_result
+
+        as_json, own = given.pop("as_json"), {name: given.pop(name) for name in shown}
+        paths = {one: given.pop(one.name) for one in outputs}
+        paths = {one: path for one, path in paths.items() if path is not None}
+        force = bool(given.get("force") if with_force else given.pop("force", False))
+        for one in paths:
+            if one.only_with and given[one.only_with] is None:
+                raise click.UsageError(f"--{one.name} needs {task.parameters[one.only_with].flag}")
+        _refuse(paths, force=force)
+        result = _done(function, task, {n: v for n, v in given.items() if v not in (None, ())} | dict(more()))
+        refused = [error for one, path in paths.items() if (error := one.refused(result, path))]
+        result = _written(result, paths, remarks, force=force)
+        if as_json:
+            print_result(result)
+        else:
+            show(result, **own, **{name: given[name] for name in of_task})
+        for error in refused:
+            raise error
+
+    options = [_option(one) for one in {**task.parameters, **shown}.values() if one.name != "force"]
+    options += [
+        click.Option([f"--{one.name}"], type=_PATHS.get("file"), callback=one.check, help=one.help) for one in outputs
+    ]
+    if outputs or with_force:
+        options.append(click.Option(["--force"], is_flag=True, help="Replace existing files."))
+    options.append(click.Option(["--json", "as_json"], is_flag=True, help="Print the result as JSON."))
+    return click.Command(task.name, params=options, callback=run, help=task.help)
+
+
+def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any result
+    """Run a task with its bar; faults of values are told under the option's name."""
+    from dbbstation.cli.output import say
+    from dbbstation.cli.provenance import provenance
+
+    if "provenance" in task.signature.parameters:
+        asked = {**asked, "provenance": provenance}
+    try:
+        with _bar(task, asked) as progress:
+            return function(**asked, progress=progress, say=lambda text: say(f"note: {text}"))
+    except ArgumentError as error:
+        flags = {name: one.flag for name, one in task.parameters.items()}
+        what = f"{error.what}; {error.remedy}" if error.remedy else error.what
+        told = re.sub(r"`(\w+)`", lambda found: flags.get(found[1], found[0]), what)
+        at = "" if told.startswith("--") else f"{flags.get(error.where, '')}: "
+        raise click.UsageError(f"{at}{told}") from None
+
+
+@contextmanager
+def _bar(task: Declared, asked: Mapping[str, Any]) -> Iterator[Any]:
+    from dbbstation.cli.progress import count_bar, task_bar
+
+    if task.stages is None:
+        with count_bar(task.label) as tell:
+            yield lambda _text, done=0, of=0: tell(done, of)
+    else:
+        with task_bar(task.label, task.stages(asked) if callable(task.stages) else task.stages) as tell:
+            yield tell
+
+
+def _refuse(paths: Mapping[CommandOutput, Path], *, force: bool) -> None:
+    from dbbstation.files.atomic import refuse_outputs
+    from dbbstation.files.provenance import refuse_existing_table
+
+    for one, path in paths.items():
+        if one.table:
+            refuse_existing_table(path, force=force)
+    refuse_outputs(paths.values(), force=force)
+
+
+def _written(
+    result: Any,  # noqa: ANN401 - any result
+    paths: Mapping[CommandOutput, Path],
+    remarks: Callable[[Any], Iterable[str]],
+    *,
+    force: bool,
+) -> Any:  # noqa: ANN401 - the same
+    """Write what is asked for; return the result with the names of the files."""
+    from dbbstation.cli.output import say
+
+    named = {one.name for one in fields(result)}
+    for one, path in paths.items():
+        if one.refused(result, path) is None:
+            one.write(result, path, force=force)
+            if one.said:
+                say(one.said.format(path=path))
+            field = one.field or one.name
+            result = replace(result, **{field: str(path)}) if field in named else result
+    for text in remarks(result):
+        say(text)
+    return result
+
+
+_PATHS = {
+    "argument": click.Path(path_type=Path),
+    "path": click.Path(path_type=Path),
+    "file": click.Path(path_type=Path, dir_okay=False),
+    "folder": click.Path(path_type=Path, file_okay=False),
+}
+
+
+def _option(one: TaskParameter) -> click.Parameter:
+    option, kind = one.option, _kind_of(one)
+    required = one.default is inspect.Parameter.empty
+    if option.kind == "argument":
+        return click.Argument(
+            [one.name], nargs=-1 if one.many else 1, required=required, metavar=option.metavar, type=kind
+        )
+    if isinstance(one.default, bool):
+        return click.Option(
+            [one.flag, one.name], is_flag=True, flag_value=not one.default, default=one.default, help=option.help
+        )
+    make: Any = click.Option
+    if option.setting:
+        make = partial(ShopOption, setting=option.setting, factor=option.factor, goes_with=option.goes_with)
+    if one.default not in (None, (), inspect.Parameter.empty):
+        make = partial(make, default=one.default, show_default=True)
+    found: click.Option = make(
+        [one.flag, one.name],
+        type=kind,
+        help=option.help,
+        metavar=option.metavar,
+        required=required,
+        multiple=one.many,
+    )
+    return found
+
+
+def _kind_of(one: TaskParameter) -> Any:  # noqa: ANN401 - a type of click
+    option, kind = one.option, get_args(one.type)[0] if one.many else one.type
+    if kind is Path or option.kind:
+        return _PATHS[option.kind or "path"]
+    if get_origin(kind) is Literal:
+        return click.Choice(get_args(kind))
+    if kind is int:
+        return click.IntRange(option.least if option.least is None else int(option.least))
+    if kind is float:
+        least = option.above if option.least is None else option.least
+        return Finite(least, option.most, min_open=option.above is not None)
+    return click.STRING

@@ -1,0 +1,169 @@
+"""Read sessions and compute the figures of their runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
+from dbbstation.circles.budget import SetUpKnowledge
+from dbbstation.errors import InputError, Problem, TraceError
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.judged import judge_session
+from dbbstation.files.recordings.session import SessionFolder, opened
+from dbbstation.results.circles import Circled, MeasuredCircle, MeasuredPair
+from dbbstation.tasks.load import check_named
+from dbbstation.trace.cut import cut
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from dbbstation.circles.path import Filter
+    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.plan.bar import Bar
+    from dbbstation.quality.judge import Judgement
+    from dbbstation.trace.recording import Recording
+
+
+def load_circles(
+    paths: Sequence[Path | SessionFolder],
+    chosen: Filter,
+    tests: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    *,
+    findings: bool = False,
+    model: IdentifiedModel | None = None,
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+) -> Circled:
+    """Read sessions and compute the figures of accepted runs.
+
+    Findings compare with all accepted runs, also of excluded tests.
+
+    Args:
+        paths: folders or session files, or what was read of them.
+        chosen: filter of G, F and H.
+        tests: names; empty for all.
+        model: gives expected circles; None: the nominal machine.
+
+    Raises:
+        InputError: every fault of every file; no accepted run; an unknown test.
+    """
+    sessions = [opened(path) for path in paths]
+    every = {test for session in sessions for test in session.plan.tests}
+    check_named(sessions, every, exclude, " to exclude")
+    check_named(sessions, every, tests)
+    circles: list[MeasuredCircle] = []
+    pairs: list[MeasuredPair] = []
+    warnings: list[str] = []
+    for session in sessions:
+        accepted = session.in_state(RunState.ACCEPTED)
+        used = [run for run in accepted if (not tests or run.test in tests) and run.test not in exclude]
+        read = session.load_all(accepted if findings else used)
+        recordings = {run.path: file.recording for run, file in zip(accepted if findings else used, read, strict=True)}
+        judgements = _judged(session, accepted, recordings, model) if findings else {}
+        of_session = []
+        for done, run in enumerate(used):
+            progress(done, len(used))
+            circle = _measured(session, run, recordings[run.path], chosen, judgements.get(run.path))
+            of_session.append(circle)
+            if circle.problem:
+                warnings.append(f"{session.name}: run {run.label} shows no circle: {circle.problem}")
+        progress(len(used), len(used))
+        circles += of_session
+        pairs += _pairs(session, of_session)
+        warnings += _many(session, used)
+    if not circles:
+        places = ", ".join(str(session.folder) for session in sessions)
+        raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
+    return Circled(tuple(circles), tuple(pairs), tuple(warnings), tuple(sessions))
+
+
+def _many(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
+    """Return notes on circles with unplanned accepted runs, one of which may be a mistake."""
+    of: dict[str, list[str]] = {}
+    for run in runs:
+        of.setdefault(f"{run.test} {run.direction}", []).append(str(run.repeat))
+    return [
+        f"{session.name}: {len(repeats)} runs of {circle} are accepted ({', '.join(sorted(repeats, key=int))}): all are shown, and a fit "
+        "takes all of them"
+        for circle, repeats in of.items()
+        if len(repeats) >= MANY
+    ]
+
+
+MANY = 3
+"""Accepted runs of one circle in one direction that are said."""
+
+
+def _judged(
+    session: SessionFolder,
+    accepted: Sequence[RunEntry],
+    recordings: dict[Path, Recording],
+    model: IdentifiedModel | None,
+) -> dict[Path, Judgement]:
+    found = judge_session(session, [(run, recordings[run.path]) for run in accepted], model)
+    return {run.path: judgement for run, judgement in zip(accepted, found, strict=True)}
+
+
+def _measured(
+    session: SessionFolder, run: RunEntry, recording: Recording, chosen: Filter, judgement: Judgement | None
+) -> MeasuredCircle:
+    known = _known(session, run, recording)
+    corrected = _corrected(session, recording)
+    try:
+        if judgement is not None and judgement.analysis is not None and corrected is recording:
+            analysis = refiltered(judgement.analysis, chosen)
+        else:
+            named = replace(corrected, name=run.label)
+            analysis = analyse(cut(named, session.circle(run)), named, chosen)
+    except TraceError as error:
+        problem = f"{error.what}; {error.remedy}" if error.remedy else error.what
+        return MeasuredCircle(session.name, run, None, problem, known, judgement)
+    return MeasuredCircle(session.name, run, analysis, "", known, judgement)
+
+
+def _corrected(session: SessionFolder, recording: Recording) -> Recording:
+    """Return a recording less the bar's excess, as a fit treats it (`Setup.bar_reads_long_mm`)."""
+    if session.bar is None:
+        return recording
+    long_mm, _ = session.bar.reads_long_mm(session.bar_temp_c(recording.temperature_degc))
+    return recording if long_mm == 0.0 else replace(recording, length_mm=recording.length_mm - long_mm)
+
+
+def _known(session: SessionFolder, run: RunEntry, recording: Recording) -> SetUpKnowledge:
+    bar, setup = session.bar, session.setup(run)
+    measured_c = session.bar_temp_c(recording.temperature_degc)
+    grown_mm = None if bar is None else bar.grown_uncertainty_mm(measured_c)
+    scatter = np.zeros(3) + setup.mounting_repeatability_mm
+    ball_um = 1e3 * np.hypot(scatter, setup.ball_uncertainty_mm)
+    return SetUpKnowledge(
+        u_bar_um=None if bar is None else 1e3 * bar.calibrator_uncertainty_mm,
+        u_temperature_um=None if grown_mm is None else 1e3 * grown_mm,
+        not_absolute=_not_absolute(bar, measured_c),
+        u_ball_um=float(max(ball_um[:2])) if setup.place_known else None,
+        u_ball_z_um=float(ball_um[2]) if setup.place_known else None,
+    )
+
+
+def _not_absolute(bar: Bar | None, measured_c: float | None) -> str:
+    """Return why a bar's lengths are not absolute, or an empty text."""
+    lacks = ("calibrated length of the bar",) if bar is None else bar.lacks(measured_c)
+    return f"not absolute, because the session does not state: {', '.join(lacks)}" if lacks else ""
+
+
+def _pairs(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[MeasuredPair]:
+    """Return both directions of each test, repeat and mounting."""
+    first: dict[tuple[str, int, str], MeasuredCircle] = {}
+    pairs = []
+    for circle in circles:
+        if circle.analysis is None:
+            continue
+        key = (circle.entry.test, circle.entry.repeat, session.setup(circle.entry).mounting)
+        before = first.setdefault(key, circle)
+        if before is not circle and before.analysis is not None:
+            pairs.append(MeasuredPair(before, circle, analyse_pair(before.analysis, circle.analysis)))
+    return pairs

@@ -1,0 +1,271 @@
+"""What a task takes, stated once in its signature: command line, checks in Python, documentation and messages are made of it.
+
+    @task("calibrate", stages=STAGES)
+    def calibrate(sessions: o.Sessions, *, step_deg: Annotated[float, Option("Angle between points [deg].", least=0.01)] = 0.1): ...
+
+A parameter without an `Option` is for Python only. This module loads fast, since help texts need it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import inspect
+import math
+import re
+from dataclasses import dataclass, field
+from numbers import Integral, Real
+from os import PathLike
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_origin
+
+from dbbstation.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    Names = str | Sequence[str]
+    File = str | PathLike[str]
+    Files = File | Iterable[File]
+else:
+    Names, File, Files = tuple[str, ...], Path, tuple[Path, ...]
+
+_OF_ALL = {"progress": "called with each stage.", "stop": "asked at each stage.", "say": "called with notes."}
+"""Parameters of every task that are for Python only."""
+
+EXAMPLES = "\\b\nExamples:"
+"""Begins the examples of a command in the docstring of its task."""
+
+_NAMES, _FILES = tuple[str, ...], tuple[Path, ...]
+_Function = TypeVar("_Function", bound="Callable[..., Any]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """What a parameter's name, type and default do not say.
+
+    Attributes:
+        help: one or two sentences, the unit in brackets; of a flag that is True by default what its absence means.
+        kind: `argument` has no flag; `path`, `file` or `folder`; empty: by the type.
+        flag: if it is not `--name`.
+        setting: key in the shop's settings; `factor` converts to this unit, `goes_with` as of `ShopOption`.
+        least: `most`, `above`: range of a number.
+        only_with: parameter that it needs.
+        not_with: parameters that it excludes.
+        objects: scripts may give other objects than paths.
+    """
+
+    help: str = field(kw_only=False)
+    kind: str = ""
+    flag: str = ""
+    metavar: str | None = None
+    setting: str = ""
+    factor: float = 1.0
+    goes_with: str = ""
+    least: float | None = None
+    most: float | None = None
+    above: float | None = None
+    only_with: str = ""
+    not_with: tuple[str, ...] = ()
+    objects: bool = False
+
+
+@dataclass(frozen=True)
+class TaskParameter:
+    """A parameter with an `Option`."""
+
+    name: str
+    type: Any
+    default: Any
+    option: Option
+
+    @property
+    def many(self) -> bool:
+        """Whether it takes several values."""
+        return get_origin(self.type) is tuple
+
+    @property
+    def flag(self) -> str:
+        """Its name on the command line."""
+        if self.option.kind == "argument":
+            return self.option.metavar or self.name
+        return self.option.flag or f"--{'no-' if self.default is True else ''}{self.name.replace('_', '-')}"
+
+    def says(self, value: Any) -> bool:  # noqa: ANN401 - of any parameter
+        """Return whether a value differs from the default."""
+        return value is not None and not (isinstance(value, str | int | float | tuple) and value in (self.default, ()))
+
+    def checked(self, value: Any) -> Any:  # noqa: ANN401 - of any parameter
+        """Return a value as the task takes it.
+
+        Raises:
+            ArgumentError: the task does not take it.
+        """
+        if value is self.default:
+            return value
+        try:
+            return self._read(value)
+        except (TypeError, ValueError) as error:
+            what = str(error) if isinstance(error, ValueError) else f"`{value!r:.60}` is no {self._kind}"
+            raise ArgumentError(self.name, what) from None
+
+    @property
+    def in_words(self) -> str:
+        """Return its type as signatures show it."""
+        kind = _SIGNED.get(self.type, getattr(self.type, "__name__", "Any"))
+        if get_origin(self.type) is Literal:
+            kind = f"Literal[{', '.join(map(repr, get_args(self.type)))}]"
+        return f"{kind} | None" if self.default is None else kind
+
+    @property
+    def _kind(self) -> str:
+        return _KINDS.get(self.type, "value for it")
+
+    def _read(self, value: Any) -> Any:  # noqa: ANN401 - of any parameter
+        kind = self.type
+        if kind == _NAMES:
+            texts = [value] if isinstance(value, str) else list(value)
+            return tuple(dict.fromkeys(name.strip() for text in texts for name in text.split(",") if name.strip()))
+        if kind == _FILES:
+            given = [value] if isinstance(value, str | PathLike) else value
+            if self.option.objects and not isinstance(given, list | tuple):
+                return given
+            return tuple(one if self.option.objects and not isinstance(one, str) else Path(one) for one in given)
+        if kind is Path:
+            return Path(value)
+        if get_origin(kind) is Literal:
+            return _one_of(str(value), get_args(kind))
+        numeric = {float: Real, int: Integral}.get(kind, kind)
+        if kind in _KINDS and (not isinstance(value, numeric) or (isinstance(value, bool) and kind is not bool)):
+            raise TypeError
+        return self._in_range(float(value) if kind is float else value)
+
+    def _in_range(self, value: Any) -> Any:  # noqa: ANN401 - of any parameter
+        one = self.option
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{value} is not a finite number")
+        beyond = ((one.least, "at least", -1), (one.most, "at most", 1))
+        for end, word, sign in beyond:
+            if end is not None and sign * value > sign * end:
+                raise ValueError(f"{value:g} is out of range: {word} {end:g}")
+        if one.above is not None and value <= one.above:
+            raise ValueError(f"{value:g} is out of range: more than {one.above:g}")
+        return value
+
+
+_SIGNED: dict[Any, str] = {_NAMES: "str | Sequence[str]", _FILES: "path or paths", Path: "str | PathLike"}
+_KINDS: dict[Any, str] = {
+    float: "number",
+    int: "whole number",
+    bool: "True or False",
+    str: "text",
+    Path: "path",
+    _NAMES: "name or list of names",
+    _FILES: "path or list of paths",
+}
+
+
+def _one_of(value: str, known: Sequence[str]) -> str:
+    """Return a value that is known, or refuse it with the nearest one."""
+    if value in known:
+        return value
+    near = difflib.get_close_matches(value, known, n=1)
+    raise ValueError(
+        f"{value!r} is unknown; did you mean {near[0]!r}?"
+        if near
+        else f"{value!r} is not one of {', '.join(map(repr, known))}"
+    )
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A task as declared.
+
+    Attributes:
+        name: of its command.
+        label: beside its progress bar.
+        stages: of its work and the passed share of time as each begins [%]; a function of the arguments; None: counted.
+        help: the docstring before `Args:`.
+        parameters: those with an `Option`.
+        signature: all parameters.
+    """
+
+    name: str
+    label: str
+    stages: Any
+    help: str
+    parameters: Mapping[str, TaskParameter]
+    signature: inspect.Signature
+
+    def checked(self, args: tuple[Any, ...], named: Mapping[str, Any]) -> inspect.BoundArguments:
+        """Return arguments as the task takes them.
+
+        Raises:
+            ArgumentError: a value that it does not take, or that does not go with another.
+        """
+        bound = self.signature.bind(*args, **named)
+        there = []
+        for name in self.parameters.keys() & bound.arguments.keys():
+            value = bound.arguments[name] = self.parameters[name].checked(bound.arguments[name])
+            there += [name] if self.parameters[name].says(value) else []
+        for name in (one for one in self.parameters if one in there):
+            option = self.parameters[name].option
+            if option.only_with and option.only_with not in there:
+                raise ArgumentError(name, f"`{name}` needs `{option.only_with}`")
+            for other in option.not_with:
+                if other in there:
+                    raise ArgumentError(other, f"`{other}` does not go with `{name}`")
+        return bound
+
+
+def task(name: str, *, label: str = "", stages: Any = None) -> Callable[[_Function], _Function]:  # noqa: ANN401 - see `Declared`
+    """Make a function a task, whose arguments are checked and whose docstring lists its options."""
+
+    def give(function: _Function) -> _Function:
+        parameters, signature = options_of(function), inspect.signature(function)
+        text = inspect.cleandoc(function.__doc__ or "")
+        head, rest = re.split(r"\n\nArgs:\n|(?=\n\n(?:Returns|Raises):\n)", text, maxsplit=1)
+        known = Declared(name, label or name, stages, head, parameters, signature)
+
+        @functools.wraps(function)
+        def call(*args: Any, **named: Any) -> Any:  # noqa: ANN401 - as the task has it
+            bound = known.checked(args, named)
+            return function(*bound.args, **bound.kwargs)
+
+        told = {name: one.option.help for name, one in parameters.items()}
+        told |= {name: text for name, text in _OF_ALL.items() if f"    {name}: " not in rest}
+        lines = "".join(f"    {name}: {text}\n" for name, text in told.items() if name in signature.parameters)
+        written = f"{head.partition(EXAMPLES)[0].strip()}\n\nArgs:\n{lines}{rest}"
+        call.__doc__ = re.sub(r"--(?:no-)?([a-z-]+)", lambda flag: f"`{flag[1].replace('-', '_')}`", written)
+        call.declared = known  # type: ignore[attr-defined]
+        shown = [
+            one.replace(annotation=parameters[one.name].in_words) if one.name in parameters else one
+            for one in signature.parameters.values()
+        ]
+        call.__signature__ = signature.replace(parameters=shown)  # type: ignore[attr-defined]
+        return call  # type: ignore[return-value]
+
+    return give
+
+
+def options_of(function: Callable[..., Any]) -> dict[str, TaskParameter]:
+    """Return the parameters of a function that have an `Option`, by name."""
+    own, found = inspect.unwrap(function), {}
+    for name, one in inspect.signature(own).parameters.items():
+        try:
+            annotation = eval(one.annotation, own.__globals__)  # noqa: S307 - of our own source
+        except NameError:
+            continue  # a type for checkers only is no option
+        option = next((mark for mark in getattr(annotation, "__metadata__", ()) if isinstance(mark, Option)), None)
+        if option is not None:
+            found[name] = TaskParameter(name, _plain(annotation.__origin__), one.default, option)
+    return found
+
+
+def _plain(kind: Any) -> Any:  # noqa: ANN401 - a type
+    """Return a type without None."""
+    if get_origin(kind) not in {Union, UnionType}:
+        return kind
+    others = [one for one in get_args(kind) if one is not NoneType]
+    return others[0] if len(others) == 1 else Any

@@ -1,0 +1,115 @@
+"""Sessions with their diagnosis, for tasks and studies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.calibration.fit.calibrate import default_sources
+from dbbstation.diagnosis import diagnose as search
+from dbbstation.diagnosis.diagnose import usable_sources
+from dbbstation.errors import ModelError
+from dbbstation.facts.serialise import plain
+from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.load import loaded
+from dbbstation.tasks.telling import Telling
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.diagnosis.findings import Diagnosis
+    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.tasks.load import Recorded, Sessions
+    from dbbstation.tasks.telling import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """Recorded sessions with their diagnosis.
+
+    Attributes:
+        lacking: reasons against further candidates, by name.
+    """
+
+    recorded: Recorded
+    diagnosis: Diagnosis
+    lacking: Mapping[str, str]
+
+    def summary(self) -> dict[str, object]:
+        """Return all results as plain numbers."""
+        return plain(diagnosis_figures(self.diagnosis, self.lacking))
+
+
+def default_candidates(known: Mapping[str, ErrorSource]) -> list[str]:
+    """Return the error sources that are not always fitted."""
+    fitted = {source.name for source in default_sources()}
+    return [name for name, source in known.items() if name not in fitted and source.candidate]
+
+
+def diagnose_sessions(
+    paths: Sequence[Path],
+    candidates: Sequence[str] | None,
+    exclude: Sequence[str],
+    say: Callable[[str], None],
+    known: Mapping[str, ErrorSource] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+    reading: Callable[[int, int], None] = lambda _done, _of: None,
+    only: Sequence[str] = (),
+) -> Diagnosed:
+    """Read sessions of one machine and find physics beyond a kinematic calibration.
+
+    Args:
+        paths: folders or session files.
+        candidates: source names; None: all.
+        known: sources by name; None: the package's.
+        only: names of tests; empty for all.
+
+    Raises:
+        InputError: faults of files and traces.
+        ModelError: an unknown source, or one that is no cause.
+        CalibrationError: the kinematic model cannot be fitted.
+    """
+    telling = Telling(_staged(progress, reading), say=lambda text: say(f"note: {text}"))
+    return diagnosed_of(paths, candidates, (tuple(only), tuple(exclude)), known or known_sources(), telling)
+
+
+def _staged(progress: Callable[[str], None], reading: Callable[[int, int], None]) -> Progress:
+    def tell(text: str, done: int = 0, of: int = 0) -> None:
+        if of:
+            reading(done, of)
+        else:
+            progress(text)
+
+    return tell
+
+
+def diagnosed_of(
+    sessions: Sessions | Recorded,
+    candidates: Sequence[str] | None,
+    chosen: tuple[Sequence[str], Sequence[str]],
+    known: Mapping[str, ErrorSource],
+    telling: Telling,
+    how: Callable[..., Diagnosis] = search.diagnose,
+) -> Diagnosed:
+    """Read sessions and diagnose them.
+
+    Args:
+        candidates: names; None: all.
+        chosen: tests to take and to leave out.
+        how: the diagnosis.
+
+    Raises:
+        InputError: faults of files and traces.
+        ModelError: an unknown source, or one that is no cause.
+    """
+    named = sources_named(default_candidates(known) if candidates is None else candidates, known)
+    for source in named:
+        if not source.candidate:
+            what = f"{source.name} is no cause: it only keeps in a model what a diagnosis left without a name"
+            raise ModelError(what, remedy="leave it out; --keep-unexplained keeps what is left")
+    recorded = loaded(sessions, *chosen, telling)
+    usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
+    found = how(recorded.machine, recorded.observations, usable, telling.stage)
+    return Diagnosed(recorded, found, lacking)

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 def show(result: ComparisonResult) -> None:
     """Print where the sessions differ."""
     if result.held_out_worse:
-        echo("Held-out tests are predicted worse than by the first session alone. Nothing is identified.\n")
-    echo(result.text)
+        echo("Held-out tests are predicted worse than by the first session alone.\n")
+    echo("\n".join((*result.sentences(), "", result.text)))
     for note in result.unlike:
         echo_line(f"- {note}")
     for title, names in (

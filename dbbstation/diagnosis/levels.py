@@ -11,15 +11,14 @@ from dbbstation.calibration.checks.missing_physics import is_missing_physics, re
 from dbbstation.calibration.outliers.outlier import OutlierKind
 from dbbstation.diagnosis.left_where import where_left
 from dbbstation.diagnosis.shapes import SIGNED
+from dbbstation.diagnosis.variables import SESSION_TIME, variable_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.coloured import Coloured
-from dbbstation.inference.detectable import MARGIN, least_seen
 from dbbstation.inference.left_over import SIGNIFICANT, LeftOver, ResidualTest
-from dbbstation.inference.levels import BALL, BAR, RUN, Detectable, Differs, Followed, FollowsAnswer
-from dbbstation.inference.levels_of import levels_of
-from dbbstation.inference.places import with_places
+from dbbstation.inference.levels import BALL, BAR, RUN, Differs, Followed, FollowsAnswer
+from dbbstation.inference.places import levels_by_tests
 from dbbstation.inference.settled import Settled
 
 if TYPE_CHECKING:
@@ -32,15 +31,8 @@ if TYPE_CHECKING:
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Cause
     from dbbstation.inference.projection import BesideBase
-    from dbbstation.sources.contract import ErrorSource
-
-SESSION_TIME = "the time of the session"
-"""Variable of what warms up or drifts over a session: tests that were held back lie between others."""
 
 UM = 1e3
-
-NOTHING = 1e-3
-"""Share of the noise up to which the rms of an effect is none."""
 
 
 class CircleBank(Bank):
@@ -106,10 +98,9 @@ def _law(explained: Explained, cause: Cause) -> Law:
     if cause.setup:
         variable = BAR if cause.name == "bar-offset" else BALL
     elif follows is not None:
-        variable = follows.variable
+        variable = SESSION_TIME if follows.variable == "time" and follows.kind != "wander" else follows.variable
     else:
-        variable = RUN if once or source is None else source.varies_with or cause.name
-    wanders = follows is not None and follows.kind == "wander"
+        variable = RUN if once or source is None else variable_of(source)
     signed = variable.endswith("sign") or (follows is not None and follows.moves == SIGNED)
 
     def columns(point: tuple[float, ...]) -> NDArray[np.float64]:
@@ -123,9 +114,10 @@ def _law(explained: Explained, cause: Cause) -> Law:
         (),
         form_uncertainty=0.0 if source is None else source.form_uncertainty,
         log_odds=cause.log_prior_odds,
-        followed=(SESSION_TIME if variable == "time" and not wanders else variable,),
+        followed=(variable,),
         way="direction" if signed else "",
         acts_once=once,
+        confirm="" if source is None else source.texts.confirm,
     )
 
 
@@ -135,13 +127,7 @@ def circle_levels(explained: Explained, outcome: Settled, gains: GainsOfTests | 
     Args:
         gains: None: not tested.
     """
-    sources = {name: source for (name, _), source in explained.channel.sources.items()}
-    each = (_size(outcome, cause, sources[cause.name]) for cause in outcome.causes if cause.named)
-    sizes = sorted(filter(None, each), key=lambda one: -np.inf if one.size is None else -one.size)
-    anew = None if gains is None else gains.anew
-    found = levels_of(outcome, _left(explained), gains, anew, sizes=tuple(sizes))
-    correction = None if gains is None else gains.error < gains.errors[frozenset()]
-    found = with_places(replace(found, correction=correction), outcome).times(UM)
+    found = levels_by_tests(outcome, _left(explained), gains).times(UM)
     if not explained.outliers:
         return found
     differs = replace(found.differs, answer=Differs.YES, why="", probability=1.0)
@@ -154,29 +140,6 @@ def _happened(outlier: Outlier) -> Followed:
     return Followed(
         ((variable,),), (), FollowsAnswer.HAPPENED, 1.0, {}, outlier.size_um, (), where=outlier.runs or outlier.test
     )
-
-
-def _size(outcome: Settled, cause: Cause, source: ErrorSource) -> Detectable | None:
-    """Smallest size of a named cause that these tests would show, beside what was found, before the geometry takes its part.
-
-    None: at its plausible size it moves nothing here.
-    """
-    variant = max(cause.variants, key=lambda one: len(one.columns))
-    others = outcome.best.without(cause.name)
-    samples = outcome.bank.samples(variant.columns)
-    of_base = outcome.comparison.beside((), variant.columns) * outcome.noise.sigma**2
-    shown = float(variant.plausible**2 @ np.diag(of_base))
-    whole = float(np.sum(np.square(samples * variant.plausible)))
-    if whole < (NOTHING * outcome.noise.sigma) ** 2 * len(samples):
-        return None
-    size = least_seen(
-        outcome.comparison.beside(others, variant.columns),
-        samples,
-        variant.plausible,
-        cause.log_prior_odds + variant.log_weight,
-    )
-    concealed = float(np.clip(1.0 - shown / max(whole, 1e-300), 0.0, 1.0))
-    return Detectable(cause.name, None if size is None else MARGIN * size, concealed, source.texts.confirm)
 
 
 def _left(explained: Explained) -> LeftOver:

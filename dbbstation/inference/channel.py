@@ -90,6 +90,7 @@ class Law:
         driven: those that result from the simulation.
         way: `direction` or `late` outside families; empty: by value.
         acts_once: no other rows can show it.
+        confirm: what shows it by itself; empty where nothing is known of that.
     """
 
     name: str
@@ -112,6 +113,7 @@ class Law:
     driven: frozenset[str] = frozenset()
     way: str = ""
     acts_once: bool = False
+    confirm: str = ""
 
     def plausible_of(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return usual amplitudes, shape (p,), of columns, shape (n, p)."""

@@ -52,6 +52,29 @@ def detectable(settled: Settled) -> tuple[Detectable, ...]:
     return tuple(sorted(found, key=lambda one: -np.inf if one.size is None else -one.size))
 
 
+def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
+    """Return the same of each law that says what shows it, but for those that move nothing here at their plausible size."""
+    laws, found = settled.bank.laws, list[Detectable]()
+    for cause in (c for c in settled.causes if c.name in laws and laws[c.name].confirm):
+        variant = max(cause.variants, key=lambda one: len(one.columns))
+        samples = settled.bank.samples(variant.columns)
+        whole = float(np.sum(np.square(samples * variant.plausible)))
+        if whole < (NOTHING * settled.noise.sigma) ** 2 * len(samples):
+            continue
+        shown = np.diag(settled.comparison.beside((), variant.columns)) * settled.noise.innovation**2
+        products = settled.comparison.beside(settled.best.without(cause.name), variant.columns)
+        size = least_seen(products, samples, variant.plausible, cause.log_prior_odds + variant.log_weight)
+        concealed = float(np.clip(1.0 - variant.plausible**2 @ shown / whole, 0.0, 1.0))
+        found.append(
+            Detectable(cause.name, None if size is None else MARGIN * size, concealed, laws[cause.name].confirm)
+        )
+    return tuple(sorted(found, key=lambda one: -np.inf if one.size is None else -one.size))
+
+
+NOTHING = 1e-3
+"""Share of the noise up to which the rms of an effect is none."""
+
+
 def _family(bank: Bank, name: str) -> Family | None:
     of = bank.patterns.get(name) or bank.laws.get(name)
     return None if of is None else of.family

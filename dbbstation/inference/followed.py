@@ -63,7 +63,7 @@ def followed_by(bank: Bank, name: str) -> frozenset[str]:
         return frozenset({name})
     if law is not None and law.followed:
         return frozenset(law.followed)
-    if of.family is Family.BLOCKS:
+    if of.family is Family.BLOCKS or (law is None and of.acts_once):
         return frozenset({RUN})
     if of.family in IN_TIME and not of.variables:
         return frozenset({TIME})

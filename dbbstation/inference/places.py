@@ -1,4 +1,4 @@
-"""Which part of an object a class acts on, such as one strut: from the forms of its members."""
+"""Levels of tests that are held back in groups, and which part of an object a class acts on, such as one strut."""
 
 from __future__ import annotations
 
@@ -8,16 +8,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import logsumexp
 
+from dbbstation.inference.detectable import detectable_causes
+from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
+    from dbbstation.inference.chosen_anew import GainsOfTests
+    from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.settled import Settled
 
 
-def with_places(levels: Levels, settled: Settled) -> Levels:
-    """Return levels with the strut, or all struts, that each class acts on for sure."""
-    return replace(levels, follows=tuple(replace(one, where=_place(settled, one.members)) for one in levels.follows))
+def levels_by_tests(settled: Settled, left: LeftOver, gains: GainsOfTests | None) -> Levels:
+    """Return the three levels, with the strut, or all struts, that each class acts on for sure.
+
+    Args:
+        left: residual tests.
+        gains: None: not tested.
+    """
+    anew = None if gains is None else gains.anew
+    found = levels_of(settled, left, gains, anew, sizes=detectable_causes(settled))
+    follows = tuple(replace(one, where=_place(settled, one.members)) for one in found.follows)
+    correction = None if gains is None else gains.error < gains.errors[frozenset()]
+    return replace(found, follows=follows, correction=correction)
 
 
 def _place(settled: Settled, names: tuple[str, ...]) -> str | None:

@@ -10,9 +10,11 @@ from pydantic import Field
 
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.levels import Levels
 from dbbstation.inference.verdict import Gains
 from dbbstation.results.diagnosis import BeforeAfter
 from dbbstation.results.frame import Framed
+from dbbstation.results.levels_text import level_sentences
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,6 +169,7 @@ class ComparisonResult(Framed):
         cancelling: None without such effects.
         averaged: tests with averaged repeats.
         unlike: other differences; `notes` in JSON.
+        levels: existence, variables and cause of a difference.
     """
 
     a: str
@@ -194,6 +197,12 @@ class ComparisonResult(Framed):
     not_comparable: tuple[NotComparable, ...]
     averaged: tuple[str, ...]
     unlike: Annotated[tuple[str, ...], Field(serialization_alias="notes")]
+    levels: Levels
+
+    def sentences(self) -> list[str]:
+        """The answer in three levels, in words; a notebook shows it above the table."""
+        values = {one.name: one.parameters for one in self.causes if isinstance(one, ComparedCause)}
+        return level_sentences(self.levels, "µm", values, rows="tests", what="The sessions")
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per run."""

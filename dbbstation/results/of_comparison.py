@@ -75,6 +75,7 @@ def comparison_result(
         not_comparable=tuple(NotComparable(test, what) for test, what in pairs.not_comparable),
         averaged=tuple(pairs.averaged),
         unlike=tuple(unlike),
+        levels=found.levels,
         drawing=drawing,
         notes=notes,
     )

@@ -12,6 +12,7 @@ import numpy as np
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.parts import ALIKE, parts_of
 from dbbstation.diagnosis.shapes import variables
+from dbbstation.diagnosis.variables import variable_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.channel import Law
 from dbbstation.sources.contract import Effect, LinearSource, Need
@@ -98,6 +99,9 @@ class Change:
             log_odds=log_odds,
             at=None if self._proportional else self._at,
             choices=tuple(choices),
+            followed=(variable_of(self.source),),
+            way="direction" if self.source.varies_with.endswith("sign") else "",
+            confirm=self.source.texts.confirm,
         )
 
     def columns(self, point: tuple[float, ...]) -> NDArray[np.float64]:

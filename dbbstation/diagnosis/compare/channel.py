@@ -57,6 +57,7 @@ def channel_of(sides: Sides, sources: Sequence[ErrorSource]) -> Channel:
         time_unit="row",
         static=(*of_readings(variables, sides, time), *of_struts(sides, runs), of_each_test(sides)),
         least_noise=RESOLUTION_MM,
+        rows_are="tests",
     )
 
 

@@ -23,6 +23,7 @@ from dbbstation.errors import TraceError
 from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.harmonics import bands, basis, coefficients
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.places import levels_by_tests
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.verdict import OUT, SURE
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.left_over import LeftOver
+    from dbbstation.inference.levels import Levels
     from dbbstation.inference.read_off import CauseFinding, Trial
     from dbbstation.inference.settled import Settled
     from dbbstation.machine.geometry import Machine
@@ -105,6 +107,7 @@ class Comparison:
         effects: of the best set, largest first, by name.
         noticed_mm: detectable change of any strut's length.
         lacking: sources not tested, with reasons.
+        levels: existence, variables and cause of a difference [µm].
     """
 
     matching: Matching
@@ -117,6 +120,7 @@ class Comparison:
     effects: Mapping[str, EffectOfCause]
     noticed_mm: float
     lacking: Mapping[str, str]
+    levels: Levels
 
     @property
     def probability(self) -> float:
@@ -201,15 +205,18 @@ def compare(
     sides = Sides.of(machine, matching.pairs)
     settled = settle(channel_of(sides, sources), in_time=False, rivals=False, progress=progress)
     progress("held-out tests")
-    trial = tried_without_tests(sides, settled, hold_out=hold_out)
+    trial, gains = tried_without_tests(sides, settled, hold_out=hold_out)
+    left = left_over(settled)
+    levels = levels_by_tests(settled, left, gains)
     return Comparison(
         matching=matching,
         settled=settled,
-        findings=read_off(settled, trial),
+        findings=read_off(settled, trial, levels),
+        levels=levels.times(1e3),
         trial=trial,
         runs=_runs(sides, settled),
-        left=left_over(settled),
-        held_out=predicted(sides, settled),
+        left=left,
+        held_out=(predicted(sides, settled, ()), predicted(sides, settled, settled.best.members)),
         effects=effects_of(sides, settled),
         noticed_mm=noticed_mm(settled),
         lacking=lacking or {},

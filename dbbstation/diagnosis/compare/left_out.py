@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.blocks import Columns, compress
-from dbbstation.inference.chosen_anew import LEAST_PARTS, ChosenAnew, chosen_anew
+from dbbstation.inference.chosen_anew import LEAST_PARTS, GainsOfTests, chosen_anew
 from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn
+from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.held_out import held_out
 from dbbstation.inference.hypotheses import search
 from dbbstation.inference.jackknife import refits_without
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 
-def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> Trial:
+def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> tuple[Trial, GainsOfTests | None]:
     """Hold back groups of tests; empty without findings or below `LEAST_PARTS` groups.
 
     Args:
@@ -40,12 +41,13 @@ def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True
             rows[own] = number == group
         parts.append(rows)
     if len(parts) < LEAST_PARTS or not settled.best.members:
-        return Trial()
-    return Trial(_chosen_anew(settled, parts) if hold_out else None, refits_without(settled, parts))
+        return Trial(), None
+    gains = _chosen_anew(sides, settled, parts) if hold_out else None
+    return Trial(None if gains is None else gains.anew, refits_without(settled, parts)), gains
 
 
-def _chosen_anew(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> ChosenAnew:
-    """Return each cause's gain; the reference is an unchanged machine."""
+def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> GainsOfTests:
+    """Return each cause's gain, and each class's; the reference is an unchanged machine."""
     bank, kept = settled.bank, settled.channel.kept
 
     def of_others() -> Iterator[ModelComparison]:
@@ -55,12 +57,17 @@ def _chosen_anew(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> Chosen
     def choose(comparison: ModelComparison) -> Sequence[Member]:
         return search(comparison, settled.causes, [settled.best.members], MOST_EXPANDED).best.members
 
-    return chosen_anew(settled.comparison, of_others(), choose, bank.kind_of)
+    follow = follow_of(settled)
+    classes = [one.wanted for one in classes_of(settled, VariableProbabilities(settled))]
+    anew = chosen_anew(settled.comparison, of_others(), choose, bank.kind_of, classes=(classes, follow))
+    rest = [[m for m in settled.best.members if not follow(m.cause.name) & wanted] for wanted in classes]
+    error, *without = (predicted(sides, settled, some).rms for some in (settled.best.members, *rest, ()))
+    return GainsOfTests(parts, anew, dict(zip([*classes, frozenset[str]()], without, strict=True)), error)
 
 
-def predicted(sides: Sides, settled: Settled) -> tuple[HeldOut, HeldOut]:
-    """Return predictions of held-out tests without and with findings."""
-    bank, members = settled.bank, settled.best.members
+def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> HeldOut:
+    """Return predictions of held-out tests by set-ups as stated and some causes."""
+    bank = settled.bank
     columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
     base = settled.channel.known
     prior = np.concatenate([base.prior, *(member.sd for member in members)])
@@ -70,8 +77,4 @@ def predicted(sides: Sides, settled: Settled) -> tuple[HeldOut, HeldOut]:
     every = np.arange(len(prior))
     blocks = [compress(every, columns[rows], bank.target[rows]) for rows in sides.blocks]
     noise = settled.noise.innovation
-    without, having = (
-        held_out(blocks, groups, known, every[:used], noise, np.zeros((0, used - len(base.prior))))
-        for used in (len(base.prior), len(prior))
-    )
-    return without, having
+    return held_out(blocks, groups, known, every, noise, np.zeros((0, len(prior) - len(base.prior))))

@@ -10,6 +10,7 @@ from dbbstation.diagnosis.channel import OUTSIZE, SET_UP, SETUP_ODDS
 from dbbstation.diagnosis.shapes import LEVER_MM, TABLE
 from dbbstation.inference.channel import Base, Law
 from dbbstation.inference.harmonics import bands, basis
+from dbbstation.inference.levels import BALL, BAR
 from dbbstation.sources.registry import sources_named
 
 if TYPE_CHECKING:
@@ -143,6 +144,7 @@ def _outsize(
             log_odds=SETUP_ODDS,
             choices=several if len(choices) > 1 else (),
             acts_once=True,
+            followed=(BAR if source.name == "bar-offset" else BALL,),
         )
     ]
 

@@ -36,12 +36,7 @@ UM = 1e3
 
 
 class CircleBank(Bank):
-    """Columns of circles, which are laid out already, in white noise.
-
-    A tenth of the squares of an effect is thousands in log evidence here: variables are interchangeable where causes are equivalent.
-    """
-
-    interchangeable = EQUIVALENT**2
+    """Columns of circles, which are laid out already, in white noise."""
 
     def __init__(self, rows: Channel, circles: CircleChannel, settled: SettledCircles) -> None:
         self.channel, self.patterns, self.laws = rows, {}, {law.name: law for law in rows.laws}
@@ -70,6 +65,7 @@ def outcome_of(explained: Explained) -> Settled:
         variables=(),
         base=Base(("the kinematic parameters",), circles.columns.base, base.prior, base.random),
         laws=tuple(_law(explained, cause) for cause in settled.causes),
+        interchangeable=EQUIVALENT**2,
         rows_are="tests",
     )
     bank = CircleBank(rows, circles, settled)

@@ -80,12 +80,9 @@ class Bank:
         long_tails: innovations may follow Student's t.
         grows_with: variable of the variance; may be empty.
         nameless: causes that are the name of nothing.
-        interchangeable: share of the squares of a fitted effect that one cause over another variable must make for both to be named: what
-            it leaves is less than a third of the effect. With 0.8 and 0.95 none of ten tables named a further variable, as with this.
     """
 
     nameless: frozenset[str] = frozenset()
-    interchangeable = 0.9
 
     def __init__(self, channel: Channel) -> None:
         self.channel = channel

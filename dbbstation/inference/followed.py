@@ -205,7 +205,7 @@ def interchangeable(
         picked = pattern is not None and pattern.family in LOOKED_FOR
         if cause.name in best.names or len(over) != 1 or over & own or picked or way_of(bank, cause.name) != VALUE:
             continue
-        if share_of(settled, members, cause) >= bank.interchangeable:
+        if share_of(settled, members, cause) >= settled.channel.interchangeable:
             found |= over
     return tuple(sorted(found))
 

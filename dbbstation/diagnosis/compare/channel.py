@@ -14,6 +14,7 @@ from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_
 from dbbstation.diagnosis.compare.causes import Change
 from dbbstation.diagnosis.compare.set_up import base_of, jig_laws, set_up_laws
 from dbbstation.diagnosis.compare.unnamed import of_each_test, of_readings, of_struts, samples_of_b, variables_of
+from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.channel import NAMED_ODDS, Channel
 from dbbstation.sources.registry import sources_named
 
@@ -57,6 +58,7 @@ def channel_of(sides: Sides, sources: Sequence[ErrorSource]) -> Channel:
         time_unit="row",
         static=(*of_readings(variables, sides, time), *of_struts(sides, runs), of_each_test(sides)),
         least_noise=RESOLUTION_MM,
+        interchangeable=EQUIVALENT**2,
         rows_are="tests",
     )
 

@@ -19,7 +19,6 @@ from unittest import mock
 import numpy as np
 
 from dbbstation.inference import patterns
-from dbbstation.inference.bank import Bank
 from dbbstation.inference.curves import Spline
 from dbbstation.inference.detectable import MARGIN, detectable
 from dbbstation.inference.followed import VariableProbabilities, classes_of, probability_of_any
@@ -60,8 +59,8 @@ def named_at(kind: str, seed: int) -> dict[str, bool]:
     """Whether, by share, a class names a variable besides those that are followed."""
     settled, found = settled_of(table_of(kind, seed, 2.0)), {}
     for share in SHARES:
-        with mock.patch.object(Bank, "interchangeable", share):
-            classes = classes_of(settled, VariableProbabilities(settled))
+        one = replace(settled, channel=replace(settled.channel, interchangeable=share))
+        classes = classes_of(one, VariableProbabilities(one))
         others = {SAME.get(v, v) for one in classes for v in one.others} - EFFECTS[kind][2]
         found[str(share)] = bool(others)
     return found

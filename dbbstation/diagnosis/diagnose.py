@@ -66,6 +66,7 @@ def diagnose(
         observations: raw.
         sources: candidates with their needs, forms of one cause under one name.
         hold_out: choose anew without each group of tests.
+        until_interrupted: an interruption ends the work, and what was found is answered.
 
     Raises:
         CalibrationError: the base model cannot be fitted.
@@ -74,6 +75,17 @@ def diagnose(
     most = sectors_for(len(observations))
     runs = [thinned(observation, most) for observation in observations]
     explained = explain(machine, runs, sources, progress, until_interrupted=until_interrupted)
+    try:
+        return _answered(explained, progress, hold_out=hold_out)
+    except KeyboardInterrupt:
+        if not until_interrupted:
+            raise
+    # What was found is judged without the tests of it that take time.
+    return _answered(replace(explained, settled=replace(explained.settled, stopped=True)), progress, hold_out=False)
+
+
+def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out: bool) -> Diagnosis:
+    """Judge what was found, and test it unless interrupted."""
     progress("verdicts")
     explained, findings = judged(explained)
     progress("held-out tests")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
+from dbbstation.diagnosis import diagnose as finished
 from dbbstation.diagnosis import explain
 from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
@@ -173,6 +174,22 @@ def test_who_interrupts_the_comparison_gets_what_it_had_found(backlash, monkeypa
     found = diagnose([backlash], until_interrupted=True)
     assert found.limits[0].what == "stopped"
     assert found.held_out == "not-tested"
+    (best,) = [source for source in found.sources if source.name == "backlash"]
+    assert best.probability > 0.95
+    for strut in range(1, 7):
+        one = best.parameters[f"strut_{strut}_um"]
+        assert abs(one.value - 4.0) <= 3.0 * one.uncertainty
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stage", ["without_tests", "next_tests"])
+def test_who_interrupts_the_tests_of_an_answer_gets_the_answer(backlash, monkeypatch, stage):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(finished, stage, interrupted)
+    found = diagnose([backlash], until_interrupted=True)
+    assert found.limits[0].what == "stopped"
     (best,) = [source for source in found.sources if source.name == "backlash"]
     assert best.probability > 0.95
     for strut in range(1, 7):

@@ -102,7 +102,6 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
     again = {} if stopped else found_again(explained, rivals)
     findings = tuple(replace(f, stability=again.get(f.name)) for f in findings)
     rest = _unexplained(explained, settled.left)
-    found = [explained.channel.source_of(m.cause.name, m.variant) for m in members]
     mismatch = is_missing_physics(explained.first) or bool(members) or bool(outliers) or rest.variable is not None
     held_out = predicted(explained)
     elsewhere = workspace_error(before, after) if members else None
@@ -118,7 +117,7 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
         levels=levels,
         outliers=tuple(beside(outlier, after) for outlier in outliers),
         workspace=elsewhere,
-        locations=locations_of(before, after, found, explained.first, rest.variable) if mismatch else (),
+        locations=locations_of(before, settled, explained.first, levels) if mismatch else (),
         sources=findings,
         unexplained=with_exact_wave(rest, after),
         shifts=shifts_between(before, after),

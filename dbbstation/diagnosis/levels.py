@@ -124,6 +124,11 @@ def circle_levels(explained: Explained, outcome: Settled, gains: GainsOfTests | 
         gains: None: not tested.
     """
     found = levels_by_tests(outcome, _left(explained), gains).times(UM)
+    unmodelled = explained.settled.unmodelled.follows
+    # Of what moves no strut, all amplitudes together are no place.
+    nowhere = {name for name, follows in unmodelled.items() if not follows.moves_struts}
+    follows = (replace(one, where=None) if nowhere.intersection(one.members) else one for one in found.follows)
+    found = replace(found, follows=tuple(follows))
     if not explained.outliers:
         return found
     differs = replace(found.differs, answer=Differs.YES, why="", probability=1.0)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.findings import Location
+from dbbstation.diagnosis.variables import SESSION_TIME
 from dbbstation.inference.harmonics import smooth
 from dbbstation.model.machine_model import MachineModel
 
@@ -16,28 +17,45 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.diagnosis.explained import SettledCircles
     from dbbstation.inference.harmonics import Misfit
+    from dbbstation.inference.levels import Levels
     from dbbstation.model.observation import Observation
-    from dbbstation.sources.contract import Effect, ErrorSource, Fitted
+    from dbbstation.sources.contract import Effect, Fitted
 
 MOST_LOCATIONS = 12
 COUNTS_SIGMA = 4.0
 """A smoothed deviation counts as misfit above this many of its standard deviations."""
 
 
-def locations_of(
-    before: Calibration, after: Calibration, found: Sequence[ErrorSource], first: Misfit, unnamed: str | None
-) -> tuple[Location, ...]:
-    """Return the largest base misfits and their struts by found sources.
+def locations_of(before: Calibration, settled: SettledCircles, first: Misfit, levels: Levels) -> tuple[Location, ...]:
+    """Return the largest base misfits, the variable that the largest class follows, and the struts of all classes."""
+    names = {member.cause.name for member in settled.members}
+    fitted = [f for f in settled.after.model.sources if f.source.name in names]
+    largest = max(levels.follows, key=lambda one: one.rms, default=None)
+    variable = "" if largest is None or largest.in_time else largest.variables[0][0]
+    variable = "time" if variable == SESSION_TIME else variable
+    none: list[NDArray[np.float64] | None] = [None] * len(before.observations)
+    struts = strut_contributions(before, fitted) if fitted else none
+    return locate(before.observations, before.residual_mm, first.noise, _with_unmodelled(settled, struts), variable)
 
-    Args:
-        after: joint fit.
-        unnamed: its variable, or None.
-    """
-    fitted = [f for f in after.model.sources if f.source in found]
-    variable = next((source.varies_with for source in found if source.varies_with), unnamed or "")
-    struts = strut_contributions(before, fitted) if fitted else [None] * len(before.observations)
-    return locate(before.observations, before.residual_mm, first.noise, struts, variable)
+
+def _with_unmodelled(
+    settled: SettledCircles, struts: list[NDArray[np.float64] | None]
+) -> list[NDArray[np.float64] | None]:
+    """Add what unmodelled effects of struts contribute to readings, per run, shape (n, 6) [mm]."""
+    unmodelled, members = settled.unmodelled, settled.best.members
+    values = settled.comparison.estimates(members).values if members else np.zeros(0)
+    for member in members:
+        own, values = values[: len(member.variant.columns)], values[len(member.columns) :]
+        shapes = [one for one in unmodelled.of(member) if one.follows.moves_struts]
+        for k, run in enumerate(unmodelled.runs):
+            rest = own
+            for shape in shapes:
+                effect, count = shape.by_strut(run, rest)
+                rest, before = rest[count:], struts[k]
+                struts[k] = effect if before is None else before + effect
+    return struts
 
 
 def locate(

@@ -181,6 +181,15 @@ class Shape:
             return np.asarray((gain[:, :, None] * curve[:, None, :]).reshape(len(gain), -1))
         return np.einsum("ni,nip->np", samples.gain[self.moves], self.form.columns(values))
 
+    def by_strut(self, samples: Samples, amplitudes: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+        """Return what each strut contributes to readings, shape (n, 6), and how many amplitudes that takes."""
+        gain, values = samples.gain[self.moves], self.followed(samples.values[self.variable])
+        columns = self.form.columns(values)
+        count = columns.shape[-1]
+        curve = columns @ amplitudes[:count]
+        effect = gain * (curve[:, None] if curve.ndim == 1 else curve)
+        return effect * (np.arange(1, STRUTS + 1) == self.strut) if self.strut else effect, count
+
     def followed(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return its variable's values, by strut or place."""
         if isinstance(self.form, Spring):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.plant.foreign.judge import judge
+from tests.plant.foreign.levels import levels_of, table_of
 from tests.plant.foreign.score import compare
 from tests.plant.foreign.sessions import KINDS, LEAST_SIZE, kind_of, make, small_machine
 from tests.plant.machine import reference_machine
@@ -112,3 +113,27 @@ def test_the_score_counts_names_values_and_silence() -> None:
     silent = compare(answer, _verdict(2.0, _source("backlash", "not-testable")))
     assert silent["without_answer"]
     assert silent["silent"]
+
+
+def test_levels_are_scored_by_variables_that_were_put_in() -> None:
+    """One of two effects is located, one of two classes is of neither, and of a class that is not sure nothing counts."""
+    answer = {
+        "effects": [
+            {"name": "backlash", "variables": ["strut-speed-sign"]},
+            {"name": "gravity", "variables": ["strut-force"]},
+        ]
+    }
+
+    def one(variable: str, said: str = "follows") -> dict[str, Any]:
+        return {"variables": [[variable]], "or_variables": [], "answer": said, "before": 2.0, "after": 1.0}
+
+    follows = [one("travel since its reversal"), one("tilt of the platform"), one("strut-force", "undecided")]
+    row = levels_of(answer, {"levels": {"differs": {"answer": "yes"}, "follows": follows}})
+    assert row["located"] == ["backlash"]
+    assert row["wrong_classes"] == ["tilt of the platform"]
+    assert len(row["classes"]) == 2
+    scored = {"named": ["backlash"], "right": ["backlash"], "listed": 2, "wrong": [], "levels": row}
+    table = table_of({"0001": scored}, {"command": "c", "date": "2026-11-27", "seed": 1}, "")
+    assert table["figures"]["effects that a class follows"][0] == "1 of 2"
+    assert table["figures"]["classes that no effect follows"][0] == "1 of 2"
+    assert table["figures"]["listed causes that were named"][0] == "1 of 2"

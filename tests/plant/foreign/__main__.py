@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.plant.foreign.judge import commit_of, judge
+from tests.plant.foreign.levels import table_of
 from tests.plant.foreign.score import as_table, scored
 from tests.plant.foreign.sessions import make
 
@@ -33,6 +34,9 @@ def main() -> None:
     parser.add_argument("--former", type=Path, help="score: an earlier score, for commits whose verdicts are gone")
     parser.add_argument("--limits", default=LIMITS, help="score: what the stored table says of its limits")
     parser.add_argument("--out", type=Path, help="score: write the figures here as JSON, too")
+    parser.add_argument(
+        "--levels", type=Path, help="score: write recall and precision of each level here, of one commit"
+    )
     given = parser.parse_args()
     numbers = _numbers(given.only) or list(range(1, given.count + 1))
     if given.task == "make":
@@ -51,6 +55,11 @@ def main() -> None:
         if given.out:
             given.out.parent.mkdir(parents=True, exist_ok=True)
             given.out.write_text(_text(as_table(figures, given.limits)), encoding="utf-8")
+        if given.levels:
+            head = {key: figures[key] for key in ("date", "seed")}
+            head["command"] = "python -m tests.plant.foreign make|run|score FOLDER --levels FILE"
+            table = table_of(figures["commits"][given.of[0]]["each"], head, given.limits)
+            given.levels.write_text(_text(table), encoding="utf-8")
 
 
 def _text(figures: dict[str, Any]) -> str:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tests.plant.foreign.levels import levels_of
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
@@ -96,6 +98,7 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, 
             f"{name} {key}": z for name in named if name in listed for key, z in _off_u(listed[name], by_name[name])
         },
         "residual_um": residual,
+        "levels": levels_of(answer, summary),
         "silent": not named and not unsure,
         "error": verdict.get("error", ""),
         "processor_s": round(verdict["processor_s"], 1),

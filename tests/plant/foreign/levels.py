@@ -1,0 +1,104 @@
+"""The three levels of a session against what was put in: does anything differ, what does it follow, which cause."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tests.diagnosis.table.levels_study import interval
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+SAID = ("follows", "goes on in time", "happened")
+"""Answers by which a class of variables is said to be followed."""
+
+UNLISTED = {"wandering-bar": {"time"}, "stick-slip": {"strut-speed-sign", "reversal"}}
+"""Variables of what is on no list."""
+
+REVERSAL = {"strut-speed-sign", "reversal"}
+MEANS = {
+    "the time of the session": {"time"},
+    "temperature": {"time"},
+    "run": {"time"},
+    "a ball put up elsewhere": {"time"},
+    "the bar's length": {"time"},
+    "strut-speed-sign": REVERSAL,
+    "travel since its reversal": REVERSAL,
+    "time since its reversal": REVERSAL,
+    "joint-angle": {"joint"},
+    "joint-angle-speed-sign": {"joint", "strut-speed-sign"},
+    "base-compliance": {"strut-force"},
+    "strut-weight": {"strut-force"},
+    "angle since the start": {"time"},
+    "reading": {"reading", "angle"},
+    "bar-scale": {"reading"},
+}
+"""Variables of the plant that one of the program's stands for, where it has another name: of the warm-ups that were put in, temperatures
+follow the time."""
+
+
+def levels_of(answer: Mapping[str, Any], summary: Mapping[str, Any]) -> dict[str, Any]:
+    """One session: which effects were located, and which classes are those of an effect."""
+    said = summary.get("levels")
+    if said is None:
+        return {}
+    effects = {one["name"]: set(one.get("variables") or UNLISTED[one["name"]]) for one in answer["effects"]}
+    classes = [one for one in said["follows"] if one["answer"] in SAID]
+    told = [set[str]().union(*(MEANS.get(name, {name}) for name in _names(one))) for one in classes]
+    every = set[str]().union(*effects.values())
+    return {
+        "differs": said["differs"]["answer"],
+        "effects": sorted(effects),
+        "located": sorted(name for name, own in effects.items() if any(own & one for one in told)),
+        "classes": [" and ".join(_names(one)) for one in classes],
+        "wrong_classes": [" and ".join(_names(one)) for one, own in zip(classes, told, strict=True) if not own & every],
+        "held_out_um": [[one["before"], one["after"]] for one in classes if one["before"] is not None],
+    }
+
+
+def table_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any], limits: str) -> dict[str, Any]:
+    """Recall and precision of each level, in the form of the validation page.
+
+    Args:
+        rows: of one commit, by session.
+        head: command, date and seed.
+    """
+    every = [row for row in rows.values() if row["levels"]]
+    there = [row for row in every if row["levels"]["effects"]]
+    nothing = [row for row in every if not row["levels"]["effects"]]
+    listed, names = sum(row["listed"] for row in there), sum(len(row["named"]) for row in every)
+    wrong = sum(not name.startswith("(") for row in every for name in row["wrong"])
+    figures = {
+        "sessions with effects: it differs": _rate([row["levels"]["differs"] == "yes" for row in there]),
+        "sessions with effects: no": _rate([row["levels"]["differs"] == "no" for row in there]),
+        "sessions without: it differs": _rate([row["levels"]["differs"] == "yes" for row in nothing]),
+        "effects that a class follows": _share(
+            sum(len(row["levels"]["located"]) for row in there), sum(len(row["levels"]["effects"]) for row in there)
+        ),
+        "classes that no effect follows": _share(
+            sum(len(row["levels"]["wrong_classes"]) for row in every),
+            sum(len(row["levels"]["classes"]) for row in every),
+        ),
+        "listed causes that were named": _share(sum(len(row["right"]) for row in there), listed),
+        "wrong names": _share(wrong, names),
+    }
+    return {
+        "question": "How often is each of the three levels right for circles?",
+        **head,
+        "data": f"{len(every)} sessions of two simulated robots whose laws are not the program's own, {len(nothing)} of them clean.",
+        "limits": limits,
+        "columns": ["counted", "share", "95 % interval"],
+        "figures": figures,
+    }
+
+
+def _names(one: Mapping[str, Any]) -> Sequence[str]:
+    return [*(name for names in one["variables"] for name in names), *one["or_variables"]]
+
+
+def _rate(each: Sequence[bool]) -> list[str]:
+    return _share(sum(each), len(each))
+
+
+def _share(count: int, of: int) -> list[str]:
+    return [f"{count} of {of}", f"{100.0 * count / max(of, 1):.0f} %", interval(count, of) or "none"]

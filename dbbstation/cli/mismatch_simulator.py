@@ -11,7 +11,8 @@ from dbbstation.cli.output import echo
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.simulator import PortTerm, SimulatorParameterResult, SimulatorResult
+    from dbbstation.diagnosis.simulator.answer import RefittedOfSimulator
+    from dbbstation.results.simulator import PortTerm, SimulatorResult
 
 
 def show_simulator(result: SimulatorResult) -> None:
@@ -109,7 +110,7 @@ def _print_findings(there: Sequence[PortTerm]) -> None:
             echo(f"  {f.text}")
 
 
-def _print_parameters(parameters: Sequence[SimulatorParameterResult]) -> None:
+def _print_parameters(parameters: Sequence[RefittedOfSimulator]) -> None:
     from dbbstation.cli.output import print_table
 
     if not parameters:

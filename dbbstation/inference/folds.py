@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping  # noqa: TC003 - types of fields are read when results are written
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import numpy as np
 
+from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.inference.verdict import Gains, is_worse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from numpy.typing import NDArray
 
@@ -61,7 +63,7 @@ class Fold:
     as_simulated: float
     before: float
     after: float
-    gains: Mapping[Kind, float] = field(default_factory=dict)
+    gains: Annotated[Mapping[Kind, float], AsItIs, Kept] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

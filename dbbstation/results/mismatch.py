@@ -8,9 +8,11 @@ from typing import Annotated
 
 from pydantic import Field
 
+from dbbstation.diagnosis.table.mismatch import RefittedParameter, VariableShare
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.folds import Fold
 from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.read_off import Span
@@ -88,22 +90,6 @@ class ResidualRms:
 
 
 @dataclass(frozen=True)
-class HeldOutPart:
-    """Errors of one held-out part, in the table's unit.
-
-    Attributes:
-        as_simulated: rms of measured less simulated value.
-        before: parameters refitted.
-    """
-
-    name: str
-    rows: int
-    as_simulated: float
-    before: float
-    after: float
-
-
-@dataclass(frozen=True)
 class HeldOutRms:
     """Errors of all held-out parts, in the table's unit.
 
@@ -116,24 +102,7 @@ class HeldOutRms:
     before: float
     after: float
     worse: bool
-    folds: tuple[HeldOutPart, ...]
-
-
-@dataclass(frozen=True)
-class VariableShare:
-    """Part of the mismatch that follows one variable.
-
-    Attributes:
-        rms: of all its effects, in the table's unit.
-        share: of the explained part, by these alone.
-        terms: number of effects.
-    """
-
-    variable: str
-    rms: float
-    share: float
-    lost: float
-    terms: int
+    folds: tuple[Fold, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,29 +146,6 @@ class EffectResult:
     ambiguous_with: tuple[str, ...]
     resembles: Mapping[str, float]
     text: str
-
-
-@dataclass(frozen=True)
-class RefittedResult:
-    """A refitted parameter of the simulation.
-
-    Attributes:
-        before: change by ordinary least squares alone.
-        after: change beside the effects.
-        confounded: R² of the parameter on the effects.
-        known: prior standard uncertainty; None if free.
-        stated: whether the user stated it.
-        far: whether derivative or prior must be renewed after so large a change.
-    """
-
-    name: str
-    before: Value
-    after: Value
-    shift: float
-    confounded: float
-    known: float | None
-    stated: bool
-    far: bool
 
 
 @dataclass(frozen=True)
@@ -247,7 +193,7 @@ class MismatchResult(Framed):
     cancelling: Cancelling | None
     led_by: tuple[VariableShare, ...]
     findings: tuple[EffectResult, ...]
-    parameters: tuple[RefittedResult, ...]
+    parameters: tuple[RefittedParameter, ...]
     left: LeftOver
     second_start_agrees: bool
     second_start_log_odds: float

@@ -9,23 +9,20 @@ from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.diagnosis.table.words import sentence_of
 from dbbstation.results.mismatch import (
     EffectResult,
-    HeldOutPart,
     HeldOutRms,
     MismatchResult,
     NextMeasurement,
     NoiseResult,
     OffsetResult,
-    RefittedResult,
     ResidualRms,
     SearchBeginning,
     VariableResult,
-    VariableShare,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from dbbstation.diagnosis.table.mismatch import Mismatch, RefittedParameter
+    from dbbstation.diagnosis.table.mismatch import Mismatch
     from dbbstation.inference.read_off import CauseFinding
 
 
@@ -58,9 +55,9 @@ def mismatch_result(
         held_out="not-tested" if found.held_out is None else "tested",
         held_out_rms=_held_out(found),
         cancelling=found.cancelling,
-        led_by=tuple(VariableShare(s.variable, s.rms, s.share, s.lost, s.terms) for s in found.shares),
+        led_by=found.shares,
         findings=tuple(_effect(found, finding) for finding in found.findings),
-        parameters=tuple(_parameter(one) for one in found.fitted),
+        parameters=found.fitted,
         left=found.left,
         second_start_agrees=found.second_start == 0.0,
         second_start_log_odds=found.second_start,
@@ -102,8 +99,7 @@ def _held_out(found: Mismatch) -> HeldOutRms | None:
     held_out = found.held_out
     if held_out is None:
         return None
-    parts = (HeldOutPart(one.name, one.rows, one.as_simulated, one.before, one.after) for one in held_out.folds)
-    return HeldOutRms(held_out.as_simulated, held_out.before, held_out.after, found.is_worse, tuple(parts))
+    return HeldOutRms(held_out.as_simulated, held_out.before, held_out.after, found.is_worse, held_out.folds)
 
 
 def _effect(found: Mismatch, finding: CauseFinding) -> EffectResult:
@@ -130,17 +126,4 @@ def _effect(found: Mismatch, finding: CauseFinding) -> EffectResult:
         ambiguous_with=tuple(finding.ambiguous_with),
         resembles=found.resembles.get(finding.name, {}),
         text=sentence_of(found, finding),
-    )
-
-
-def _parameter(one: RefittedParameter) -> RefittedResult:
-    return RefittedResult(
-        name=one.name,
-        before=one.before,
-        after=one.after,
-        shift=one.after.value - one.before.value,
-        confounded=one.confounded,
-        known=one.known,
-        stated=one.stated,
-        far=one.is_far,
     )

@@ -12,18 +12,16 @@ from dbbstation.results.simulator import (
     HeldOutSimulation,
     HeldOutSimulations,
     PortTerm,
-    SeparatingInput,
     SimulatedOutput,
     SimulatedRun,
     SimulationNoise,
     SimulationRms,
     SimulationsRun,
-    SimulatorParameterResult,
     SimulatorResult,
 )
 
 if TYPE_CHECKING:
-    from dbbstation.diagnosis.simulator.answer import Moved, SimulatorComparison
+    from dbbstation.diagnosis.simulator.answer import SimulatorComparison
     from dbbstation.inference.read_off import CauseFinding
 
 HIDDEN = 0.1
@@ -56,21 +54,9 @@ def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -
         held_out="not-tested" if answer.held_out is None else "tested",
         held_out_rms=_held_out(answer),
         findings=tuple(_term(answer, one) for one in answer.findings),
-        parameters=tuple(_parameter(one) for one in answer.parameters),
+        parameters=answer.parameters,
         left=answer.left,
-        next=tuple(
-            SeparatingInput(
-                one.text,
-                one.terms,
-                one.part,
-                one.sigmas,
-                one.repeats,
-                one.trial.about if one.trial else None,
-                one.trial_sigmas,
-                one.recorded_sigmas,
-            )
-            for one in answer.separations
-        ),
+        next=answer.separations,
         not_asked=dict(answer.not_asked),
         simulations=simulations,
     )
@@ -114,18 +100,3 @@ def _why(one: CauseFinding) -> str:
         return ""
     hidden = f" The parameters had taken up {100.0 * one.confounded:.0f} % of it." if one.confounded > HIDDEN else ""
     return f"The recordings want it, and nothing else that was asked does as well.{hidden}"
-
-
-def _parameter(one: Moved) -> SimulatorParameterResult:
-    shift, u = one.after.value - one.before.value, one.before.uncertainty
-    return SimulatorParameterResult(
-        name=one.name,
-        unit=one.before.unit,
-        stated=one.stated,
-        refitted=one.before,
-        corrected=one.after,
-        shift=shift,
-        shift_over_u=finite(shift / u if u > 0.0 else None),
-        confounded=one.confounded,
-        not_told_apart_from=None if one.alike is None else tuple(one.alike),
-    )

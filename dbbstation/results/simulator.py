@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
+from dbbstation.diagnosis.simulator.answer import RefittedOfSimulator
+from dbbstation.diagnosis.simulator.separate import SeparatingInput
 from dbbstation.facts.serialise import Absent, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.left_over import LeftOver
@@ -118,52 +120,6 @@ class PortTerm:
 
 
 @dataclass(frozen=True)
-class SimulatorParameterResult:
-    """A parameter of the simulator.
-
-    Attributes:
-        stated: in the model file.
-        refitted: without terms.
-        corrected: with the found terms.
-        shift_over_u: in standard uncertainties of the first; None if unknown.
-        confounded: R² on the found terms.
-        not_told_apart_from: indistinguishable parameters, or None.
-    """
-
-    name: str
-    unit: str
-    stated: float
-    refitted: Value
-    corrected: Value
-    shift: float
-    shift_over_u: float | None
-    confounded: float
-    not_told_apart_from: tuple[str, ...] | None
-
-
-@dataclass(frozen=True)
-class SeparatingInput:
-    """A recording that would distinguish two terms.
-
-    Attributes:
-        part: stretch of largest difference.
-        sigmas: difference there in standard deviations.
-        repeats: of that stretch until distinguished.
-        input: best input in words; None if no tried one beats the recorded.
-        input_sigmas: difference under it, for equal length.
-    """
-
-    text: str
-    terms: tuple[str, ...]
-    part: str
-    sigmas: float
-    repeats: int
-    input: str | None
-    input_sigmas: float
-    recorded_sigmas: float
-
-
-@dataclass(frozen=True)
 class SimulationsRun:
     """Number of simulations.
 
@@ -206,7 +162,7 @@ class SimulatorResult(Framed):
     held_out: str
     held_out_rms: HeldOutSimulations | None
     findings: tuple[PortTerm, ...]
-    parameters: tuple[SimulatorParameterResult, ...]
+    parameters: tuple[RefittedOfSimulator, ...]
     left: LeftOver
     next: tuple[SeparatingInput, ...]
     not_asked: Mapping[str, str]

@@ -20,7 +20,7 @@ from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
 from dbbstation.diagnosis.simulator.search import compared, moves, search
 from dbbstation.diagnosis.simulator.separate import separations
 from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns, rms
-from dbbstation.facts.value import Value
+from dbbstation.facts.value import Value, finite
 from dbbstation.inference.chosen_anew import LEAST_PARTS
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.left_over import left_over
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.nodes import Challenge, Node
     from dbbstation.diagnosis.simulator.own import PortSource
     from dbbstation.diagnosis.simulator.search import SearchOutcome
-    from dbbstation.diagnosis.simulator.separate import Separation
+    from dbbstation.diagnosis.simulator.separate import SeparatingInput
     from dbbstation.diagnosis.simulator.terms import Term
     from dbbstation.diagnosis.simulator.work import Run
     from dbbstation.inference.folds import HeldOutError
@@ -47,22 +47,27 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Moved:
+class RefittedOfSimulator:
     """A parameter of the simulator.
 
     Attributes:
-        before: without terms.
-        after: with findings.
-        confounded: R² on findings; zero without.
-        alike: indistinguishable parameters.
+        stated: in the model file.
+        refitted: without terms.
+        corrected: with the found terms.
+        shift_over_u: in standard uncertainties of the first; None if unknown.
+        confounded: R² on the found terms; zero without.
+        not_told_apart_from: indistinguishable parameters, or None.
     """
 
     name: str
+    unit: str
     stated: float
-    before: Value
-    after: Value
+    refitted: Value
+    corrected: Value
+    shift: float
+    shift_over_u: float | None
     confounded: float
-    alike: tuple[str, ...] | None
+    not_told_apart_from: tuple[str, ...] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +89,14 @@ class SimulatorComparison:
     base: Node
     found: SearchOutcome
     findings: tuple[CauseFinding, ...]
-    parameters: tuple[Moved, ...]
+    parameters: tuple[RefittedOfSimulator, ...]
     left: LeftOver
     levels: Levels
     held_out: HeldOutError | None
     as_simulated: NDArray[np.float64]
     nonlinear: Mapping[str, float]
     not_asked: Mapping[str, str]
-    separations: tuple[Separation, ...] = ()
+    separations: tuple[SeparatingInput, ...] = ()
     stopped: str = ""
 
     @property
@@ -282,7 +287,7 @@ def _nonlinear(work: SimulationRuns, found: SearchOutcome) -> dict[str, float]:
     return apart
 
 
-def _parameters(base: Node, found: SearchOutcome) -> tuple[Moved, ...]:
+def _parameters(base: Node, found: SearchOutcome) -> tuple[RefittedOfSimulator, ...]:
     weigh, sigma = noise_of(found.settled)
     model, fitted = base.work.model, found.node.fitted
     count = len(model.parameters)
@@ -294,17 +299,25 @@ def _parameters(base: Node, found: SearchOutcome) -> tuple[Moved, ...]:
     before = _uncertainties(white, known) * max(rms(weigh(base.fitted.residual)) / sigma, 1.0)
     names = [p.name for p in model.parameters]
     alike = dict(not_told_apart(names, white))
-    return tuple(
-        Moved(
-            p.name,
-            p.value,
-            Value(float(base.fitted.state.values[k]), float(before[k]), p.unit),
-            Value(float(found.state.values[k]), float(both[k]), p.unit),
-            float(np.clip(1.0 - (alone[k] / both[k]) ** 2, 0.0, 1.0)) if both[k] > 0.0 else 0.0,
-            alike.get(p.name),
+    found_parameters = []
+    for k, p in enumerate(model.parameters):
+        refitted = Value(float(base.fitted.state.values[k]), float(before[k]), p.unit)
+        corrected = Value(float(found.state.values[k]), float(both[k]), p.unit)
+        shift, u = corrected.value - refitted.value, refitted.uncertainty
+        found_parameters.append(
+            RefittedOfSimulator(
+                name=p.name,
+                unit=p.unit,
+                stated=p.value,
+                refitted=refitted,
+                corrected=corrected,
+                shift=shift,
+                shift_over_u=finite(shift / u if u > 0.0 else None),
+                confounded=float(np.clip(1.0 - (alone[k] / both[k]) ** 2, 0.0, 1.0)) if both[k] > 0.0 else 0.0,
+                not_told_apart_from=None if alike.get(p.name) is None else tuple(alike[p.name]),
+            )
         )
-        for k, p in enumerate(model.parameters)
-    )
+    return tuple(found_parameters)
 
 
 def _uncertainties(rows: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:

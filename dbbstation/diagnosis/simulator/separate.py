@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,42 +29,42 @@ MOST_REPEATS = 1000
 """Repeats from which on they are no proposal."""
 
 
-@dataclass(frozen=True, eq=False)
-class Separation:
-    """What would distinguish two terms.
+@dataclass(frozen=True)
+class SeparatingInput:
+    """A recording that would distinguish two terms.
 
     Attributes:
-        part: stretch of greatest difference.
+        part: stretch of largest difference.
         sigmas: difference there in standard deviations.
-        repeats: until distinguished.
-        trial: best input, or None.
-        trial_sigmas: under it, for equal length.
+        repeats: of that stretch until distinguished.
+        input: best input in words; None if no tried one beats the recorded.
+        input_sigmas: difference under it, for equal length.
     """
 
+    text: str
     terms: tuple[str, str]
     part: str
     sigmas: float
     repeats: int
-    trial: TrialInput | None
-    trial_sigmas: float
+    input: str | None
+    input_sigmas: float
     recorded_sigmas: float
 
-    @property
-    def text(self) -> str:
-        """In words."""
-        first, second = self.terms
-        if self.trial is not None:
-            return (
-                f"{first} or {second}: record {self.trial.about}. Their answers then differ by {self.trial_sigmas:.2g} standard "
-                f"deviations; under the inputs as recorded they differ by {self.recorded_sigmas:.2g}."
-            )
+
+def _text(one: SeparatingInput) -> str:
+    first, second = one.terms
+    if one.input is not None:
         return (
-            f"{first} or {second}: their answers differ most in {self.part}, by {self.sigmas:.2g} standard deviations. "
-            f"Record inputs as there, {_repeated(self.repeats)}, or larger ones."
+            f"{first} or {second}: record {one.input}. Their answers then differ by {one.input_sigmas:.2g} standard "
+            f"deviations; under the inputs as recorded they differ by {one.recorded_sigmas:.2g}."
         )
+    return (
+        f"{first} or {second}: their answers differ most in {one.part}, by {one.sigmas:.2g} standard deviations. "
+        f"Record inputs as there, {_repeated(one.repeats)}, or larger ones."
+    )
 
 
-def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> tuple[Separation, ...]:
+def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> tuple[SeparatingInput, ...]:
     """Return proposals for indistinguishable pairs.
 
     Both answers are compared beside parameters by stretch, until `OUT` standard deviations, and under trial inputs.
@@ -81,9 +81,11 @@ def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding
         if squares[best] > 0.0:
             repeats = max(int(np.ceil(OUT**2 / squares[best])), 1)
             trial, sigmas, recorded = _tried(nodes, found, pair)
-            proposals.append(
-                Separation(pair, every[best][0], float(np.sqrt(squares[best])), repeats, trial, sigmas, recorded)
+            about = None if trial is None else trial.about
+            one = SeparatingInput(
+                "", pair, every[best][0], float(np.sqrt(squares[best])), repeats, about, sigmas, recorded
             )
+            proposals.append(replace(one, text=_text(one)))
     return tuple(proposals)
 
 

@@ -60,7 +60,7 @@ MOST_WORK_WITHOUT = 2e5
 
 @dataclass(frozen=True)
 class RefittedParameter:
-    """A base parameter before and after.
+    """A refitted parameter of the simulation.
 
     Attributes:
         before: base alone, ordinary least squares, correlation-adjusted.
@@ -68,29 +68,36 @@ class RefittedParameter:
         confounded: R² on findings.
         known: prior standard uncertainty; None if free.
         stated: by the user; else twice the simulated difference.
+        far: whether derivative or prior must be renewed after so large a change.
     """
 
     name: str
     before: Value
     after: Value
+    shift: float
     confounded: float
-    known: float | None = None
-    stated: bool = False
+    known: float | None
+    stated: bool
+    far: bool
 
-    @property
-    def is_far(self) -> bool:
-        """Return whether derivative or prior must be renewed."""
-        return self.known is not None and abs(self.after.value) > (FAR_STATED if self.stated else 1.0) * self.known
+
+def refitted(
+    name: str, before: Value, after: Value, confounded: float, known: float | None = None, *, stated: bool = False
+) -> RefittedParameter:
+    """Return a parameter before and after; arguments as of `RefittedParameter`."""
+    far = known is not None and abs(after.value) > (FAR_STATED if stated else 1.0) * known
+    return RefittedParameter(name, before, after, after.value - before.value, confounded, known, stated, far)
 
 
 @dataclass(frozen=True)
-class Share:
-    """The mismatch's part of one variable.
+class VariableShare:
+    """Part of the mismatch that follows one variable.
 
     Attributes:
         rms: of all its effects, in the table's unit.
-        share: of the reduction, alone.
+        share: of the explained part, by these alone.
         lost: without them.
+        terms: number of effects.
     """
 
     variable: str
@@ -119,7 +126,7 @@ class Mismatch:
     table: Table
     settled: Settled
     findings: tuple[CauseFinding, ...]
-    shares: tuple[Share, ...]
+    shares: tuple[VariableShare, ...]
     resembles: dict[str, dict[str, float]]
     fitted: tuple[RefittedParameter, ...]
     left: LeftOver
@@ -300,7 +307,7 @@ def _second_start(settled: Settled) -> float:
     return 0.0 if other.best.names == settled.best.names else other.log_probability - settled.log_probability
 
 
-def _shares(settled: Settled) -> tuple[Share, ...]:
+def _shares(settled: Settled) -> tuple[VariableShare, ...]:
     """Return variables by their own explanation."""
     comparison, best, patterns = settled.comparison, settled.best, settled.bank.patterns
     whole = comparison.explained(best.members) if best.members else 0.0
@@ -316,7 +323,7 @@ def _shares(settled: Settled) -> tuple[Share, ...]:
             rest = best.without(*own)
             share = comparison.explained(alone) / whole
             lost = max(1.0 - (comparison.explained(rest) if rest else 0.0) / whole, 0.0)
-            found.append(Share(variable.name, _rms_about_mean(settled.effect(own)), share, lost, len(own)))
+            found.append(VariableShare(variable.name, _rms_about_mean(settled.effect(own)), share, lost, len(own)))
     return tuple(sorted(found, key=lambda share: -share.share))
 
 
@@ -360,13 +367,13 @@ def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple
     )
     units = [channel.unit if name == OFFSET else "in its own unit" for name in channel.base.names]
     return tuple(
-        RefittedParameter(
+        refitted(
             name,
             Value(float(alone.x[k]), float(np.sqrt(max(before[k], 0.0))), units[k]),
             Value(float(beside.x[k]), float(np.sqrt(max(after[k], 0.0))), units[k]).at_least(float(moved[k])),
             float(np.clip(1.0 - before[k] / after[k], 0.0, 1.0)) if after[k] > 0.0 else 1.0,
             float(channel.base.prior[k]) if np.isfinite(channel.base.prior[k]) else None,
-            name in table.known,
+            stated=name in table.known,
         )
         for k, name in enumerate(channel.base.names)
     )

@@ -23,8 +23,8 @@ def test_quadratic_drag_is_found_behind_the_damping_that_hid_it():
     answer = expect_right("pendulum drag")
     damping = next(one for one in answer.parameters if one.name == "damping")
     assert damping.confounded > 0.5
-    assert damping.before.value > 0.4  # refitted without the drag it stands for it
-    assert abs(damping.after.value - 0.3) < 4.0 * damping.after.uncertainty
+    assert damping.refitted.value > 0.4  # refitted without the drag it stands for it
+    assert abs(damping.corrected.value - 0.3) < 4.0 * damping.corrected.uncertainty
 
 
 @pytest.mark.nightly  # a term over a simulated place, the hardening spring, is in CI

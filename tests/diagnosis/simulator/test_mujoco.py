@@ -27,7 +27,7 @@ def test_a_spring_in_the_elbow_is_found_behind_the_load_that_hid_it():
     value = found.values["coefficient"]
     assert abs(value.value + arm.SPRING) < 3.0 * value.uncertainty
     load = next(one for one in answer.parameters if one.name == "load")
-    assert abs(load.after.value - arm.LOAD) < 4.0 * load.after.uncertainty
+    assert abs(load.corrected.value - arm.LOAD) < 4.0 * load.corrected.uncertainty
 
 
 @pytest.mark.nightly

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.table.mismatch import RefittedParameter, find_mismatch
+from dbbstation.diagnosis.table.mismatch import find_mismatch, refitted
 from dbbstation.errors import InputError
 from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import Verdict
@@ -48,7 +48,7 @@ def test_what_was_known_keeps_a_parameter_from_taking_up_an_effect(path):
     freely = told(path, free=("stiffness",))
     (alone,) = freely.parameters
     assert alone.known is None
-    assert not alone.is_far
+    assert not alone.far
     # 0.06 mm at 100 N are 0.6 of a derivative of 1e-3 mm/N.
     assert alone.after.value == pytest.approx(0.62, abs=0.05)
     assert next(one for one in freely.findings if one.name == "linear in load_n").verdict is not Verdict.IDENTIFIED
@@ -66,7 +66,7 @@ def test_what_was_known_keeps_a_parameter_from_taking_up_an_effect(path):
 )
 def test_what_moves_far_is_said_to(value, known, stated, far):
     none = Value(0.0, 1.0, "")
-    assert RefittedParameter("mass", none, Value(value, 0.01, ""), 0.0, known, stated).is_far == far
+    assert refitted("mass", none, Value(value, 0.01, ""), 0.0, known, stated=stated).far == far
 
 
 def test_by_default_refitting_moves_the_simulation_by_about_what_it_was_off(path):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.table.mismatch import find_mismatch, refitted
-from dbbstation.errors import InputError
+from dbbstation.errors import ArgumentError, InputError
 from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import Verdict
 from dbbstation.results.of_mismatch import mismatch_result
@@ -95,7 +95,7 @@ def test_statements_that_fit_nothing_are_refused(path):
 
 @pytest.mark.parametrize("text", ["stiffness", "stiffness=0", "stiffness=-1", "stiffness=inf", "=1", "stiffness=a"])
 def test_uncertainties_that_are_none_are_refused(text):
-    with pytest.raises(InputError, match="is not understood"):
+    with pytest.raises(ArgumentError, match="is not understood"):
         stated_uncertainties(text)
 
 

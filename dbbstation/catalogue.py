@@ -13,10 +13,11 @@ import pkgutil
 import traceback
 from dataclasses import dataclass
 from inspect import getmembers, isabstract, isclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeVar
 
-from dbbstation.errors import Problem, StationError
+from dbbstation.errors import InputError, Problem, StationError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -104,6 +105,35 @@ def loaded(group: str, faults: list[Problem]) -> list[Loaded]:
         except FOREIGN as error:
             faults.append(Problem(place.file, 0, 0, f"cannot be loaded: {in_words(error)}", remedy))
     return found
+
+
+def files_of_packages(group: str, own: Iterable[Path], *, called: str) -> dict[str, Path]:
+    """Return YAML files by name, sorted: the program's own, and those in the folders of packages that entry points name.
+
+    Args:
+        called: kind in words, with its article.
+
+    Raises:
+        InputError: an invalid entry point, or a taken name.
+    """
+    faults: list[Problem] = []
+    files = {path.stem: path for path in own}
+    whose = dict.fromkeys(files, "dbbstation itself")
+    for point in loaded(group, faults):
+        folders = [Path(folder) for folder in getattr(point.value, "__path__", ())]
+        found = sorted(path for folder in folders for path in folder.glob("*.yaml"))
+        if not found:
+            what = f"{point.named} is no package with a file that ends in .yaml in its folder"
+            faults.append(Problem(point.place.file, 0, 0, what, point.remedy))
+        for path in found:
+            if path.stem in files:
+                what = f"{called} `{path.stem}` is known already, from {whose[path.stem]}"
+                faults.append(Problem(point.place.file, 0, 0, what, "give it another name"))
+            else:
+                files[path.stem], whose[path.stem] = path, point.place.file
+    if faults:
+        raise InputError(faults)
+    return dict(sorted(files.items()))
 
 
 def added(

@@ -64,7 +64,7 @@ def _refused(result: MismatchResult | SimulatorResult, path: Path) -> OutputErro
 
 def _allowed() -> dict[str, object]:
     setting = shop_settings().values.get("simulators")
-    return {"allowed": setting.value} if setting else {}
+    return {"allowed": setting.value if setting else ()}
 
 
 OUT = "Write the table here, with the corrected simulation as a further column; with --simulator, the missing terms as Python code."

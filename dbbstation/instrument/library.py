@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import loaded, looked_up, nearest
+from dbbstation.catalogue import files_of_packages, looked_up, nearest
 from dbbstation.errors import InputError, InstrumentError, Problem
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml.schema import validate
@@ -37,24 +37,7 @@ def known_instruments() -> list[str]:
 
 
 def _files() -> dict[str, Path]:
-    faults: list[Problem] = []
-    files = {path.stem: path for path in instruments_folder().glob("*.yaml")}
-    whose = dict.fromkeys(files, "dbbstation itself")
-    for point in loaded(GROUP, faults):
-        folders = [Path(folder) for folder in getattr(point.value, "__path__", ())]
-        found = sorted(path for folder in folders for path in folder.glob("*.yaml"))
-        if not found:
-            what = f"{point.named} is no package with a protocol file, which ends in .yaml, in its folder"
-            faults.append(Problem(point.place.file, 0, 0, what, point.remedy))
-        for path in found:
-            if path.stem in files:
-                what = f"an instrument `{path.stem}` is known already, from {whose[path.stem]}"
-                faults.append(Problem(point.place.file, 0, 0, what, "give it another name"))
-            else:
-                files[path.stem], whose[path.stem] = path, point.place.file
-    if faults:
-        raise InputError(faults)
-    return dict(sorted(files.items()))
+    return files_of_packages(GROUP, instruments_folder().glob("*.yaml"), called="an instrument")
 
 
 def load_instrument(name_or_file: str | Path, profile: str | None = None) -> Protocol:

@@ -8,6 +8,7 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dbbstation.catalogue import files_of_packages, looked_up
 from dbbstation.errors import OutputError, StationError
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.simulator import read_simulator
@@ -25,6 +26,27 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 
+GROUP = "dbbstation.simulators"
+"""Entry points of this group name packages; every `.yaml` file in the folder of one is a simulator."""
+
+
+def simulator_file(name_or_file: str) -> Path:
+    """Return the file of a simulator that is installed, or the `.yaml` file itself.
+
+    Raises:
+        StationError: nothing has this name.
+        InputError: an invalid entry point, or a taken name.
+    """
+    if name_or_file.endswith((".yaml", ".yml")):
+        return Path(name_or_file)
+    how = "give a .yaml file, or install its package"
+    return looked_up(name_or_file, _installed(), called="simulator", error=StationError, how_to_add=how)
+
+
+def _installed() -> dict[str, Path]:
+    return files_of_packages(GROUP, (), called="a simulator")
+
+
 def require_allowed(path: Path, settings: Collection[str], *, allow: bool) -> str:
     """Refuse a simulator that the user has not allowed; shipped ones are allowed.
 
@@ -40,7 +62,10 @@ def require_allowed(path: Path, settings: Collection[str], *, allow: bool) -> st
         StationError: it is not allowed.
         InputError: faults of its file.
     """
-    if real_path(path).is_relative_to(real_path(shipped_folder("fixtures") / "simulators")):
+    of_user = {real_path(one) for one in _installed().values()}  # installing a package is permission
+    if real_path(path) in of_user or real_path(path).is_relative_to(
+        real_path(shipped_folder("fixtures") / "simulators")
+    ):
         return ""
     file = read_simulator(path)
     key = key_of_simulator(path, file)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import ArgumentError
@@ -65,7 +64,7 @@ def mismatch(
     simulator: Annotated[
         File | None,
         Option(
-            "Simulator of your own, which is executed: it is refitted, and asked at its ports what it lacks.",
+            "Simulator of your own, or the name of an installed one, which is executed: it is refitted, and asked at its ports what it lacks.",
             kind="path",
             metavar="model.yaml",
             not_with=("measured", "simulated", "variables", "run", "time", "known", "free", "offset"),
@@ -146,7 +145,7 @@ def mismatch(
     held_out: Annotated[bool, Option("Leave out the held-out test, which takes most of the time.")] = True,
     decimal: o.Decimal = None,
     separator: o.Separator = None,
-    allowed: Collection[str] = (),
+    allowed: Collection[str] | None = None,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
@@ -170,7 +169,7 @@ def mismatch(
       dbbstation mismatch tank.csv --measured level_m --simulated level_sim_m --known valve=0.02 --free level_at_start
 
     Args:
-        allowed: hashes of simulators that may run.
+        allowed: hashes of simulators that may run; None: passing one is permission.
 
     Returns:
         What was found; `drawing` draws it, and `table` or `code` has the corrected simulation.
@@ -191,10 +190,12 @@ def mismatch(
     telling = Telling(progress, stop, say)
     numbers = number_language(decimal, separator)
     if simulator is not None:
-        from dbbstation.simulators.allowed import require_allowed
+        from dbbstation.simulators.allowed import require_allowed, simulator_file
         from dbbstation.tasks.mismatch_simulator import with_simulator
 
-        telling.note(*filter(None, [require_allowed(Path(simulator), allowed, allow=allow)]))
+        simulator = simulator_file(str(simulator))
+        if allowed is not None:
+            telling.note(*filter(None, [require_allowed(simulator, allowed, allow=allow)]))
         return with_simulator(
             simulator,
             data,

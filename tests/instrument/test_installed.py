@@ -51,8 +51,8 @@ def test_a_name_that_is_taken_names_package_and_owner(install):
     ("entry", "why"),
     [
         ("no_such_package", "cannot be loaded: ModuleNotFoundError"),
-        ("json.decoder", "json.decoder is no package with a protocol file"),
-        ("email", "email is no package with a protocol file"),
+        ("json.decoder", "json.decoder is no package with a file that ends in .yaml"),
+        ("email", "email is no package with a file that ends in .yaml"),
     ],
 )
 def test_an_entry_point_that_does_not_hold_names_its_package(install, entry, why):

@@ -29,6 +29,7 @@ def _write(result: DriveResult, path: Path, *, force: bool) -> None:
 def show(result: DriveResult) -> None:
     """Print what was identified."""
     _print_if_worse(result.held_out_rms_n)
+    echo("\n".join((*result.sentences(), "")))
     if result.mismatch:
         echo(
             f"Mass and viscous friction leave {result.misfit_rms_n:.3g} N rms beyond noise "
@@ -85,7 +86,7 @@ def _print_if_worse(held: HeldOutForce | None) -> None:
     if held and held.worse:
         echo(
             f"Everything found predicts held-out parts worse than mass and friction alone: {held.corrected:.3g} N rms against "
-            f"{held.reference:.3g} N. Nothing is identified."
+            f"{held.reference:.3g} N."
         )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.diagnosis.drive.findings import DriveFindings
 from dbbstation.facts.serialise import Absent
 from dbbstation.results.frame import Framed
+from dbbstation.results.levels_text import level_sentences
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,6 +25,12 @@ class DriveResult(Framed, DriveFindings):
 
     compared: Annotated[str | None, Absent] = None
     figure: Annotated[str | None, Absent] = None
+
+    def sentences(self) -> list[str]:
+        """The answer in three levels, in words; a notebook shows it above the table."""
+        values = {one.name: one.parameters for one in self.sources}
+        what = "Measured force and the law with mass and friction"
+        return level_sentences(self.levels, "N", values, rows="samples", what=what)
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per cause."""

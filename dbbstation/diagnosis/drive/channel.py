@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.drive.naming import acts
 from dbbstation.diagnosis.drive.recordings import with_waves
+from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.curves import Clock, Spline
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import CURVES, Family, Pattern
 from dbbstation.inference.variables import Kind, Variable
-from dbbstation.inference.verdict import SURE
+from dbbstation.inference.verdict import SURE, Acts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
@@ -119,6 +121,8 @@ def drive_channel(
         surely=SURE,
         grows=np.abs(recordings.motion[:, 0]),
         known_noise=recordings.edge_noise_n,
+        interchangeable=EQUIVALENT**2,
+        rows_are="samples",
         clock=Clock(
             recordings.time_s / recordings.samples_apart_s, recordings.step_response, recordings.response_reach
         ),
@@ -196,6 +200,10 @@ def _law(
         form_uncertainty=source.form_uncertainty,
         discrepancy=lambda effect, _, __: _departure(effect, variables[along].values),
         log_odds=float(odds),
+        followed=(source.varies_with.removesuffix(" wave").removesuffix(" by direction"),),
+        way="direction" if source.varies_with.endswith(" by direction") else "",
+        acts_once=acts(source.name) is Acts.ONCE,
+        confirm=source.texts.confirm,
     )
 
 

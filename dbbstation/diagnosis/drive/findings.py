@@ -13,6 +13,7 @@ from pydantic import Field
 from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.levels import Levels
 from dbbstation.inference.verdict import Acts, Gains, Verdict
 
 
@@ -270,6 +271,7 @@ class DriveFindings:
         table: compared samples by column.
         before: base parameters.
         chosen: causes of the last model by force.
+        levels: existence, variables and cause of a difference [N].
     """
 
     mismatch: bool
@@ -295,3 +297,4 @@ class DriveFindings:
     before: Annotated[Mapping[str, DriveValue], AsItIs, Kept]
     chosen: Annotated[tuple[str, ...], AsItIs, Kept]
     curve: Annotated[FrictionCurve, AsItIs, Kept]
+    levels: Levels

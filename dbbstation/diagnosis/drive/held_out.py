@@ -11,6 +11,7 @@ from dbbstation.diagnosis.drive.fit import RowsKept
 from dbbstation.diagnosis.drive.moving import within
 from dbbstation.diagnosis.drive.naming import COULOMB, source_of
 from dbbstation.inference.folds import parts_of
+from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart
 from dbbstation.inference.settle import settle
 from dbbstation.inference.verdict import Gains, is_worse
 
@@ -24,17 +25,19 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 
-def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> HeldOutForce:
+def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> tuple[HeldOutForce, ChosenWithoutParts]:
     """Hold back parts: whole recordings from five on, else ten stretches, with the filter's reach excluded."""
     channel = drive.channel
     parts = parts_of(channel)
     gap = int(np.ceil(GAP_PERIODS / drive.scale.cutoff_hz / drive.recordings.samples_apart_s))
     brought: dict[str, list[float]] = {source: [0.0] * len(parts) for source in drive.sources}
     reference = corrected = 0.0
+    without: list[WithoutPart] = []
     for number, (_, rows) in enumerate(parts):
         progress(f"held-out part {number + 1} of {len(parts)}")
         kept = channel.without(within(rows, gap))
         settled = settle(kept, most_expanded=0, most_looks=1, thorough=False, rivals=False)
+        without.append(WithoutPart(rows, settled))
         chosen = settled.best.members
         of_chosen = RowsKept(drive, settled, chosen)
 
@@ -56,7 +59,8 @@ def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> HeldOutFor
     lengths = tuple(int(rows.sum()) for _, rows in parts)
     gains = {source: Gains(tuple(each), lengths) for source, each in brought.items() if any(each)}
     errors = float(np.sqrt(reference / count)), float(np.sqrt(corrected / count))
-    return HeldOutForce(len(parts), *errors, is_worse(errors[1], errors[0]), gains)
+    found = HeldOutForce(len(parts), *errors, is_worse(errors[1], errors[0]), gains)
+    return found, ChosenWithoutParts(without)
 
 
 GAP_PERIODS = 0.5

@@ -31,8 +31,10 @@ from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.verdicts import Verdicts
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import cancelling, effects_by_name
+from dbbstation.inference.detectable import detectable_causes
 from dbbstation.inference.hypotheses import Hypothesis
 from dbbstation.inference.left_over import SIGNIFICANT, left_over
+from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -85,8 +87,11 @@ def identify(
         explained = explain(put_together, sources, progress)
     before, after = explained.before, explained.after
     limits = limits_of(explained)
-    held = held_out(explained.drive, progress) if hold_out else None
-    verdicts = Verdicts(explained, several_speeds=limits.several_speeds, held=held)
+    held, parts = held_out(explained.drive, progress) if hold_out else (None, None)
+    settled, left = explained.settled, left_over(explained.settled)
+    levels = levels_of(settled, left, parts, None, sizes=detectable_causes(settled))
+    levels = levels if held is None else replace(levels, correction=held.corrected < held.reference)
+    verdicts = Verdicts(explained, levels, several_speeds=limits.several_speeds, held=held)
     values = base_values(explained.drive, explained.settled, after)
     known = {
         MASS: mass_is_known(limits, values.get(MASS)),
@@ -140,6 +145,7 @@ def identify(
         before=at_first,
         chosen=chosen,
         curve=_curve(explained),
+        levels=levels,
     )
 
 

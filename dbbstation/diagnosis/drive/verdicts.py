@@ -13,11 +13,12 @@ from dbbstation.diagnosis.drive.findings import CausePart, DriveFinding, Unexpla
 from dbbstation.diagnosis.drive.naming import COGGING, COULOMB, TRANSIENT, acts, source_of
 from dbbstation.diagnosis.drive.noise_rival import probability_beside_noise
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, edges_of, pulse_parts
+from dbbstation.inference.levels import FollowsAnswer
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.pushes import MOST_PUSHES
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.stretches import SHORTEST
-from dbbstation.inference.verdict import OUT, SURE, Gains, Verdict, claim
+from dbbstation.inference.verdict import OUT, SURE, Acts, Gains, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.findings import Complement, HeldOutForce
     from dbbstation.facts.value import Value
+    from dbbstation.inference.levels import Levels
     from dbbstation.inference.read_off import CauseFinding
 
 CLAIMS = frozenset({Verdict.IDENTIFIED, Verdict.AMBIGUOUS})
@@ -36,12 +38,15 @@ class Verdicts:
     """Everything that is said of causes, named and unnamed.
 
     Args:
+        levels: whether a cause predicts is read off these.
         several_speeds: Coulomb and viscous friction are separable.
         held: held-out predictions; None: not tested.
     """
 
-    def __init__(self, explained: ExplainedDrive, *, several_speeds: bool, held: HeldOutForce | None = None) -> None:
-        self._held = held
+    def __init__(
+        self, explained: ExplainedDrive, levels: Levels, *, several_speeds: bool, held: HeldOutForce | None = None
+    ) -> None:
+        self._held, self._levels = held, levels
         self._explained, self._drive, self._several = explained, explained.drive, several_speeds
         self._raw = read_off(explained.settled)
         self._source_of = {f.name: self._source(f) for f in self._raw}
@@ -117,7 +122,7 @@ class Verdicts:
             alike = (*alike, "viscous friction")
         if there:
             sure = not alike and any(f.verdict is Verdict.IDENTIFIED for f in there)
-            verdict = self._claimed(source.name) if sure else Verdict.AMBIGUOUS
+            verdict = self._claimed(source.name, there) if sure else Verdict.AMBIGUOUS
             text = self._text(source, verdict, alike, there)
         else:
             verdict, text = self._absent(source, own)
@@ -164,11 +169,13 @@ class Verdicts:
             gains=gains,
         )
 
-    def _claimed(self, source: str) -> Verdict:
-        if self._held is None:
-            return claim(SURE, OUT, acts(source), None)
-        gains = self._held.gains.get(source, Gains(()))
-        return claim(SURE, OUT, acts(source), gains, worse=self._held.worse)
+    def _claimed(self, source: str, there: Sequence[CauseFinding]) -> Verdict:
+        if acts(source) is Acts.ONCE:
+            return Verdict.HAPPENED
+        names = {finding.name for finding in there}
+        answers = [one.answer for one in self._levels.follows if names.intersection(one.members)]
+        refuted = bool(answers) and all(one is FollowsAnswer.DOES_NOT_PREDICT for one in answers)
+        return Verdict.DOES_NOT_PREDICT if refuted else Verdict.IDENTIFIED
 
     def _at_end(self, there: Sequence[CauseFinding]) -> dict[str, str]:
         laws = [f.name for f in there if f.name in self._drive.of_law and self._is_member(f)]
@@ -275,16 +282,10 @@ class Verdicts:
         if verdict is Verdict.HAPPENED:
             return f"{source.texts.what} It happened here; no other samples can test it. {source.texts.confirm}"
         if verdict is Verdict.DOES_NOT_PREDICT:
-            return f"It is there in these samples and {self._brings_nothing(source.name)}. {source.texts.confirm}"
+            return f"It is there in these samples, and held-out parts gain nothing by it. {source.texts.confirm}"
         if alike:
             return f"This recording cannot tell it from {', '.join(alike)}. {source.texts.confirm}"
         return f"{there[0].text or 'This recording does not decide it.'} {source.texts.confirm}"
-
-    def _brings_nothing(self, source: str) -> str:
-        if self._held is not None and self._held.worse:
-            return "everything together predicts held-out parts worse than mass and friction do"
-        gains = Gains(()) if self._held is None else self._held.gains.get(source, Gains(()))
-        return f"brings too little where it was not fitted: something in {gains.with_gain} of {self._held.parts if self._held else 0} held-out parts"
 
     def _absent(self, source: DriveSource, own: Sequence[CauseFinding]) -> tuple[Verdict, str]:
         looked_for = {COGGING: lambda: self._no_cogging(own), TRANSIENT: self._no_transient}

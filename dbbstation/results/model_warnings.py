@@ -58,14 +58,14 @@ def chance_in_words(probability: float) -> str:
 
 
 def _undecided(report: Mapping[str, Any]) -> list[str]:
-    """Return undecided causes, and findings that predict worse."""
+    """Return undecided causes, findings that predict worse, and limits that the diagnosis reached."""
     said = report.get("diagnosis")
     if not isinstance(said, Mapping):
         return []
     told = [f"these recordings cannot tell {' from '.join(names)}: the model has one of them" for names in _lists(said)]
     if said.get("held_out_worse") is True:
         told.append("held-out tests are predicted worse by the model than by the kinematic calibration alone")
-    return told
+    return told + [str(text).rstrip(".") for text in said.get("limits", ())]
 
 
 def _lists(said: Mapping[str, Any]) -> list[Sequence[str]]:

@@ -102,13 +102,14 @@ def diagnosis_result(
 
 
 def kept_of(figures: DiagnosisFigures) -> dict[str, object]:
-    """Return what a model file keeps of its diagnosis: doubts about causes."""
+    """Return what a model file keeps of its diagnosis: doubts about causes, and limits that it reached."""
     open_ones = (one for one in figures.sources if one.verdict == Verdict.AMBIGUOUS)
     groups = {frozenset((one.name, *one.ambiguous_with)): [one.name, *one.ambiguous_with] for one in open_ones}
     return {
         "ambiguous": list(groups.values()),
         "held_out_worse": figures.held_out_worse,
         "verdicts": {one.name: one.verdict for one in figures.sources},
+        "limits": [limit.text for limit in figures.limits],
     }
 
 

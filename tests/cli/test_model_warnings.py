@@ -93,6 +93,14 @@ def test_causes_that_are_not_decided_stand_on_page_1(run, tmp_path):
     assert "cannot tell gravity from strut-weight" in text.split("serial number", 1)[0]
 
 
+def test_a_limit_that_the_diagnosis_reached_stands_on_page_1_and_beside_the_parameters(run, tmp_path):
+    limit = "The joint fit still moved at its last step. Values and uncertainties are those of that step."
+    model = model_that(tmp_path, f'diagnosis: {{limits: ["{limit}"]}}')
+    text, data = page_of(run, model, tmp_path)
+    assert [limit in part for part in text.split("serial number", 1)] == [True, True]
+    assert data["model_warnings"] == [limit[:-1]]
+
+
 def test_a_model_that_is_sound_has_no_warning(run, tmp_path):
     model = model_that(tmp_path, "misfit: {probability: 0.4, rms_um: 0.1, missing_physics: false}")
     text, data = page_of(run, model, tmp_path)

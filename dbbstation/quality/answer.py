@@ -88,12 +88,12 @@ EXPLAINS = (
     (Name.FEED,),
     (Name.CIRCLE,),
     (Name.SCALE,),
-    (Name.SPIKE, Name.BUMP, Name.CLOSURE, Name.DRIFT, Name.NOISE),
+    (Name.BUMP, Name.CLOSURE, Name.DRIFT, Name.NOISE, Name.RADIUS),
+    (Name.SPIKE,),
     (Name.PROGRAMS,),
     (Name.TEST, Name.DIRECTION),
     (Name.LOCAL,),
     (Name.BAR,),
-    (Name.RADIUS,),
     (Name.OTHER_DIRECTION, Name.REPEAT),
     (Name.BORE,),
     (Name.FORM,),
@@ -108,7 +108,14 @@ limit they are: a limit is the same probability for all."""
 def rank(finding: Finding) -> tuple[int, float]:
     """Return a sort key: the most explanatory finding first."""
     place = next(k for k, names in enumerate(EXPLAINS) if finding.name in names)
-    return place, -(finding.value / finding.limit if finding.value is not None and finding.limit else 0.0)
+    times = finding.value / finding.limit if finding.value is not None and finding.limit else 0.0
+    if Name.BUMP in EXPLAINS[place] and times < CLEARLY:
+        place = next(k for k, names in enumerate(EXPLAINS) if Name.LOCAL in names)
+    return place, -times
+
+
+CLEARLY = 2.0
+"""Times its limit from which a disturbance explains a circle of another form; below, the other form brings it about."""
 
 
 SHOWN_BY = {

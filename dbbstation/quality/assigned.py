@@ -42,8 +42,8 @@ WIDE = 3
 ELSEWHERE_UM = 1e3
 """Standard deviation of a run that is no circle of the plan, per coefficient: a bar's travel is millimetres [µm]."""
 
-ELSEWHERE = -1
-"""Label of such a run."""
+ELSEWHERE, BESIDE, LARGER = -1, -2, -3
+"""Labels of such a run, of its own circle about another place, and of its own circle with another radius."""
 
 ANYWHERE_UM = 1e4
 """Standard deviation of a centre that says nothing [µm]."""
@@ -115,13 +115,15 @@ class Assigned:
         for at, one in enumerate(self.runs):
             changed = [labels[at] for labels in likely if labels[at] != self._planned[at]]
             if changed:
-                found[one] = self._wrong(one, changed[0], certain=len(changed) == len(likely))
+                # A ball beside its place, where it is as likely, is what is looked after first.
+                label = min(changed, key=lambda one: one not in {BESIDE, LARGER})
+                found[one] = self._wrong(one, label, certain=len(changed) == len(likely))
         return found
 
     def _wrong(self, one: Seen, label: int, *, certain: bool) -> Finding:
         value, limit = max(self.odds(one), 0.0) + self._cost, self._cost
-        if label == ELSEWHERE:
-            name, what = Name.FORM, "it fits neither its place in the plan nor the other circles"
+        if label < 0:
+            name, what = _OTHERWISE[label]
         elif self.circles[label].test == one.run.test:
             name, what = Name.DIRECTION, "it ran the wrong way round"
         else:
@@ -152,7 +154,7 @@ class Assigned:
 
     def _neighbours(self, labels: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
         """Yield assignments that differ by one run, by all runs of a mounting, or by two mountings that change places."""
-        everything = (*range(len(self.circles)), ELSEWHERE)
+        everything = (*range(len(self.circles)), ELSEWHERE, BESIDE, LARGER)
         for at, label in enumerate(labels):
             yield from (_put(labels, {at: other}) for other in everything if other != label)
         groups = self._groups
@@ -201,7 +203,7 @@ class Assigned:
         return self._cost * (len(whole) + single)
 
     def _same_way(self, run: int, label: int) -> bool:
-        return label != ELSEWHERE and self.circles[label].circle.direction is self.runs[run].run.circle.direction
+        return label >= 0 and self.circles[label].circle.direction is self.runs[run].run.circle.direction
 
     def _likelihood(self, labels: Sequence[int]) -> float:
         """Return the log density of all readings, machine errors of all sizes alike probable."""
@@ -232,9 +234,12 @@ class Assigned:
             apart = float(off @ off) / ELSEWHERE_UM**2 + 2.0 * COEFFICIENTS * float(np.log(ELSEWHERE_UM))
             found = np.zeros((wide, wide)), np.zeros(wide), apart
         else:
-            own = self._own[label] + one.u_um**2 * np.eye(COEFFICIENTS)
-            columns = np.hstack([self._of_machine[label], self._of_session[label]])
-            off = read_um(one) - expected_um(self.circles[label])
+            shown = self._planned[run] if label < 0 else label
+            own = self._own[shown] + one.u_um**2 * np.eye(COEFFICIENTS)
+            for k in {BESIDE: (FIRST_COSINE, FIRST_SINE), LARGER: (0,)}.get(label, ()):
+                own[k, k] += ELSEWHERE_UM**2
+            columns = np.hstack([self._of_machine[shown], self._of_session[shown]])
+            off = read_um(one) - expected_um(self.circles[shown])
             root = np.linalg.cholesky(own)
             white, apart_by = np.linalg.solve(root, columns), np.linalg.solve(root, off)
             logs = 2.0 * float(np.sum(np.log(np.diagonal(root))))
@@ -306,6 +311,13 @@ class Assigned:
                 own[[FIRST_COSINE, FIRST_SINE], [FIRST_COSINE, FIRST_SINE]] += ANYWHERE_UM**2
             found.append(own)
         return found
+
+
+_OTHERWISE = {
+    ELSEWHERE: (Name.FORM, "it fits neither its place in the plan nor the other circles"),
+    BESIDE: (Name.BORE, "its ball stands elsewhere"),
+    LARGER: (Name.RADIUS, "its radius is another"),
+}
 
 
 def _put(labels: tuple[int, ...], changed: Mapping[int, int]) -> tuple[int, ...]:

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.quality.finding import Finding, Name, found, undecided
+from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.forms import own_um2
 from dbbstation.quality.knowledge import HIGHER
 from dbbstation.quality.limits import length_quantile, quantile
 from dbbstation.quality.stated import limit_along
+from dbbstation.trace.cut import FEED_SIGMAS
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis
@@ -23,10 +24,14 @@ BY_OTHERS = " by the other tests"
 def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
     """Judge the mean reading.
 
+    A larger circle at the programmed feed turns slower. An overlap that shows it decides without expectation.
+
     Args:
         expected: of its mean reading; None if unknown.
         by_others: whether the expectation is by other tests.
     """
+    if (larger := _turns_slower(one)) is not None:
+        return larger
     if expected is None:
         return undecided(Name.RADIUS, "no expected radius is known", "µm")
     off_um = one.mean_radial_error_um - 1e3 * expected.radial_mm
@@ -40,6 +45,22 @@ def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = 
         stated,
         f"{stated}: check bar length, radius of plan and program, and the tool length",
     )
+
+
+def _turns_slower(one: CircleAnalysis) -> Finding | None:
+    """Return that the circle is as much larger as it turns slower, or None."""
+    circle, mean_um = one.raw.circle, one.mean_radial_error_um
+    if one.feed_mm_min is None:
+        return None
+    shown, u = one.feed_mm_min
+    slower_um, u_um = 1e3 * circle.bar_mm * (circle.feed_mm_min / shown - 1.0), 1e3 * circle.bar_mm * u / shown
+    limit = FEED_SIGMAS * u_um
+    if abs(slower_um) <= limit or abs(slower_um - mean_um) > limit or abs(mean_um) <= limit:
+        return None
+    stated = f"the bar reads {mean_um:+.1f} µm on average, and the circle turns slower by {slower_um:+.0f} ± {u_um:.0f} µm of its radius"
+    why = f"{stated}: check radius of plan and program, and the tool length"
+    short = f"radius {1e-3 * mean_um:+.2f} mm"
+    return Finding(Name.RADIUS, abs(mean_um), limit, "µm", FindingVerdict.WRONG, why, short)
 
 
 def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:

@@ -14,7 +14,7 @@ from dbbstation.quality.knowledge import Others, due_s
 from dbbstation.quality.limits import FEWEST_OTHERS, joined, quantile, scale_of
 from dbbstation.quality.repeated import repeated
 from dbbstation.quality.spike import spike
-from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE
+from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE, edges_of, feed_off
 from dbbstation.trace.loss import AFTER_LOSS, share_lost
 
 if TYPE_CHECKING:
@@ -162,7 +162,10 @@ def feed(one: Seen, others: Others) -> Finding:
     limit = max(FEED_TOLERANCE * programmed, FEED_SIGMAS * u)
     stated = f"the overlap shows {shown:.1f} ± {u:.1f} mm/min, programmed are {programmed:g}"
     short = f"feed {shown:.0f} of {programmed:g} mm/min"
-    return found(Name.FEED, abs(shown - programmed), limit, "mm/min", stated, f"{stated}: {AFTER_OTHER_FEED}", short)
+    off = limit * feed_off(
+        one.feed_mm_min, one.run.recording, one.run.circle, edges_of(one.run.recording, one.run.circle)
+    )
+    return found(Name.FEED, off, limit, "mm/min", stated, f"{stated}: {AFTER_OTHER_FEED}", short)
 
 
 def _feed_by_duration(one: Seen, others: Others) -> Finding:
@@ -222,14 +225,43 @@ def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
         return no_circle(one)
     expected = one.run.expected
     reversals = () if expected is None else expected.reversals_deg
+    closed = closure(one.analysis, others, expected)
+    slower = _slower(one, others) if closed.wrong else None
     return (
         lost_samples(one),
         noise(one.analysis, others),
-        closure(one.analysis, others, expected),
+        closed,
         drift(one.analysis, others, expected),
         bump(one.analysis, reversals),
         spike(one.analysis, reversals),
         held(one.analysis.raw),
         repeated(one.analysis.raw),
-        feed(one, others),
+        slower or feed(one, others),
     )
+
+
+def _slower(one: Seen, others: Others) -> Finding | None:
+    """Return that a turn took longer by a lower feed, which closes it, and not by stops, which leave it open; or None."""
+    circle, recording = one.run.circle, one.run.recording
+    if one.feed_mm_min is not None or one.longer_s is None:
+        return None
+    due = due_s(circle)
+    usual = float(np.median(others.longer_s)) if len(others.longer_s) >= FEWEST_OTHERS else 0.0
+    longer = (one.longer_s - usual) / due
+    begun_s, ended_s = edges_of(recording, circle)
+    turn_s = 360.0 / circle.turning_deg_s * np.array([1.0, 1.0 + longer])
+    ends_s = 0.5 * (begun_s + ended_s) + 0.5 * np.outer(turn_s, [-1.0, 1.0])
+    lengths = np.interp(ends_s, recording.good.t_s, recording.good.length_mm)
+    as_planned, closed = np.abs(np.diff(lengths, axis=1))[:, 0]
+    if longer < LEAST_SLOWER or closed > 0.5 * as_planned:
+        return None
+    shown = circle.feed_mm_min / (1.0 + longer)
+    short = f"feed {shown:.0f} of {circle.feed_mm_min:g} mm/min"
+    stated = f"feed-in to feed-out took {due + one.longer_s:.1f} s, {due + usual:.1f} s were due, and the turn closes at {short}"
+    limit = circle.feed_mm_min * LEAST_SLOWER
+    off = circle.feed_mm_min - shown
+    return Finding(Name.FEED, off, limit, "mm/min", FindingVerdict.WRONG, f"{stated}: {AFTER_OTHER_FEED}", short)
+
+
+LEAST_SLOWER = 0.08
+"""Share of the time by which a turn must be longer for that: overrides step by tenths, stops at corners come to a second."""

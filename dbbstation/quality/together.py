@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.optimize import brentq
+from scipy.special import chdtrc, chdtri, logsumexp
 
 from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
-from dbbstation.quality.limits import FEWEST_OTHERS, median_length
+from dbbstation.quality.limits import FEWEST_OTHERS, SHARE, median_length
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -91,9 +92,25 @@ def expected_beside(both: Together | None) -> Expected | None:
     scatter = both.apart_um - apart
     covariance = np.einsum("s,sij->ij", weights, both.covariance_um2)
     covariance += np.einsum("s,si,sj->ij", weights, scatter, scatter)
-    covariance *= _straying(both, int(np.argmax(of_others))) ** 2
+    covariance *= _straying(both, int(np.argmax(of_others))) ** 2 * _tail(weights, both.covariance_um2)
     one = both.runs[0]
     return _placed(own, one.run.circle, read_um(one) - expected_um(one.run) - apart, covariance)
+
+
+def _tail(weights: NDArray[np.float64], covariances_um2: NDArray[np.float64]) -> float:
+    """Return the factor on the mean covariance by which a mixture of sizes has longer tails than a normal distribution.
+
+    Its square radius is exceeded with probability SHARE; covariances of different sizes are taken as alike in shape.
+
+    Args:
+        covariances_um2: shape (9, 7, 7).
+    """
+    sizes = np.trace(covariances_um2, axis1=1, axis2=2)
+    sizes /= weights @ sizes
+    normal = float(chdtri(COEFFICIENTS, SHARE))
+    farthest = normal * max(float(sizes.max()), 1.0)
+    found = brentq(lambda square: float(weights @ chdtrc(COEFFICIENTS, square / sizes)) - SHARE, 0.0, farthest)
+    return max(float(found) / normal, 1.0)
 
 
 def _straying(both: Together, size: int) -> float:

@@ -14,7 +14,8 @@ from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.quality.assigned import Assigned, Reference
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
-from dbbstation.quality.knowledge import coefficients_um, seen
+from dbbstation.quality.knowledge import Others, coefficients_um, seen
+from dbbstation.quality.single import by_itself
 from dbbstation.quality.together import read_along_um
 from dbbstation.station import events
 from dbbstation.trace.analysis import figures
@@ -133,7 +134,9 @@ class RunJudge:
         one = run_of(self._writer.session, entry, recording, self._model, self._planned)
         self._waiting[_key(run)] = new = seen(one)
         counting = {key: known for key, known in self._counting.items() if key != _key(run)}
-        assigned = self._assigned([*counting.values(), new]) if new.analysis is not None else None
+        # A circle during which something moved says nothing about the others.
+        whole = new.analysis is not None and not any(finding.wrong for finding in by_itself(new, Others()))
+        assigned = self._assigned([*counting.values(), new]) if whole else None
         suspects = {} if assigned is None else assigned.suspects()
         self._doubted = {events.RunId(*key, 0): suspects[known] for key, known in counting.items() if known in suspects}
         others = [known for known in counting.values() if known not in suspects]

@@ -148,6 +148,9 @@ def _cable(shop: Shop, test: str, direction: Direction) -> None:
     shop.cell.start(test, direction)
 
 
+NAMED = {Name.FEED: "feed of", Name.LOST: "were lost", Name.CIRCLE: ":"}
+"""What the reason of a recording without a circle names."""
+
 PLACED = frozenset({Name.BORE, Name.OTHER_DIRECTION, Name.REPEAT, Name.TEST, Name.FORM})
 SABOTAGES = {
     "ball": Sabotage(PLACED, _beside),
@@ -300,7 +303,7 @@ class Shop:
     def _judged(self, completed: events.RunCompleted) -> None:
         answer = completed.answer
         wrong = sorted(completed.wrong, key=rank)
-        cause = str(wrong[0].name) if wrong else (completed.problem and "circle")
+        cause = str(wrong[0].name) if wrong else next((n for n, text in NAMED.items() if text in completed.problem), "")
         self.words[completed.run.label].append((str(answer.word), cause or "; ".join(answer.unseen)))
         if self._is_spoilt(completed.run) and answer.word is Advice.REPEAT:
             self.seen = cause or "circle"

@@ -46,6 +46,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
     help="Start of the program after the session's start [s], for models that depend on time.",
 )
 @largest_correction_option
+@click.option("--machine", type=_FILE, help="Machine file: refuse if it says that the control corrects already.")
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
 def compensate(
@@ -62,6 +63,7 @@ def compensate(
     strict: bool,
     time_s: float | None,
     largest_mm: float,
+    machine: Path | None,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -100,6 +102,7 @@ def compensate(
         strict=strict,
         time_s=time_s,
         largest_correction_mm=largest_mm,
+        machine=machine,
         force=force,
         known=every,
         provenance=provenance,

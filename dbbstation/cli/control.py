@@ -68,6 +68,8 @@ def kinematics(
       dbbstation control kinematics --model model.yaml --out dbbkins.comp
       dbbstation control kinematics --model model.yaml --out dbbkins.comp --leave-out backlash --thermometer machine
     """  # noqa: D301 (click reads the escape)
+    from datetime import UTC, datetime
+
     from dbbstation.cli.output import print_result, say
     from dbbstation.files.own_sources import every_source
     from dbbstation.tasks.control import kinematics as written
@@ -75,6 +77,7 @@ def kinematics(
     result = written(
         model_file,
         out,
+        date=datetime.now(UTC).date().isoformat(),
         known=every_source(source_files),
         machine=machine,
         left_out=left_out,
@@ -92,7 +95,7 @@ def kinematics(
     _print("Install", result.install)
     _print("INI file", result.ini)
     _print("HAL file", result.hal)
-    _print("Machine file, once it is in use", result.machine_file)
+    _print("Machine file to use from then on", [result.machine_file])
     _print("The way back", result.way_back)
 
 

@@ -174,6 +174,8 @@ def _measured(asked: MeasureOptions) -> None:
     )
     job.check(str(asked.plan_file))
     say_sampling(plan.to_domain(), protocol, asked.baud)
+    if machine.control is not None:
+        echo(f"note: the control corrects by itself: {machine.control.said}; the session notes it", err=True)
     if asked.auto is None:  # a virtual machine has a bar of known length
         require_bar(job, asked.largest_bar_age_h)
     with (

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
 
-DESCRIPTION = frozenset({"name"})
-"""Keys that say nothing of the machine itself."""
+DESCRIPTION = frozenset({"name", "control"})
+"""Keys that say nothing of the nominal machine itself; what a control corrects is counted as a part of the commands."""
 
 NOT_PREDICTED = frozenset({"travel", "joint_tolerance_mm", "acceleration_mm_s2"})
 """Keys that no prediction of a calibrated model uses: what the machine may reach, and what a fit took for likely."""
@@ -56,7 +56,7 @@ class Difference:
 
 def differences(one: Machine, other: Machine) -> tuple[Difference, ...]:
     """Return every difference beyond a nanometre, names aside."""
-    return tuple(found for found in _between("", one, other) if found.key not in DESCRIPTION)
+    return tuple(found for found in _between("", one, other) if found.first_key not in DESCRIPTION)
 
 
 def in_words(found: Sequence[Difference], most: int = 4) -> str:

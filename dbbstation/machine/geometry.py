@@ -10,6 +10,8 @@ import numpy as np
 from dbbstation.machine.rotation import Rotation
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
 STRUTS = 6
@@ -122,6 +124,28 @@ class JointAxes:
     platform: NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class ControlCorrection:
+    """What a control corrects of its machine by itself.
+
+    Attributes:
+        correction: `kinematics`, or `parameters` of a kinematics with tables.
+        model_sha256: of the model file that it was made from.
+        date: of that, ISO 8601.
+        sources: values of the error sources that it takes out, by name and parameter.
+    """
+
+    correction: str
+    model_sha256: str
+    date: str
+    sources: Mapping[str, Mapping[str, float]]
+
+    @property
+    def said(self) -> str:
+        """Return what corrects, in words."""
+        return f"{self.correction} of the model {self.model_sha256[:12]} since {self.date}"
+
+
 @dataclass(frozen=True, eq=False)
 class Machine:
     """The nominal machine: what its controller believes.
@@ -137,6 +161,7 @@ class Machine:
         greatest_feed_mm_min: None if unknown.
         greatest_turn_deg_min: at a resting tool tip; None if unknown.
         acceleration_mm_s2: planned by the control; None if unknown.
+        control: what the control corrects by itself; None for nothing. Everything else here is nominal all the same.
     """
 
     name: str
@@ -152,6 +177,7 @@ class Machine:
     greatest_feed_mm_min: float | None = None
     greatest_turn_deg_min: float | None = None
     acceleration_mm_s2: float | None = None
+    control: ControlCorrection | None = None
 
     @property
     def feed_limit_mm_min(self) -> float:

@@ -32,6 +32,7 @@ class Observation:
         raw: full turn.
         started_s: after the session's start; None if unknown.
         commanded: poses at lead-in and raw samples; None for the plan's circle.
+        stood: pose while a ball was put up under the spindle, shape (6,); None for the ball's place.
     """
 
     test: str
@@ -40,6 +41,7 @@ class Observation:
     setup: Setup
     started_s: float | None = None
     commanded: NDArray[np.float64] | None = None
+    stood: NDArray[np.float64] | None = None
 
     @property
     def label(self) -> str:
@@ -80,10 +82,15 @@ class Observation:
             reading_is_measured=True,
         )
 
+    @property
+    def standing_pose(self) -> NDArray[np.float64]:
+        """Return the commanded pose while the ball was put up, shape (6,) [mm, deg]."""
+        return np.array([*self.setup.fixed_ball_mm, *self.raw.circle.tilt_deg]) if self.stood is None else self.stood
+
     def _standing(self, until_s: float | None) -> Motion:
         """Return the machine standing at the set-up: three samples, a second apart."""
         raw = self.raw
-        pose = np.array([*self.setup.fixed_ball_mm, *raw.circle.tilt_deg])
+        pose = self.standing_pose
         return Motion(
             poses=np.tile(pose, (STANDING, 1)),
             is_path=True,

@@ -17,7 +17,7 @@ class KinematicsResult:
         install: commands, in order.
         ini: lines for the INI file.
         hal: lines for the HAL file.
-        machine_file: lines for the machine file, once the component is in use.
+        machine_file: machine file to use once the component is in use; it says what the control corrects.
         way_back: what undoes it.
     """
 
@@ -30,6 +30,6 @@ class KinematicsResult:
     install: tuple[str, ...]
     ini: tuple[str, ...]
     hal: tuple[str, ...]
-    machine_file: tuple[str, ...]
+    machine_file: str
     way_back: tuple[str, ...]
     notes: tuple[str, ...]

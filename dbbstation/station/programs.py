@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.nc.commanded import poses_at_progress
+from dbbstation.nc.nominal import check_nominal
 from dbbstation.nc.reach import check_reach
 from dbbstation.nc.registry import dialect_of_file, known_dialects
 
@@ -95,8 +96,14 @@ def _loaded(path: Path, circle: Circle, machine: Machine, faults: list[Problem])
     try:
         toolpath = read_toolpath(path, content)
         poses_at_progress(toolpath, circle, _PHI_DEG)
+        if machine.control is not None:
+            check_nominal(toolpath)
     except InputError as error:
         faults.extend(error.problems)
+        return None
+    except StationError as error:
+        what = f"{error.what}, and the control corrects already: {machine.control.said if machine.control else ''}"
+        faults.append(Problem(str(path), 0, 0, what, "measure with nominal programs"))
         return None
     check_reach(machine, toolpath)
     named = [match[1] for text in toolpath.text.values() if (match := _MODEL.match(text))]

@@ -91,6 +91,7 @@ def program(
         OutputError: a program exists without `force`.
         StoppedError: `stop` returned True; nothing was written.
     """
+    from dbbstation.control.commands import refuse_second_correction
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
@@ -110,6 +111,7 @@ def program(
     tests_of, hexapod = read_plan(plan_file), read_machine(machine_file)
     inverse = None
     if model is not None:
+        refuse_second_correction(hexapod)
         inverse = inverse_of(
             model,
             every_source(paths_of(source_files)) if known is None else known,

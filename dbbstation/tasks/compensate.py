@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.control.commands import refuse_second_correction
 from dbbstation.files.atomic import refuse_existing, write_text
+from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.inputs import in_a_book
 from dbbstation.files.own_dialects import dialect_given
+from dbbstation.machine.difference import check_model_is_of
 from dbbstation.nc.compensate import CHORD_MM
 from dbbstation.nc.export import compensated_program
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
@@ -51,6 +54,7 @@ def compensate(
     strict: bool = False,
     time_s: float | None = None,
     largest_correction_mm: float = LARGEST_CORRECTION_MM,
+    machine: str | PathLike[str] | None = None,
     force: bool = False,
     known: Mapping[str, ErrorSource] | None = None,
     provenance: Callable[[], Provenance] = from_python,
@@ -70,6 +74,7 @@ def compensate(
         strict: refuse a program that misses the chord error or a feed.
         time_s: start of the program after the session's, for models that depend on time.
         largest_correction_mm: models that shift a point by more are refused.
+        machine: file of the machine as it is now, whose control may correct already; None: as the model has it.
         force: overwrite `out`.
         known: error sources by name, for a model file.
         provenance: called for the header after all reading.
@@ -82,7 +87,7 @@ def compensate(
         KinematicsError: a pose that the machine cannot take.
         ModelError: the model has a source that needs what a program lacks.
         MachineError: a feed that the machine does not reach.
-        StationError: the program is compensated or for another machine, corrections are too large, or `strict` refuses it.
+        StationError: the control corrects already; the program is compensated or for another machine, corrections are too large, or `strict` refuses it.
         ValueError: an unknown `prefer`, or `start` is no pose.
     """
     source = Path(program)
@@ -101,6 +106,10 @@ def compensate(
         prefer=prefer,
         strict=strict,
     )
+    own = inverse.model.machine
+    now = own if machine is None else read_machine(Path(machine))
+    check_model_is_of(now, own)
+    refuse_second_correction(now)
     telling = Telling(say=say)
     warnings = () if inverse.identified is None else model_warnings(inverse.identified)
     telling.note(*warnings)

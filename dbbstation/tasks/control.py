@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from dbbstation.control.commands import correction_of
 from dbbstation.control.kinematics import component, settings
 from dbbstation.errors import ModelError, StationError
-from dbbstation.files.atomic import refuse_existing, write_text
-from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.atomic import refuse_outputs, write_text
+from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.inputs import in_a_book
 from dbbstation.files.shipped import package_text
@@ -20,10 +22,14 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
     from pathlib import Path
 
+    from dbbstation.machine.geometry import ControlCorrection
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.sources.contract import ErrorSource
 
 SUFFIX = ".comp"
+
+MACHINE_SUFFIX = ".machine.yaml"
+"""End of the machine file that says what the control corrects."""
 
 
 @in_a_book
@@ -31,6 +37,7 @@ def kinematics(
     model: Path,
     out: Path,
     *,
+    date: str,
     known: Mapping[str, ErrorSource],
     machine: Path | None = None,
     left_out: Collection[str] = (),
@@ -40,7 +47,8 @@ def kinematics(
     """Write a LinuxCNC kinematics component that corrects a model's errors.
 
     Args:
-        out: a `.comp` file; its stem is the component's name.
+        out: a `.comp` file; its stem is the component's name. The machine file beside it says what the control corrects.
+        date: of today, ISO 8601.
         known: error sources by name.
         machine: file of the machine that it is for; None: not compared.
         left_out: sources that the control shall not correct.
@@ -54,7 +62,8 @@ def kinematics(
     """
     if out.suffix != SUFFIX:
         raise StationError(f"{out.name} is no name of a component file", remedy=f"end it with {SUFFIX}")
-    refuse_existing(out, force=force)
+    corrected = out.with_suffix(MACHINE_SUFFIX)
+    refuse_outputs([out, corrected], force=force)
     identified, digest = _read(model, known, machine), sha256_of(model)
     made = component(
         identified.model,
@@ -65,6 +74,13 @@ def kinematics(
         thermometers=thermometers,
     )
     ini, hal = settings(made, identified.model)
+    taken_out = [f for f in identified.model.of_the_machine().sources if f.source.name in made.parts]
+    _write_machine(
+        corrected,
+        identified,
+        correction_of("kinematics", digest, date, taken_out, identified.model.machine),
+        force=force,
+    )
     write_text(out, made.text, force=force)
     return KinematicsResult(
         file=str(out),
@@ -76,10 +92,10 @@ def kinematics(
         install=(f"sudo halcompile --install {out.name}",),
         ini=ini,
         hal=hal,
-        machine_file=("control:", "  correction: kinematics", f"  model: {model.name}", f"  model_sha256: {digest}"),
+        machine_file=str(corrected),
         way_back=(
             "put the former KINEMATICS line back into the INI file, the former lines into the HAL file, and home again",
-            "take `control` out of the machine file",
+            "use the former machine file again, without `control`",
         ),
         notes=(*model_warnings(identified), HOMING, UNITS),
     )
@@ -90,6 +106,10 @@ HOMING = (
     "X, Y, Z, A, B, C of a standing machine change by its errors"
 )
 UNITS = "the component counts in mm and degrees: LINEAR_UNITS = mm, ANGULAR_UNITS = degree"
+
+
+def _write_machine(path: Path, identified: IdentifiedModel, control: ControlCorrection, *, force: bool) -> None:
+    write_text(path, machine_text(replace(identified.model.machine, control=control)), force=force)
 
 
 def _read(path: Path, known: Mapping[str, ErrorSource], machine: Path | None) -> IdentifiedModel:

@@ -8,6 +8,9 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from dbbstation.control.commands import nominal_commands
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.recordings.entries import RunEntry, RunState
 from dbbstation.files.recordings.session import SessionFolder, opened
@@ -16,6 +19,7 @@ from dbbstation.machine.difference import differences, in_words
 from dbbstation.model.observation import Observation
 from dbbstation.nc.commanded import commanded_poses
 from dbbstation.sources.contract import Thermometer
+from dbbstation.sources.registry import known_sources
 from dbbstation.tasks.telling import Telling, never, silent
 from dbbstation.trace.cut import cut
 from dbbstation.trace.thermometers import logged_curve
@@ -161,6 +165,13 @@ def load_sessions(
     if not observations:
         places = ", ".join(str(session.folder) for session in sessions)
         raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
+    under_correction = {session.name: session.machine for session in sessions if session.machine.control is not None}
+    observations = [_under(under_correction.get(one.setup.session), one) for one in observations]
+    warnings += [
+        f"{name}: its control corrects by itself: {one.control.said}"
+        for name, one in under_correction.items()
+        if one.control
+    ]
     observations = _with_thermometers(_with_shared_balls(observations, sessions), logs)
     hashes = {session.name: session.sha256 for session in sessions}
     return Recorded(sessions[0].machine, tuple(observations), hashes, tuple(warnings))
@@ -178,6 +189,15 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
     if text is None:
         raise InputError(faults)
     return replace(observation, commanded=commanded_poses(text, str(path), observation))
+
+
+def _under(machine: Machine | None, observation: Observation) -> Observation:
+    """Return a run under a correcting control as a run of a nominal control whose struts were driven the same."""
+    if machine is None:
+        return observation
+    poses = np.vstack([observation.motion().poses, observation.standing_pose])
+    commands = nominal_commands(machine, poses, known_sources())
+    return replace(observation, commanded=commands[:-1], stood=commands[-1])
 
 
 def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:

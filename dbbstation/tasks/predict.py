@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.control.commands import nominal_commands
 from dbbstation.files.formats.number_language import PLAIN
 from dbbstation.files.formats.pose_table import PoseTable, read_poses, write_poses
 from dbbstation.files.inputs import in_a_book
@@ -16,6 +17,7 @@ from dbbstation.machine.travel import check_travel
 from dbbstation.model.uncertainty import predicted_poses
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.prediction import PredictionResult, prediction_result
+from dbbstation.sources.registry import known_sources
 from dbbstation.tasks.models import model_of
 from dbbstation.tasks.provenance import from_python
 from dbbstation.tasks.telling import Telling, never, silent
@@ -81,7 +83,8 @@ def predict(
     table, where = _table(poses, numbers)
     telling.stage("travel")
     check_travel(identified.model.machine, table.poses, where=where)
-    actual, uncertainty_mm = predicted_poses(identified, table.poses, telling.counted("predicting pose"))
+    commands = nominal_commands(identified.model.machine, table.poses, known_sources() if known is None else known)
+    actual, uncertainty_mm = predicted_poses(identified, commands, telling.counted("predicting pose"))
     if out is not None:
         telling.stage("writing")
         write_poses(

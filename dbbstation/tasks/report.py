@@ -186,7 +186,7 @@ def _ranked(
             raise recorded
         if any(one.commanded is not None for one in recorded.observations):
             return Ranked(
-                why_not="The circles ran under compensated programs, in which the model's causes are taken out already: `--before` ranks them on the "
+                why_not="The circles ran under compensated programs or a correcting control, in which the model's causes are taken out already: `--before` ranks them on the "
                 "circles before."
             )
         runs = [thinned(one) for one in recorded.observations]

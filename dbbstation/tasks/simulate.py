@@ -50,7 +50,7 @@ def simulate(
     """Write the session that a ball bar would record on a model's machine, without noise.
 
     Balls are at the plan's positions, balls under the spindle at the model's tool tip. Only the machine's own sources
-    act. Lengths are written to 1 nm.
+    act, under a nominal control. Lengths are written to 1 nm.
 
     Args:
         model: a model, its file, or the result of `calibrate` or `diagnose`.
@@ -68,6 +68,7 @@ def simulate(
     if folder.exists():
         raise OutputError("the session folder exists already", where=str(folder), remedy="choose another name")
     machine_model = model_of(model, known).model.of_the_machine()
+    machine_model = replace(machine_model, machine=replace(machine_model.machine, control=None))
     inline = read_inline_plan(Path(plan))
     planned = inline.to_domain()
     planned.check(machine_model.machine)

@@ -25,6 +25,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_set_up import SetUpReadings
 from dbbstation.files.recordings.session_writer import SessionWriter
+from dbbstation.machine.geometry import ControlCorrection
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.bar import Bar
@@ -166,7 +167,9 @@ def make_models(folder: Path) -> None:
     )
     write_model(folder / "small.yaml", model, force=True)
     origin = Provenance("dbbstation 0.1.0", "dbbstation calibrate small", {"small/session.yaml": session.sha256})
-    planned = replace(machine, greatest_feed_mm_min=20_000.0, acceleration_mm_s2=1500.0)
+    lengths = {f"strut_{k}_mm": 0.01 * k for k in range(1, 7)}
+    control = ControlCorrection("kinematics", "0123456789abcdef" * 4, "2026-11-27", {"strut-reference-length": lengths})
+    planned = replace(machine, greatest_feed_mm_min=20_000.0, acceleration_mm_s2=1500.0, control=control)
     every = replace(
         model,
         model=MachineModel(planned, fitted),

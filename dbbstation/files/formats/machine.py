@@ -14,7 +14,16 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
-from dbbstation.machine.geometry import Compliance, Hexapod, JointAxes, Machine, Masses, StrutMasses, Travel
+from dbbstation.machine.geometry import (
+    Compliance,
+    ControlCorrection,
+    Hexapod,
+    JointAxes,
+    Machine,
+    Masses,
+    StrutMasses,
+    Travel,
+)
 from dbbstation.machine.rotation import Rotation
 
 _Millimetre = Annotated[float, Quantity("mm", 0, 20, signed=True)]
@@ -100,6 +109,19 @@ class JointAxesSchema(Schema):
     """Of the platform joints, platform frame [1]."""
 
 
+class ControlSchema(Schema):
+    """What the control corrects by itself, as `dbbstation control` writes it."""
+
+    correction: Literal["kinematics", "parameters"]
+    """A kinematics made of a model, or parameters and tables for the control's own."""
+    model_sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    """SHA-256 of the model file that it was made from."""
+    date: Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
+    """When that was."""
+    sources: dict[str, dict[str, float]]
+    """Error sources that it takes out, by name, with their parameters in the sources' units."""
+
+
 class MachineParts(Schema):
     """The machine itself: what a machine file holds beside its `format` line, and a model holds inline."""
 
@@ -143,11 +165,13 @@ class MachineParts(Schema):
     """Weight of struts and motors; needed by the source that models it."""
     joint_axes: JointAxesSchema | None = None
     """Axes of universal joints; needed by the source that models how they turn the screws."""
+    control: ControlSchema | None = None
+    """What the control corrects by itself; absent where it drives by the nominal machine."""
 
     def to_domain(self) -> Machine:
         """Return the machine that calculations use."""
         masses, compliance, strut_masses = self.masses, self.compliance, self.strut_masses
-        axes = self.joint_axes
+        axes, control = self.joint_axes, self.control
         return Machine(
             name=self.name,
             hexapod=Hexapod(
@@ -166,6 +190,7 @@ class MachineParts(Schema):
             greatest_feed_mm_min=self.greatest_feed_mm_min,
             greatest_turn_deg_min=self.greatest_turn_deg_min,
             acceleration_mm_s2=self.acceleration_mm_s2,
+            control=None if control is None else ControlCorrection(**control.model_dump()),
         )
 
 
@@ -193,6 +218,7 @@ def machine_parts(machine: Machine) -> MachineParts:
             "strut_masses": machine.strut_masses and asdict(machine.strut_masses),
             "joint_axes": machine.joint_axes
             and {"base": points(machine.joint_axes.base), "platform": points(machine.joint_axes.platform)},
+            "control": machine.control and asdict(machine.control),
         }
     )
 

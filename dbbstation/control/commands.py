@@ -1,0 +1,81 @@
+"""Commands under a control that corrects: what they would be under a nominal one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import ModelError, StationError
+from dbbstation.machine.geometry import ControlCorrection
+from dbbstation.model.compensation import compensated
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.contract import Fitted, Motion, Need
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import ErrorSource
+
+
+def correction_of(
+    kind: str, digest: str, date: str, taken_out: Iterable[Fitted], machine: Machine
+) -> ControlCorrection:
+    """Return what a control corrects, as a machine file holds it."""
+    sources = {
+        fitted.source.name: {
+            parameter.name: float(value)
+            for parameter, value in zip(fitted.source.parameters(machine), fitted.values, strict=True)
+        }
+        for fitted in taken_out
+    }
+    return ControlCorrection(kind, digest, date, sources)
+
+
+def refuse_second_correction(machine: Machine) -> None:
+    """Refuse to compensate what the control corrects.
+
+    Raises:
+        StationError: says what corrects.
+    """
+    if machine.control is not None:
+        raise StationError(
+            f"the control of {machine.name!r} corrects the machine already: {machine.control.said}",
+            remedy="run nominal programs; or take the correction out of the control, and `control` out of the machine file",
+        )
+
+
+def nominal_commands(
+    machine: Machine, poses: NDArray[np.float64], known: Mapping[str, ErrorSource]
+) -> NDArray[np.float64]:
+    """Return the poses at which a nominal control drives the struts as this one does, shape (n, 6) [mm, deg].
+
+    Args:
+        poses: commanded, shape (n, 6).
+        known: error sources by name.
+
+    Raises:
+        ModelError: an unknown source, or one that follows more than the pose.
+        KinematicsError: a pose that the machine cannot take.
+    """
+    if machine.control is None or not len(poses):
+        return poses
+    taken_out = tuple(_fitted(name, dict(values), machine, known) for name, values in machine.control.sources.items())
+    return compensated(MachineModel(machine, taken_out), Motion(poses))
+
+
+def _fitted(name: str, values: Mapping[str, float], machine: Machine, known: Mapping[str, ErrorSource]) -> Fitted:
+    source = known.get(name)
+    laws = () if source is None else (source, *source.other_laws())
+    for law in laws:
+        names = [parameter.name for parameter in law.parameters(machine)]
+        if set(names) == set(values) and law.needs <= {Need.POSE}:
+            return Fitted(law, np.array([values[each] for each in names]))
+    raise ModelError(
+        f"what the control corrects has the source {name}, which is unknown, has other parameters or follows more than the pose",
+        where="`control` of the machine file",
+        remedy="switch the parts that follow thermometers off while measuring, and take them out of `control`",
+    )

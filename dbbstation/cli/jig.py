@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.mapping_options import AS_WRITTEN
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo, echo_line
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from dbbstation.files.formats.jig import JigFile
     from dbbstation.plan.repeatability import HolderResult
@@ -33,6 +34,15 @@ _COLUMN = click.option(
     metavar="WHAT=NAME",
     help="Which column is what: ball, bore, holder, x, y, z, u or ux, uy, uz; axis, value, unit of a row per coordinate; such as x=Ist_X  [default: by their names].",
 )
+
+
+def _as_written(function: Callable[..., None]) -> Callable[..., None]:
+    """Give a command `decimal`, `separator` and `encoding`."""
+    for option in reversed(AS_WRITTEN):
+        function = option(function)
+    return function
+
+
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 _FORCE = click.option("--force", is_flag=True, help="Replace an existing file.")
 
@@ -54,6 +64,7 @@ def jig() -> None:
     "--jig", "before", required=True, type=click.Path(path_type=Path), help="Jig file whose plate and holders stay."
 )
 @_COLUMN
+@_as_written
 @_UNIT
 @_U_UNIT
 @click.option(
@@ -75,6 +86,9 @@ def sheet(
     before: Path,
     columns: tuple[str, ...],
     unit: str | None,
+    decimal: str | None,
+    separator: str | None,
+    encoding: str | None,
     u_unit: str | None,
     names: tuple[str, ...],
     coverage: float | None,
@@ -97,13 +111,18 @@ def sheet(
     from dbbstation.cli.output import print_result, print_table
     from dbbstation.cli.provenance import provenance
     from dbbstation.files.formats.jig import jig_text, read_jig
+    from dbbstation.files.formats.number_language import number_language
     from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.files.recordings.cmm_sheet import jig_of_sheet, read_sheet
     from dbbstation.results.jig import MeasuredBall, SheetResult
 
     refuse_existing_table(out, force=force)
     old = read_jig(before)
-    measured = read_sheet(sheet, _pairs(columns, "--column", _WHAT), _micro(unit), coverage, u_unit=_micro(u_unit))
+    numbers = number_language(decimal, separator)
+    named = _pairs(columns, "--column", _WHAT)
+    measured = read_sheet(
+        sheet, named, _micro(unit), coverage, u_unit=_micro(u_unit), numbers=numbers, encoding=encoding
+    )
     new = jig_of_sheet(
         old,
         measured,
@@ -142,6 +161,7 @@ def sheet(
 @jig.command()
 @_SHEET
 @_COLUMN
+@_as_written
 @_UNIT
 @click.option("--holder", help="Holder that all rows are of, where the table does not say it.")
 @click.option(
@@ -161,6 +181,9 @@ def holders(
     *,
     columns: tuple[str, ...],
     unit: str | None,
+    decimal: str | None,
+    separator: str | None,
+    encoding: str | None,
     holder: str | None,
     cmm_repeatability_um: float,
     before: Path | None,
@@ -180,6 +203,7 @@ def holders(
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_result
     from dbbstation.errors import InputError, Problem
+    from dbbstation.files.formats.number_language import number_language
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.files.recordings.cmm_sheet import read_sheet
     from dbbstation.plan.repeatability import repeatability
@@ -191,7 +215,9 @@ def holders(
         )
     if out is not None:
         refuse_existing_table(out, force=force)
-    rows = read_sheet(sheet, _pairs(columns, "--column", _WHAT), _micro(unit), 1.0, of_one_holder=True)
+    numbers = number_language(decimal, separator)
+    named = _pairs(columns, "--column", _WHAT)
+    rows = read_sheet(sheet, named, _micro(unit), 1.0, of_one_holder=True, numbers=numbers, encoding=encoding)
     found: dict[str, HolderResult] = {}
     try:
         for name, places in _by_holder(rows, holder, sheet).items():

@@ -25,6 +25,23 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t"}
 
+AS_WRITTEN = (
+    click.option(
+        "--decimal",
+        type=click.Choice([".", ","]),
+        help="Decimal sign in the files  [default: the shop's, else found by looking].",
+    ),
+    click.option(
+        "--separator", type=SEPARATOR, metavar="[comma|semicolon|tab]", help="What stands between columns  [likewise]."
+    ),
+    click.option(
+        "--encoding",
+        type=click.Choice(["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"]),
+        help="Of the files' text  [default: utf-8; of sheets found by looking].",
+    ),
+)
+"""How tables are written."""
+
 _OPTIONS = (
     click.option(
         "--mapping",
@@ -67,19 +84,7 @@ _OPTIONS = (
     ),
     click.option("--zero-mm", type=Finite(20, 2000), help="Length of the bar at which the deviation is 0 [mm]."),
     click.option("--file-name", metavar="PATTERN", help="What names of files say, such as '{test}_{direction}'."),
-    click.option(
-        "--decimal",
-        type=click.Choice([".", ","]),
-        help="Decimal sign in the files  [default: the shop's, else found by looking].",
-    ),
-    click.option(
-        "--separator", type=SEPARATOR, metavar="[comma|semicolon|tab]", help="What stands between columns  [likewise]."
-    ),
-    click.option(
-        "--encoding",
-        type=click.Choice(["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"]),
-        help="Of the files' text  [default: utf-8].",
-    ),
+    *AS_WRITTEN,
 )
 
 

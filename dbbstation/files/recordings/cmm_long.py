@@ -15,9 +15,9 @@ from dbbstation.files.source_text import shortened
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-_BALL = ("featureid", "feature", "element", "ball", "name", "label", "merkmal", "id")
-_AXIS = ("axis", "achse", "idsymbol", "coordinate", "koordinate", "type", "characteristic", "property")
-_VALUE = ("actual", "ist", "istwert", "measured", "value", "messwert")
+_BALL = ("featureid", "feature", "element", "ball", "name", "label", "merkmal", "id", "要素名")
+_AXIS = ("axis", "achse", "idsymbol", "coordinate", "koordinate", "type", "characteristic", "property", "座標名")
+_VALUE = ("actual", "ist", "istwert", "measured", "value", "messwert", "実測値", "測定値")
 _UNIT = ("unit", "einheit")
 AXES = ("x", "y", "z")
 _AXIS_CELL = re.compile(

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.files.recordings.table_csv import TableFile
 
 AXES = ("x", "y", "z")
@@ -56,6 +57,8 @@ def read_sheet(
     *,
     of_one_holder: bool = False,
     u_unit: str | None = None,
+    numbers: NumberLanguage | None = None,
+    encoding: str | None = None,
 ) -> list[Measured]:
     """Read a sheet: DMIS by its extension, else a table.
 
@@ -65,13 +68,14 @@ def read_sheet(
         unit: of coordinates; None: as the sheet states, else mm.
         of_one_holder: a bore alone identifies a ball.
         u_unit: of uncertainties; None: as the sheet states, else that of coordinates.
+        numbers, encoding: of a table; None: as fits best.
 
     Raises:
         InputError: every fault of the file.
     """
     if path.suffix.lower() in DMIS_ENDINGS:
         return [Measured(one.name, None, "", one.centre_mm, None, one.line) for one in read_dmis(path)]
-    foreign = read_foreign(path)
+    foreign = read_foreign(path, numbers, encoding)
     table = foreign.table
     given = columns.get("u") or columns.get("ux")
     u_said = u_unit or ("" if given is None else _said_unit(given, foreign.units))
@@ -146,7 +150,15 @@ def jig_of_sheet(
             faults.append(Problem(file, one.line, 0, f"the ball `{name}` comes a second time", "take one of them out"))
         elif u_um is None:
             what = f"nothing states an uncertainty of `{name}`"
-            faults.append(Problem(file, one.line, 0, what, "give --u-um, the standard uncertainty of a coordinate"))
+            faults.append(
+                Problem(
+                    file,
+                    one.line,
+                    0,
+                    what,
+                    "give --u-um, the standard uncertainty of a coordinate, or name the column of them: --column u=NAME",
+                )
+            )
         elif not all(map(math.isfinite, one.centre_mm)):
             faults.append(Problem(file, one.line, 0, f"`{name}` has no z", "say which column it is: --column z=NAME"))
         else:
@@ -162,18 +174,40 @@ def jig_of_sheet(
 
 _KEYS = ("ball", "bore", "holder", *AXES, "u", "ux", "uy", "uz")
 _NAMES = {
-    "ball": {"ball", "name", "label", "feature", "id"},
+    "ball": {"ball", "name", "label", "feature", "id", "kugel", "要素名"},
     "holder": {"holder", "halter"},
     "bore": {"bore", "bohrung"},
 }
+_MEASURED = {"actual", "act", "ist", "istwert", "meas", "measured", "gemessen", "実測値", "測定値"}
+_NOT_MEASURED = {
+    "nominal",
+    "nom",
+    "soll",
+    "sollwert",
+    "target",
+    "基準値",
+    "設計値",
+    "u",
+    "dev",
+    "deviation",
+    "abweichung",
+    "tol",
+    "tolerance",
+}
+"""Words beside an axis; `U` and `u` are different things, and so is what another program means by them: they are named, not guessed."""
 
 
 def _usual(key: str, table: TableFile) -> str | None:
-    """Return the column of this role by its name, such as `X` or `x_mm`; `U(x) [µm]` is not guessed."""
+    """Return the column of this role by its name, such as `X`, `x_mm` or `X Ist [mm]`; `U(x) [µm]` is not guessed."""
+    if key.startswith("u"):
+        return None
     wanted = _NAMES.get(key, {key})
-    names = [name for name in table.names if re.split(r"[\s_\[(]", name.strip().lower())[0] in wanted]
-    # `U` and `u` are different things, and so is what another program means by them: they are named, not guessed.
-    return None if key.startswith("u") or len(names) != 1 else names[0]
+    words = {name: [word for word in re.split(r"[\W_]+", name.lower()) if word] for name in table.names}
+    first = [name for name, of in words.items() if of[:1] and of[0] in wanted]
+    found = first if key not in AXES else [name for name, of in words.items() if wanted & set(of)]
+    found = [name for name in found if not _NOT_MEASURED & set(words[name])]
+    stated = [name for name in found if _MEASURED & set(words[name])]
+    return next((names[0] for names in (stated, found) if len(names) == 1), None)
 
 
 def _bad_cells(table: TableFile, name: str) -> list[Problem]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -67,25 +68,27 @@ class ForeignTable:
     repeated: tuple[int, ...] = ()
 
 
-def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: str = "utf-8") -> ForeignTable:
+def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: str | None = "utf-8") -> ForeignTable:
     """Read a table that another program wrote.
 
     Args:
         language: None: as fits best.
-        encoding: without a byte order mark.
+        encoding: without a byte order mark; None: as fits, in doubt refused.
 
     Raises:
         InputError: it cannot be read, has no table, or rows of different width.
     """
     faults: list[Problem] = []
     data = read_bytes(path, faults, LARGEST_TABLE)
-    if data is not None and (kind := kind_of(data)) is not None:
+    encoding = encoding or _encoding(data or b"")
+    if data is not None and encoding not in _WIDE and (kind := kind_of(data)) is not None:
         raise InputError([Problem(str(path), 1, 1, *kind)])
     text = None if data is None else _text(data, str(path), encoding, faults)
     if data is None or text is None:
         raise InputError(faults)
     lines = _without_end(text.replace(_MINUS, "-").splitlines())
     chosen = language or _language(lines, str(path))
+    lines = _without_last_separator(lines, chosen.separator)
     stated = "" if language is None else f"; {_STATED}"
     rows, first = _looked_at(lines, chosen, str(path))
     if first is None and (language is None or language.separator == "\t") and (parted := with_tabs(lines)) is not None:
@@ -108,8 +111,8 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
     body = [*[""] * names, lines[names].lstrip("\ufeff# "), *lines[names + 1 :]]
     if has_units:
         body[near[-1]] = ""
-    if lines[names].rstrip().endswith(chosen.separator) and not rows[names][-1]:
-        body = [line.rstrip().removesuffix(chosen.separator) for line in body]
+    if lines[names].rstrip(" ").endswith(chosen.separator) and not rows[names][-1]:
+        body = [line.rstrip(" ").removesuffix(chosen.separator) for line in body]
     body, repeated = _heads_taken_out(body, names, chosen)
     table = parse_table("\n".join(body), str(path), numbers=chosen)
     units = dict(zip(table.names, rows[near[-1]], strict=False)) if has_units else {}
@@ -143,6 +146,15 @@ def _no_table(lines: list[str], language: NumberLanguage, file: str, stated: str
         what,
         f"say --decimal and --separator, or check which file it is; as it was read {language.text}{stated}",
     )
+
+
+def _without_last_separator(lines: list[str], separator: str) -> list[str]:
+    """Return lines without the separator at their ends, if all of the widest have one."""
+    widest = max((line.count(separator) for line in lines), default=0)
+    wide = [line for line in lines if line.count(separator) == widest]
+    if widest < 2 or not all(line.rstrip(" ").endswith(separator) for line in wide):  # noqa: PLR2004 - one ends the first cell
+        return lines
+    return [line.rstrip(" ").removesuffix(separator) if line.count(separator) == widest else line for line in lines]
 
 
 def _heads_taken_out(body: list[str], names: int, language: NumberLanguage) -> tuple[list[str], tuple[int, ...]]:
@@ -184,6 +196,32 @@ def _text(data: bytes, file: str, encoding: str, faults: list[Problem]) -> str |
         what = f"byte {data[error.start]:#04x} at position {error.start} is no {encoding} text"
         faults.append(Problem(file, 0, 0, what, "give another --encoding, or save the file as UTF-8"))
         return None
+
+
+_WIDE = ("utf-16-be", "utf-16-le")
+_RUN = re.compile(rb"[\x80-\xff]+")
+_JAPANESE = re.compile(r"[\u3000-\u30ff\u4e00-\u9fff\uff01-\uff5e]+")
+_WESTERN = 2
+"""Bytes beyond ASCII that follow one another in western words at the most; Cyrillic and Asian words have more."""
+
+
+def _encoding(data: bytes) -> str:
+    """Return the encoding that a text fits beyond doubt, else UTF-8, which is then refused with its place."""
+    zeros = data[::2].count(0), data[1::2].count(0)
+    if max(zeros) > len(data) // 10:  # digits have one in two bytes
+        return _WIDE[zeros[0] < zeros[1]]
+    with suppress(UnicodeDecodeError):
+        data.decode("utf-8")
+        return "utf-8"
+    runs = _RUN.findall(data)
+    if all(len(run) <= _WESTERN for run in runs):
+        with suppress(UnicodeDecodeError):
+            data.decode("cp1252")
+            return "cp1252"
+    with suppress(UnicodeDecodeError):
+        if _JAPANESE.fullmatch("".join(letter for letter in data.decode("cp932") if not letter.isascii())):
+            return "cp932"
+    return "utf-8"
 
 
 def _language(lines: list[str], file: str) -> NumberLanguage:

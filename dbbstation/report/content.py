@@ -182,7 +182,7 @@ def _ranking(reported: Reported) -> ShownCauses | None:
     if ranked is None:
         return None
     return ShownCauses(
-        ranked.session, ranked.why_not, cause_rows(ranked, reported.coverage_factor), cured_polars(ranked)
+        ranked.session, ranked.why_not, cause_rows(ranked, reported.coverage_factor), cured_polars(ranked), ranked.said
     )
 
 

@@ -39,12 +39,14 @@ class ShownCauses:
         session: of the circles.
         why_not: may be empty.
         polars: without the first cause.
+        said: the diagnosis in two sentences; may be empty.
     """
 
     session: str
     why_not: str
     rows: Sequence[CauseRow]
     polars: Sequence[TitledPolar]
+    said: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, computed_field
 
 from dbbstation.calibration.outliers.outlier import Outlier
 from dbbstation.facts.run import OfRun
@@ -19,7 +19,7 @@ from dbbstation.inference.verdict import Gains
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.effects import CauseContribution
 from dbbstation.results.frame import Framed
-from dbbstation.results.levels_text import level_sentences
+from dbbstation.results.levels_text import level_sentences, short_sentences
 
 
 @dataclass(frozen=True)
@@ -268,6 +268,12 @@ class DiagnosisFigures(Framed):
         values = {one.name: one.parameters for one in self.sources}
         what = "Measured circles and the kinematic model"
         return level_sentences(self.levels, "µm", values, rows="tests", what=what)
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def said(self) -> tuple[str, ...]:
+        """Whether anything differs, and what it follows most, in two sentences for a report or a screen."""
+        return short_sentences(self.levels, "µm", "Measured circles and the kinematic model")
 
     @property
     def identified(self) -> tuple[CauseResult, ...]:

@@ -46,6 +46,16 @@ def level_sentences(
     return found
 
 
+def short_sentences(levels: Levels, unit: str, what: str) -> tuple[str, ...]:
+    """Return what is said first: whether anything differs, and what it follows most, with the error in tests that took no part."""
+    first = next(_difference(levels.differs, unit, what, "tests"))
+    largest = max(levels.follows, key=lambda one: one.rms, default=None)
+    if largest is None:
+        return (first,)
+    told = [sentence.strip() for sentence in _followed(largest, unit, {}, "tests")]
+    return (first, " ".join(told[:2] if told[1:] and told[1].startswith("Correcting") else told[:1]))
+
+
 def no_correction(levels: Levels) -> str:
     """Why no correction is offered, as a sentence."""
     if levels.differs.gain is None:

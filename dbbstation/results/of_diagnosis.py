@@ -108,6 +108,7 @@ def kept_of(figures: DiagnosisFigures) -> dict[str, object]:
     return {
         "ambiguous": list(groups.values()),
         "held_out_worse": figures.held_out_worse,
+        "said": list(figures.said),
         "verdicts": {one.name: one.verdict for one in figures.sources},
         "limits": [limit.text for limit in figures.limits],
     }

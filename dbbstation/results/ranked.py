@@ -20,12 +20,14 @@ class Ranked:
     Attributes:
         verdicts: of the model's diagnosis, by cause.
         why_not: why there are none; else empty.
+        said: the model's diagnosis in two sentences; may be empty.
     """
 
     session: str = ""
     effects: tuple[CauseEffect, ...] = ()
     verdicts: Mapping[str, str] | None = None
     why_not: str = ""
+    said: tuple[str, ...] = ()
 
 
 def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:

@@ -67,6 +67,7 @@ class DiagnosisAnswer:
     Attributes:
         mismatch: whether the residual exceeds noise and mountings.
         next_test: None for nothing.
+        said: whether anything differs, and what it follows.
     """
 
     mismatch: bool
@@ -76,6 +77,7 @@ class DiagnosisAnswer:
     unexplained: TextAnswer
     next_test: TextAnswer | None
     limits: tuple[TextAnswer, ...] = ()
+    said: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -205,5 +205,6 @@ def _ranked(
     if not found:
         return Ranked(why_not="The model has no cause that acts on these circles.")
     said = identified.report.get("diagnosis")
-    verdicts = said.get("verdicts", {}) if isinstance(said, Mapping) else {}
-    return Ranked(", ".join(dict.fromkeys(names)), found, verdicts)
+    said = said if isinstance(said, Mapping) else {}
+    told = tuple(str(one) for one in said.get("said", ()))
+    return Ranked(", ".join(dict.fromkeys(names)), found, said.get("verdicts", {}), said=told)

@@ -61,6 +61,7 @@ def _calibrated(answer: CalibrationAnswer) -> Iterator[str]:
 
 
 def _diagnosed(answer: DiagnosisAnswer) -> Iterator[str]:
+    yield from answer.said
     form = texts.MISMATCH if answer.mismatch else texts.NO_MISMATCH
     yield form.format(rms=answer.misfit_rms_um, noise=answer.noise_um)
     for verdict, words in texts.VERDICT_WORDS.items():

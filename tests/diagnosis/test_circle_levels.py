@@ -16,6 +16,7 @@ from dbbstation.inference.chosen_anew import chosen_anew
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.levels import Differs, FollowsAnswer
 from dbbstation.inference.places import form_probabilities
+from dbbstation.results.levels_text import short_sentences
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.backlash import Backlash
@@ -116,3 +117,13 @@ def test_verdicts_are_read_off_the_levels(both):
     assert found["backlash"].verdict is Verdict.IDENTIFIED
     assert found["gravity"].verdict is Verdict.IDENTIFIED
     assert all(found[name].verdict.rank > Verdict.AMBIGUOUS.rank for name in FEW if name not in {"gravity", "backlash"})
+
+
+@pytest.mark.slow
+def test_two_sentences_say_that_it_differs_and_what_it_follows_most(both):
+    *_, levels = both
+    first, second = short_sentences(levels, "µm", "Measured circles and the kinematic model")
+    assert first.startswith("Measured circles and the kinematic model differ: probability 1.000")
+    largest = max(levels.follows, key=lambda one: one.rms)
+    assert second.startswith(f"The difference follows {largest.name}")
+    assert f"leaves {largest.after:.3g} of" in second

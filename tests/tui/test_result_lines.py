@@ -69,6 +69,8 @@ def test_a_diagnosis_lists_causes_by_what_is_known_of_them() -> None:
     more = result_lines(SessionTask.DIAGNOSE, answer | {"mismatch": False, "next_test": {"text": "a circle"}})
     assert more[0] == texts.NO_MISMATCH.format(rms=9.3, noise=0.3)
     assert more[-1] == texts.MEASURE_NEXT.format(text="a circle")
+    said = ["Measured circles and the kinematic model differ.", "The difference follows strut-force."]
+    assert result_lines(SessionTask.DIAGNOSE, answer | {"said": said})[:2] == said
 
 
 def test_the_greatest_correction_of_all_programs_is_told() -> None:

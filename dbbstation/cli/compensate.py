@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.control_state import control_options, lengths_by_tool, named_numbers, numbers_of
 from dbbstation.cli.correction import largest_correction_option
 from dbbstation.cli.keeping import keeping_options
 from dbbstation.cli.number_types import Finite
@@ -29,7 +30,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 )
 @click.option("--from", "source", metavar="D", help="Language of PROGRAM, likewise [default: by its extension].")
 @click.option("--out", type=_FILE, required=True, help="File to write.")
-@click.option("--start", metavar="X,Y,Z,A,B,C", help="Pose before the program, in mm and degrees.")
+@control_options
 @shop_option(
     "--chord-um",
     setting="program.chord_um",
@@ -58,6 +59,11 @@ def compensate(
     source: str | None,
     out: Path,
     start: str | None,
+    angles: str | None,
+    offsets: tuple[str, ...],
+    parameters: Path | None,
+    lengths: tuple[str, ...],
+    tools: Path | None,
     chord_um: float,
     prefer: str,
     strict: bool,
@@ -72,23 +78,25 @@ def compensate(
     Moves at feed are split into the longest pieces that keep the chord error. If the control is slower in such pieces, the
     output states about how much. --strict refuses the program instead.
 
-    The program must be in machine coordinates and name all six axes in its first move, or --start says where the machine
-    stands. It must be whole (M2, M30 or percent signs), not compensated yet, and of no other machine. Travel, feeds and the
-    size of corrections are checked before anything is written.
+    State the control's work offsets and tool lengths, or its files, and the angles of a program that names X, Y and Z only.
+    The result is right for these. Its first lines stop LinuxCNC if others are in force.
+
+    The program must be whole (M2, M30 or percent signs), not compensated yet, and of no other machine. Travel, feeds and
+    the size of corrections are checked before anything is written.
 
     \b
     Examples:
       dbbstation compensate part.ngc --model model.yaml --out part-compensated.ngc
-      dbbstation compensate part.nc --from linuxcnc --model model.yaml --out true.ngc --start 0,0,-1000,0,0,0
+      dbbstation compensate part.ngc --model model.yaml --out true.ngc --angles 0,0,0 --offset G54=20,-35,-1000 --tool-length 1=52.1
+      dbbstation compensate part.nc --from linuxcnc --model model.yaml --out true.ngc --parameters linuxcnc.var --tools tool.tbl
       dbbstation compensate part.ngc --model model.yaml --out true.ngc --strict
     """
     from dbbstation.cli.output import say
-    from dbbstation.cli.programs import parsed_pose, print_programs
+    from dbbstation.cli.programs import print_programs
     from dbbstation.cli.provenance import provenance
     from dbbstation.files.own_sources import every_source
     from dbbstation.tasks.compensate import compensate as compensated
 
-    pose = None if start is None else parsed_pose(start)
     every = every_source(source_files)
     result = compensated(
         program_file,
@@ -96,7 +104,12 @@ def compensate(
         out,
         dialect=dialect,
         written_in=source,
-        start=pose,
+        start=None if start is None else numbers_of(start, {6}, "--start"),
+        angles_deg=None if angles is None else numbers_of(angles, {3}, "--angles"),
+        offsets=named_numbers(offsets, {3, 6}, "--offset"),
+        parameters=parameters,
+        tool_lengths_mm=lengths_by_tool(lengths),
+        tools=tools,
         chord_um=chord_um,
         prefer=prefer,
         strict=strict,

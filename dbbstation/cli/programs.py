@@ -4,28 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import click
-import numpy as np
-
 from dbbstation.cli.output import print_result, print_table, say
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.results.programs import ProgramsResult, WrittenProgram
-
-
-def parsed_pose(text: str) -> NDArray[np.float64]:
-    """Return the pose of `X,Y,Z,A,B,C`, shape (6,) [mm, deg]."""
-    try:
-        pose = np.array([float(number) for number in text.split(",")])
-    except ValueError:
-        pose = np.empty(0)
-    if pose.shape != (6,) or not np.isfinite(pose).all():
-        raise click.BadParameter("six numbers with commas between them are needed", param_hint="--start")
-    return pose
 
 
 def print_programs(result: ProgramsResult, *, as_json: bool) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.nc.toolpath import RowKind, Toolpath, ToolpathBuilder
+from dbbstation.nc.toolpath import IN_FORCE, RowKind, Toolpath, ToolpathBuilder
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def circle_toolpath(
     first, last = circle.poses(_ends_deg(circle), circle.feed_in_mm)
     path = ToolpathBuilder(name)
     path.corner_mm = max(LEAST_CORNER_MM, chord_error_mm(circle, step_deg))
-    path.guard = ()
+    path.holds = {IN_FORCE: (0.0,) * 6}
     if approach is not None:
         path.rapid(_raised(first, approach.clear_mm))
     path.feed(first[None], circle.feed_mm_min)
@@ -81,7 +81,7 @@ def circle_toolpath(
     # One step each on the overshoot and on the turn.
     parts = np.flatnonzero(np.abs(np.diff(turned)) > EVEN_RAD) + 1
     for poses, angles in zip(np.split(arc[1:], parts), np.split(turned, parts), strict=True):
-        path.feed(poses, circle.feed_mm_min, arc=(x, y, float(angles.mean())))
+        path.feed(poses, circle.feed_mm_min, arc=(x, y, float(angles.mean()), 0.0))
     path.dwell(CORNER_DWELL_S)
     path.feed(last[None], circle.feed_mm_min)
     path.dwell(OUTER_DWELL_S)

@@ -67,10 +67,9 @@ class CommandCurve:
         self._model = model
         self._started_s = started_s
         self._hold_tilt = hold_tilt
-        self._known = ~np.isnan(toolpath.before[:, 0])
-        self.leads_on = self._known & ((toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0))
+        self.leads_on = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
         has_history = any(fitted.source.has_history for fitted in model.of_the_machine().sources)
-        self._waits = self._known & ~self.leads_on & (toolpath.duration_s > 0.0) & has_history
+        self._waits = ~self.leads_on & (toolpath.duration_s > 0.0) & has_history
         self.tilt_left_mm = 0.0
         """Largest correction of the tilt that was left out so far, as felt at `LEVER_MM` [mm]."""
         self._before = before
@@ -80,7 +79,7 @@ class CommandCurve:
     def at(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return poses to command at places in program order, shape (k, 6) [mm, deg].
 
-        Rows without motion take over the pose before them; NaN before the place is known. If the model has a history, the
+        Rows without motion take over the pose before them. If the model has a history, the
         end of long stops is inverted as well and commanded for the move before.
 
         Raises:
@@ -90,27 +89,26 @@ class CommandCurve:
         path = self.toolpath
         row, share = row_and_share(places)
         # In time order: where the machine stands first.
-        first = int(np.argmax(self._known))
-        moves = self.leads_on[row] & (places > first)
+        moves = self.leads_on[row] & (places > 0)
         taken = moves | (self._waits[row] & (share == 1.0))
         if not moves.any():
-            return np.where(self._known[row][:, None], path.poses[row], np.nan)
+            return path.poses[row]
         poses = path.between(row[taken], share[taken])
         time_s = None
         if self._started_s is not None:
             begin_s = path.end_s - path.duration_s
             time_s = self._started_s + begin_s[row[taken]] + share[taken] * path.duration_s[row[taken]]
         if self._before is None:
-            poses = np.vstack([path.before[first], poses])
-            if time_s is not None:
-                time_s = np.concatenate([self._started_s + begin_s[first][None], time_s])
+            poses = np.vstack([path.before[0], poses])
+            if time_s is not None and self._started_s is not None:
+                time_s = np.concatenate([[self._started_s], time_s])
         inverse = self._inverted(Motion(poses=poses, is_path=True, time_s=time_s))
         behind = np.cumsum(taken)
         # Until the next place that leads somewhere the machine stands where it comes to rest.
         rests = np.append(~moves[1:], False)
         resting = np.flatnonzero(~rests)
         at_rest = behind[resting[np.searchsorted(resting, np.arange(len(row)))]]
-        return np.where(self._known[row][:, None], inverse[at_rest], np.nan)
+        return inverse[at_rest]
 
     def _inverted(self, wanted: Motion) -> NDArray[np.float64]:
         """Invert stretch by stretch, handing the sources' memory on.
@@ -150,13 +148,10 @@ def row_and_share(places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArr
 
 
 def felt_mm(off: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the way at the tip, or of a point at the lever if larger, of pose differences (k, 6), shape (k,) [mm].
-
-    Zero if a place is not known.
-    """
+    """Return the way at the tip, or of a point at the lever if larger, of pose differences (k, 6), shape (k,) [mm]."""
     lengths = in_mm(off)
     moved, tilted = np.linalg.norm(lengths[:, :3], axis=1), np.linalg.norm(lengths[:, 3:], axis=1)
-    felt: NDArray[np.float64] = np.nan_to_num(np.maximum(moved, tilted))
+    felt: NDArray[np.float64] = np.maximum(moved, tilted)
     return felt
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.nc.toolpath import DECIMALS
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.nc.planner import LookAhead
+    from dbbstation.nc.setup import Setup
     from dbbstation.nc.toolpath import Toolpath
 
 
@@ -39,6 +40,7 @@ class Dialect(ABC):
     """The control, in one line."""
     look_ahead: ClassVar[LookAhead | None] = None
     """How far the control looks ahead in moves that turn A, B or C; None: not known, and feeds are not checked."""
+    takes_setup: ClassVar[bool] = False
     decimals: ClassVar[Sequence[int]] = DECIMALS
     """Of the numbers of X, Y, Z [mm], A, B, C [deg]: what compensated programs are marked and checked by."""
 
@@ -59,23 +61,33 @@ class Dialect(ABC):
         return True
 
     @abstractmethod
-    def read(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
+    def read(
+        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: Setup | None = None
+    ) -> Toolpath:
         """Return what a program commands.
 
         Args:
-            start: pose before the program, shape (6,) [mm, deg]; None: the first move must name all six axes.
+            start: pose before the program, shape (6,) [mm, deg], NaN for unknown axes; None: all are.
+            setup: offsets and tool lengths of the control, given to a dialect that `takes_setup`; None: all are zero.
 
         Raises:
             InputError: faults with line and column.
         """
 
-    def toolpath(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
+    def toolpath(
+        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: Setup | None = None
+    ) -> Toolpath:
         """Return what `read` does of a program that moves something.
 
         Raises:
             InputError: as `read`, or nothing moves.
+            StationError: a setup for a dialect that takes none.
         """
-        path = self.read(text, name, start=start)
+        declared = {} if setup is None else {"setup": setup}
+        if declared and not self.takes_setup:
+            what = f"the dialect {self.name} takes no offsets, tool lengths or files of the control"
+            raise StationError(what, where=name, remedy="leave them out, or post the program in machine coordinates")
+        path = self.read(text, name, start=start, **declared)
         if not path.is_move.any():
             raise InputError([Problem(name, 0, 0, "this program moves nothing", "check that it is the file you mean")])
         return path

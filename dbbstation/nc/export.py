@@ -22,7 +22,6 @@ from dbbstation.nc.reach import STEP_DEG as REACH_DEG
 from dbbstation.nc.reach import STEP_MM as REACH_MM
 from dbbstation.nc.reach import check_feeds, check_reach
 from dbbstation.nc.remarks import check_kept, remarks_on
-from dbbstation.nc.systems import in_systems
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
@@ -197,7 +196,7 @@ def compensated_program(
     machine = inverse.model.machine
     check_nominal(path)
     check_machine(path, machine)
-    header = [f"machine: {machine.name}", *_said(origin or {})]
+    header = [f"machine: {machine.name}", *_said(origin or {}), *_holds_for(path)]
 
     return _program(path, machine, dialect, path.name, inverse, chord_mm, header, split=True)
 
@@ -230,7 +229,7 @@ def _program(
         planner=planner_of(machine, dialect),
         prefer=prefer,
     )
-    exact = in_systems(done.toolpath)
+    exact = done.toolpath
     finished = marked(exact, dialect.decimals)
     # What rounding and mark move a pose by is part of how far the tool leaves the path.
     coarse_mm = felt_mm(finished.poses - exact.poses).max(initial=0.0)
@@ -295,7 +294,7 @@ def _uncertainty_um(path: Toolpath, inverse: Inverse) -> tuple[float | None, tup
     if inverse.identified is None:
         return None, (), ""
     row, share = path.subdivided(REACH_MM, REACH_DEG)
-    known = ~np.isnan(path.poses[row, 0]) & path.is_move[row]
+    known = path.is_move[row]
     row, share = row[known], share[known]
     some = np.unique(np.linspace(0, len(row) - 1, UNCERTAIN_AT).astype(np.int64))
     row, share = row[some], share[some]
@@ -327,6 +326,20 @@ def _circle_header(
 
 def _said(names: Mapping[str, str]) -> list[str]:
     return [f"{what}: {name}" for what, name in names.items()]
+
+
+def _holds_for(path: Toolpath) -> list[str]:
+    """Return what a program is right for, besides the model."""
+    if path.holds is None:
+        return []
+    held = {
+        name: " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", values, strict=True) if value) or "zero"
+        for name, values in path.holds.items()
+    }
+    lengths = {name: held.pop(name) for name in list(held) if name[0] == "H"}
+    said = [f"right for {'' if name == 'G92' else 'work system '}{name}: {offset}" for name, offset in held.items()]
+    said += [f"right for the length of tool {name[1:]}: {length}" for name, length in lengths.items()]
+    return [*said, "after a new touch-off of one of these: compensate again"]
 
 
 def _points(path: Toolpath) -> int:

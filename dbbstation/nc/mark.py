@@ -73,10 +73,10 @@ known by: never change them."""
 
 def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
     """Return a compensated toolpath with marked poses, rounded as they will be written."""
-    moves = np.flatnonzero(toolpath.is_move)
+    moves = np.flatnonzero(toolpath.is_move & (toolpath.unknown == 0))
     if not len(moves):
         return toolpath
-    numbers = _numbers(toolpath.poses[moves], decimals)
+    numbers = _numbers(toolpath.numbers_written[moves], decimals)
     free = _free(toolpath, moves, decimals)
     can = np.flatnonzero(free.any(axis=1))
     bits = BITS[min(max(len(np.unique(_sums(numbers[can]))), 2), 4)]  # a pose that comes again counts once
@@ -84,8 +84,9 @@ def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
         _mark_many(numbers, free, can)
     else:
         _mark_few(numbers, free, can, bits)
-    poses = toolpath.poses.copy()
-    poses[moves] = numbers / 10.0 ** np.array(decimals)
+    written = toolpath.numbers_written
+    written[moves] = numbers / 10.0 ** np.array(decimals)
+    poses = toolpath.with_numbers(written).poses
     # Rows between moves stand where the move before them ended.
     before = np.searchsorted(moves, np.arange(len(poses)), side="right") - 1
     stands = ~toolpath.is_move & (before >= 0)
@@ -95,7 +96,7 @@ def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
 
 def is_marked(toolpath: Toolpath) -> bool:
     """Return whether more poses are marked than chance gives."""
-    poses = toolpath.poses[toolpath.is_move]
+    poses = toolpath.numbers_written[toolpath.is_move & (toolpath.unknown == 0)]
     for decimals in decimals_of(poses):
         sums = np.unique(_sums(_numbers(poses, decimals)))
         for bits in BITS.values():
@@ -184,7 +185,7 @@ def _free(toolpath: Toolpath, moves: NDArray[np.int64], decimals: Sequence[int])
     free = np.ones(poses.shape, dtype=np.bool_)
     free[:-1] &= moving
     free[1:] &= moving
-    free[0] &= toolpath.start is None
+    free[0] &= toolpath.start is None or np.isnan(toolpath.start)
     return free
 
 

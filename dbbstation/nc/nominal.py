@@ -34,7 +34,8 @@ def checksum(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> int:
     Comments, feeds, line numbers and units do not count.
     """
     told = np.isin(toolpath.kind, [RowKind.RAPID, RowKind.FEED, RowKind.DWELL, RowKind.PAUSE])
-    poses = np.where(toolpath.is_move[:, None], np.rint(toolpath.poses * 10.0 ** np.array(decimals)), 0.0)
+    counts = toolpath.is_move & (toolpath.unknown == 0)
+    poses = np.where(counts[:, None], np.rint(toolpath.numbers_written * 10.0 ** np.array(decimals)), 0.0)
     digest = hashlib.sha256()
     digest.update(toolpath.kind[told].astype("<i1").tobytes())
     digest.update(poses[told].astype("<i8").tobytes())
@@ -52,7 +53,7 @@ def check_nominal(toolpath: Toolpath) -> None:
     """
     said = any(text.startswith(COMPENSATED) for text in toolpath.text.values())
     how = "says its header" if said else ""
-    moved = toolpath.poses[toolpath.is_move]
+    moved = toolpath.numbers_written[toolpath.is_move]
     if (
         not how
         and toolpath.numbers

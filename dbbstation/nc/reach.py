@@ -70,10 +70,10 @@ class _Poses:
 
     def __init__(self, toolpath: Toolpath, row: NDArray[np.int64], share: NDArray[np.float64]) -> None:
         poses = toolpath.between(row, share)
-        known = ~np.isnan(poses[:, 0]) & toolpath.is_move[row]
+        known = toolpath.is_move[row]
         self.row, self.poses = row[known], poses[known]
-        if toolpath.start is not None and len(row) and row[0] == 0:
-            self.row, self.poses = np.concatenate([[0], self.row]), np.vstack([toolpath.start, self.poses])
+        if len(row) and row[0] == 0:
+            self.row, self.poses = np.concatenate([[0], self.row]), np.vstack([toolpath.before[:1], self.poses])
 
     def first_outside(self, machine: Machine) -> int | None:
         """Return the first pose outside the travel, or None."""

@@ -138,8 +138,8 @@ def runs_of(toolpath: Toolpath, needed_mm: NDArray[np.float64]) -> NDArray[np.in
     short = cuts & (np.bincount(moves, weights=toolpath.tip_mm)[moves] < ALMOST * needed_mm)
     way = toolpath.poses[:, :3] - toolpath.before[:, :3]
     along = np.einsum("ni,ni->n", way[1:], way[:-1]) >= COSINE * toolpath.tip_mm[1:] * toolpath.tip_mm[:-1]
-    alike = (toolpath.feed[1:] == toolpath.feed[:-1]) & (toolpath.system[1:] == toolpath.system[:-1])
-    joined = (short[1:] | short[:-1]) & cuts[1:] & cuts[:-1] & along & alike & (toolpath.corners_mm[:-1] != 0.0)
+    alike = (toolpath.feed[1:] == toolpath.feed[:-1]) & (toolpath.offset[1:] == toolpath.offset[:-1])
+    joined = (short[1:] | short[:-1]) & cuts[1:] & cuts[:-1] & along & alike & ~(toolpath.corners_mm[:-1] <= 0.0)
     joined |= moves[1:] == moves[:-1]
     runs: NDArray[np.int64] = np.concatenate([[0], np.cumsum(~joined)])
     return runs
@@ -229,8 +229,6 @@ def with_begins(at_places: NDArray[np.float64], start: NDArray[np.float64]) -> N
         start: before the first piece, shape (6,).
     """
     begins = np.vstack([start, at_places[:-1, -1]])
-    # Where nobody knows where the machine stands, a piece begins where it ends.
-    begins = np.where(np.isnan(begins), at_places[:, -1], begins)
     return np.concatenate([begins[:, None], at_places], axis=1)
 
 

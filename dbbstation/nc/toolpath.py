@@ -45,7 +45,7 @@ class RowKind(IntEnum):
     MESSAGE = 7
     """What the control shows or writes to a file: its keyword, a comma, the text, as in `MSG, hello`."""
     SYSTEM = 8
-    """From here on numbers count in this work coordinate system, `G54` to `G59.3`."""
+    """From here on numbers count otherwise: `G54` to `G59.3`, `G10 L2 …`, `G43 H1`, `G49`."""
 
 
 class Ending(StrEnum):
@@ -57,11 +57,11 @@ class Ending(StrEnum):
     """With its text, between percent signs: spindle and coolant stay as they are."""
 
 
-ACTIVE_SYSTEM, MACHINE_SYSTEM = -1, 0
-"""Coordinates in which numbers count: the work system that the control happens to have; the machine's own (G53)."""
+IN_FORCE = "in force"
+"""In place of a work system: the one that the control has when the program begins."""
 
-BY_INCREMENTS = -2
-"""In place of a system: the axis was moved by an increment from a place that had been named in another system."""
+EXACT_STOP_MM = -1.0
+"""Rounding of moves that stop at their ends (G61.1), beside 0 for the exact path (G61)."""
 
 SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 """Work coordinate systems in order, from number 1."""
@@ -78,22 +78,25 @@ class Toolpath:
     Attributes:
         name: for messages; the file if it was read from one.
         kind: `RowKind` of each row, shape (n,).
-        poses: [X, Y, Z, A, B, C] after each row, shape (n, 6) [mm, deg]; NaN before the first move if the place is unknown.
+        poses: [X, Y, Z, A, B, C] after each row in machine coordinates, without tool length, shape (n, 6) [mm, deg].
         feed_mm_min: of `FEED` rows along the tip's path, shape (n,); NaN in other rows.
         feed_deg_min: of `FEED` rows that only turn, shape (n,); NaN in other rows.
         dwell_s: of `DWELL` rows, shape (n,); zero in other rows.
         line: of the program, from 1, shape (n,); 0 if there is none.
         text: words of `PAUSE`, `COMMENT` and `FUNCTION` rows, by row.
-        start: pose before the first row, shape (6,); None where unknown.
-        corners_mm: rounding allowed at the end of each row, shape (n,): 0 exact, infinite unlimited, NaN not stated.
-        system: of each row's numbers, shape (n,): `MACHINE_SYSTEM`, `ACTIVE_SYSTEM`, or 1 to 9 for `SYSTEMS`.
-        frame: system in which each axis was named last, shape (n, 6): as `system`, or `BY_INCREMENTS`.
-        guard: not None if the program ends before it moves when one of these systems, G92 or a tool length is not zero.
+        start: pose before the first row, shape (6,), NaN for unknown axes; None: all are.
+        corners_mm: rounding allowed at the end of each row, shape (n,): 0 exact, `EXACT_STOP_MM`, infinite unlimited, NaN not stated.
+        offset: row of `offsets` by which numbers of each row are less than its pose, shape (n,).
+        offsets: work offset, G92 and tool length together, shape (k, 6) [mm, deg]; the first is zero.
+        unknown: axes of which the program does not know where they stand, a bit each, shape (n,): such a row must not name them.
+        in_machine: moves in machine coordinates (G53), shape (n,).
+        holds: offsets and tool lengths that the poses are right for, by `IN_FORCE`, `G54`, `G92`, `H1`, each shape (6,); a control
+            that can checks them before it moves. None: not stated.
         units_said: whether the program states its unit of length.
         numbers: first and last line number; a compensated program carries its checksum in the first.
         run: number of the program among those that are written together, from 1.
-        arc: centre X, Y [mm] and spanned angle of a chord [rad], counter-clockwise positive, shape (n, 3); angle 0 in straight
-            rows. None: no arcs.
+        arc: centre [mm] in the first and second axis of its plane, spanned angle of a chord [rad], counter-clockwise positive, plane
+            as in `PLANES`, shape (n, 4); angle 0 in straight rows. None: no arcs.
     """
 
     name: str
@@ -104,11 +107,13 @@ class Toolpath:
     dwell_s: NDArray[np.float64]
     line: NDArray[np.int64]
     corners_mm: NDArray[np.float64]
-    system: NDArray[np.int8]
-    frame: NDArray[np.int8]
+    offset: NDArray[np.int32]
+    offsets: NDArray[np.float64]
+    unknown: NDArray[np.uint8]
+    in_machine: NDArray[np.bool_]
     text: Mapping[int, str] = field(default_factory=dict)
     start: NDArray[np.float64] | None = None
-    guard: tuple[str, ...] | None = None
+    holds: Mapping[str, tuple[float, ...]] | None = None
     ending: Ending = Ending.STOP
     units_said: bool = True
     numbers: tuple[int, ...] = ()
@@ -144,9 +149,10 @@ class Toolpath:
             feed_deg_min=self.feed_deg_min[row],
             dwell_s=self.dwell_s[row],
             line=self.line[row],
-            corners_mm=np.where((corners == 0.0) & ~last, PIECE_CORNER_MM, corners),
-            system=self.system[row],
-            frame=self.frame[row],
+            corners_mm=np.where((corners <= 0.0) & ~last, PIECE_CORNER_MM, corners),
+            offset=self.offset[row],
+            unknown=self.unknown[row],
+            in_machine=self.in_machine[row],
             text=MappingProxyType({place[old]: text for old, text in self.text.items()}),
             arc=None,
         )
@@ -167,8 +173,9 @@ class Toolpath:
             dwell_s=self.dwell_s[rows],
             line=self.line[rows],
             corners_mm=self.corners_mm[rows],
-            system=self.system[rows],
-            frame=self.frame[rows],
+            offset=self.offset[rows],
+            unknown=self.unknown[rows],
+            in_machine=self.in_machine[rows],
             text=MappingProxyType({}),
             arc=None if self.arc is None else self.arc[rows],
         )
@@ -181,9 +188,17 @@ class Toolpath:
     @cached_property
     def before(self) -> NDArray[np.float64]:
         """Return the pose before each row, shape (n, 6) [mm, deg]; the pose after it if the place is not known."""
-        start = np.full(6, np.nan) if self.start is None else self.start
-        before = np.vstack([start, self.poses])[:-1]
-        return np.where(np.isnan(before), self.poses, before)
+        first = self.poses[:1] if self.start is None else np.where(np.isnan(self.start), self.poses[:1], self.start)
+        return np.vstack([first, self.poses])[: len(self)]
+
+    @property
+    def numbers_written(self) -> NDArray[np.float64]:
+        """Return what is written for each pose, shape (n, 6): less work offsets and tool length."""
+        return self.poses - self.offsets[self.offset]
+
+    def with_numbers(self, numbers: NDArray[np.float64]) -> Toolpath:
+        """Return the toolpath with other written numbers, shape (n, 6)."""
+        return replace(self, poses=numbers + self.offsets[self.offset])
 
     @cached_property
     def tip_mm(self) -> NDArray[np.float64]:
@@ -232,7 +247,9 @@ class Toolpath:
         inside = before + share[:, None] * (after - before)
         if self.arc is not None:
             chord = np.flatnonzero(self.arc[row, 2] != 0.0)
-            inside[chord, :2] = _on_arc(before[chord, :2], after[chord, :2], self.arc[row[chord]], share[chord])
+            arc, plane = self.arc[row[chord]], PLANES[self.arc[row[chord], 3].astype(np.int64)]
+            first, last = (np.take_along_axis(each[chord], plane, axis=1) for each in (before, after))
+            inside[chord[:, None], plane] = _on_arc(first, last, arc, share[chord])
         # The end of a row is its programmed pose to the last bit.
         return np.where(share[:, None] == 1.0, after, inside)
 
@@ -246,17 +263,20 @@ class Toolpath:
         return np.where(np.isnan(pieces), 1.0, pieces).astype(np.int64)
 
     def _interpolated(self, at: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
-        known = ~np.isnan(self.poses[:, 0])
-        if not known.any():
+        if not len(self):
             raise ValueError(f"{self.name} has no moves")
-        first = int(np.argmax(known))
-        ends = np.concatenate([[0.0 if first == 0 else ends[first - 1]], ends[known]])
-        nodes = np.vstack([self.before[first], self.poses[known]])
+        nodes = np.vstack([self.before[:1], self.poses])
+        ends = np.concatenate([[0.0], ends])
         return np.column_stack([np.interp(at, ends, nodes[:, axis]) for axis in range(6)])
 
 
 _NO_FEED = (np.nan, np.nan)
-_STRAIGHT = (0.0, 0.0, 0.0)
+_STRAIGHT = (0.0, 0.0, 0.0, 0.0)
+
+PLANES = np.array([[0, 1], [2, 0], [1, 2]])
+"""First and second axis of G17, G18 and G19: counter-clockwise leads from the first to the second."""
+
+ALL_AXES = 0b111111
 
 
 class _Rows(NamedTuple):
@@ -268,56 +288,53 @@ class _Rows(NamedTuple):
     dwell_s: float
     line: int
     corner_mm: float
-    system: int
-    frame: NDArray[np.int8]
-    arc: tuple[float, float, float]
+    offset: int
+    unknown: int
+    in_machine: bool
+    arc: tuple[float, float, float, float]
 
 
 class ToolpathBuilder:
     """Collects the rows of a toolpath.
 
     Args:
-        start: pose before the first row, shape (6,) [mm, deg]; None if unknown.
+        start: pose before the first row, shape (6,) [mm, deg], NaN for unknown axes; None if all are.
 
     Attributes:
         corner_mm: rounding allowed in the moves that follow; None: not stated.
-        system: of the numbers that follow, as `Toolpath.system`.
-        increments: whether numbers are increments.
+        unknown: axes of which nobody knows where they stand, a bit each; a move that names or feeds them makes them known.
     """
 
     def __init__(self, name: str, start: NDArray[np.float64] | None = None) -> None:
         self.name = name
         self.corner_mm: float | None = None
-        self.system = ACTIVE_SYSTEM
-        self.increments = False
-        self.guard: tuple[str, ...] | None = None
+        self.holds: dict[str, tuple[float, ...]] | None = None
         self.ending = Ending.STOP
         self.units_said = True
         self.numbers: tuple[int, ...] = ()
         self._start = start
         self._pose = np.full(6, np.nan) if start is None else np.asarray(start, dtype=np.float64)
-        self._frame = np.full(6, ACTIVE_SYSTEM, dtype=np.int8)
+        self.unknown = bits_of(np.isnan(self._pose))
+        self._offsets: dict[tuple[float, ...], int] = {(0.0,) * 6: 0}
+        self._offset = 0
         self._rows: list[_Rows] = []
         self._text: dict[int, str] = {}
         self._count = 0
 
-    def rapid(
-        self,
-        pose: NDArray[np.float64],
-        *,
-        line: int = 0,
-        named: Sequence[int] = range(6),
-        system: int | None = None,
-    ) -> None:
+    def count_from(self, offset: Sequence[float]) -> None:
+        """Set by how much numbers of the moves that follow are less than their poses, shape (6,) [mm, deg]."""
+        self._offset = self._offsets.setdefault(tuple(float(each) for each in offset), len(self._offsets))
+
+    def rapid(self, pose: NDArray[np.float64], *, line: int = 0, in_machine: bool = False, unknown: int = 0) -> None:
         """Add a move as fast as the machine can.
 
         Args:
-            pose: to go to, shape (6,) [mm, deg].
-            named: axes that the line names, 0 to 5.
-            system: of this move's numbers; None: unchanged.
+            pose: to go to, shape (6,) [mm, deg]; NaN for axes that are not known.
+            in_machine: it is written in machine coordinates.
+            unknown: axes that it leaves unknown.
         """
-        self._named(named, system)
-        self._add(RowKind.RAPID, pose[None], line=line, system=system)
+        self.unknown = unknown
+        self._add(RowKind.RAPID, pose[None], line=line, in_machine=in_machine)
 
     def feed(
         self,
@@ -326,22 +343,19 @@ class ToolpathBuilder:
         deg_min: float | None = None,
         *,
         line: int = 0,
-        named: Sequence[int] = range(6),
-        system: int | None = None,
-        arc: tuple[float, float, float] = _STRAIGHT,
+        in_machine: bool = False,
+        arc: tuple[float, float, float, float] = _STRAIGHT,
     ) -> None:
         """Add moves at a feed.
 
         Args:
             poses: to go through, shape (k, 6) [mm, deg].
             deg_min: of moves that only turn; None: `mm_min`.
-            named: axes that the line names, 0 to 5.
-            system: None: unchanged.
             arc: as a row of `Toolpath.arc`.
         """
-        self._named(named, system)
+        self.unknown = 0
         feed = (mm_min, mm_min if deg_min is None else deg_min)
-        self._add(RowKind.FEED, poses, feed, line=line, system=system, arc=arc)
+        self._add(RowKind.FEED, poses, feed, line=line, in_machine=in_machine, arc=arc)
 
     def dwell(self, seconds: float, *, line: int = 0) -> None:
         """Add a stop of known duration."""
@@ -370,30 +384,36 @@ class ToolpathBuilder:
         return self._text.get(self._count - 1, "")
 
     def built(self) -> Toolpath:
-        """Return the toolpath of all rows so far."""
+        """Return the toolpath of all rows so far; an axis stands where it is first named before that."""
         count = np.array([len(rows.poses) for rows in self._rows], dtype=np.int64)
 
         def each(values: list[Any], kind: type) -> NDArray[Any]:
             return np.repeat(np.array(values, dtype=kind), count, axis=0)
 
+        poses = np.vstack([np.empty((0, 6)), *(rows.poses for rows in self._rows)])
+        for axis in np.flatnonzero(np.isnan(poses).any(axis=0)):
+            known = np.flatnonzero(~np.isnan(poses[:, axis]))
+            poses[: known[0] if len(known) else None, axis] = poses[known[0], axis] if len(known) else 0.0
         return Toolpath(
             name=self.name,
             kind=each([rows.kind for rows in self._rows], np.int8),
-            poses=np.vstack([np.empty((0, 6)), *(rows.poses for rows in self._rows)]),
+            poses=poses,
             feed_mm_min=each([rows.feed[0] for rows in self._rows], np.float64),
             feed_deg_min=each([rows.feed[1] for rows in self._rows], np.float64),
             dwell_s=each([rows.dwell_s for rows in self._rows], np.float64),
             line=each([rows.line for rows in self._rows], np.int64),
             corners_mm=self._corners_mm(count),
-            system=each([rows.system for rows in self._rows], np.int8),
-            frame=each([rows.frame for rows in self._rows], np.int8).reshape(-1, 6),
+            offset=each([rows.offset for rows in self._rows], np.int32),
+            offsets=np.array(list(self._offsets)),
+            unknown=each([rows.unknown for rows in self._rows], np.uint8),
+            in_machine=each([rows.in_machine for rows in self._rows], np.bool_),
             text=MappingProxyType(dict(self._text)),
             start=self._start,
-            guard=self.guard,
+            holds=self.holds,
             ending=self.ending,
             units_said=self.units_said,
             numbers=self.numbers,
-            arc=each([rows.arc for rows in self._rows], np.float64).reshape(-1, 3),
+            arc=each([rows.arc for rows in self._rows], np.float64).reshape(-1, 4),
         )
 
     def __len__(self) -> int:
@@ -404,13 +424,8 @@ class ToolpathBuilder:
         corners = np.repeat(np.array([rows.corner_mm for rows in self._rows], dtype=np.float64), count)
         last = np.zeros(len(corners), dtype=np.bool_)
         last[np.cumsum(count) - 1] = True
-        inner: NDArray[np.float64] = np.where((corners == 0.0) & ~last, PIECE_CORNER_MM, corners)
+        inner: NDArray[np.float64] = np.where((corners <= 0.0) & ~last, PIECE_CORNER_MM, corners)
         return inner
-
-    def _named(self, named: Sequence[int], system: int | None) -> None:
-        frame, axes, counted = self._frame.copy(), list(named), self.system if system is None else system
-        frame[axes] = np.where((frame[axes] == counted) | (not self.increments), counted, BY_INCREMENTS)
-        self._frame = frame
 
     def _add(
         self,
@@ -420,15 +435,20 @@ class ToolpathBuilder:
         *,
         dwell_s: float = 0.0,
         line: int,
-        system: int | None = None,
-        arc: tuple[float, float, float] = _STRAIGHT,
+        in_machine: bool = False,
+        arc: tuple[float, float, float, float] = _STRAIGHT,
     ) -> None:
         corner_mm = np.nan if self.corner_mm is None else self.corner_mm
         poses = np.array(poses, dtype=np.float64)
-        counted = self.system if system is None else system
-        self._rows.append(_Rows(kind, poses, feed, dwell_s, line, corner_mm, counted, self._frame, arc))
+        offset = 0 if in_machine else self._offset
+        self._rows.append(_Rows(kind, poses, feed, dwell_s, line, corner_mm, offset, self.unknown, in_machine, arc))
         self._count += len(poses)
         self._pose = poses[-1]
+
+
+def bits_of(axes: NDArray[np.bool_]) -> int:
+    """Return axes, shape (6,), as a bit each."""
+    return int(axes @ (1 << np.arange(6)))
 
 
 def _on_arc(

@@ -6,6 +6,7 @@ faults. An error for missing words is none.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,7 +14,8 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.nc.mark import is_marked, marked
-from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, RowKind, ToolpathBuilder
+from dbbstation.nc.toolpath import IN_FORCE, Ending, RowKind, ToolpathBuilder
+from dbbstation.nc.words import WordDialect
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -64,7 +66,17 @@ def faults_of(dialect: Dialect) -> list[str]:
     if not faults:
         wrote = _built(has_words)
         faults = _differences(wrote, _read(dialect, wrote), "all in one program")
-    return faults or _faults_of_mark(dialect)
+    return faults or _faults_of_guard(dialect, moves) or _faults_of_mark(dialect)
+
+
+def _faults_of_guard(dialect: Dialect, moves: Toolpath) -> list[str]:
+    """Return whether the check of offsets changes what is read, or is lost where the dialect has one."""
+    guarded = replace(moves, holds={IN_FORCE: (0.0,) * 6})
+    faults = _differences(moves, _read(dialect, guarded), "a check of offsets")
+    checks = isinstance(dialect, WordDialect) and type(dialect).guard is not WordDialect.guard
+    if not faults and checks and dialect.write(guarded) == dialect.write(moves):
+        return ["it loses the check of offsets"]
+    return faults
 
 
 def _faults_of_mark(dialect: Dialect) -> list[str]:
@@ -116,12 +128,11 @@ def _said(kind: RowKind, *texts: str) -> Callable[[ToolpathBuilder], None]:
 
 def _systems(path: ToolpathBuilder) -> None:
     path.say(RowKind.SYSTEM, "G55")
-    path.system = SYSTEMS.index("G55") + 1
     path.rapid(FIRST)
 
 
 def _machine(path: ToolpathBuilder) -> None:
-    path.rapid(_from_first([0, 0, 50, 0, 0, 0]), system=MACHINE_SYSTEM)
+    path.rapid(_from_first([0, 0, 50, 0, 0, 0]), in_machine=True)
     path.rapid(FIRST)
 
 
@@ -129,10 +140,6 @@ def _corners(path: ToolpathBuilder) -> None:
     for number, corner_mm in enumerate((0.0, 0.02, np.inf)):
         path.corner_mm = corner_mm
         path.feed(_from_first([0, 1 + number, 0, 0, 0, 0])[None], 500.0)
-
-
-def _guard(path: ToolpathBuilder) -> None:
-    path.guard = ()
 
 
 def _ends(ending: Ending) -> Callable[[ToolpathBuilder], None]:
@@ -155,7 +162,6 @@ THINGS: dict[str, Callable[[ToolpathBuilder], None]] = {
     "a work system": _systems,
     "machine coordinates": _machine,
     "path control": _corners,
-    "a guard against offsets": _guard,
     "an end without M2": _ends(Ending.TEXT),
     "M30": _ends(Ending.REWIND),
 }
@@ -218,8 +224,6 @@ def _with_messages(path: Toolpath) -> dict[int, str | None]:
 
 def _rows(path: Toolpath) -> Iterator[_Row]:
     """Return rows that act on a machine, with modal changes."""
-    if path.guard is not None:
-        yield _Row(" ".join(["a guard against offsets", *path.guard]))
     feeds, corner, texts = path.feed, np.nan, _with_messages(path)
     for row, kind in enumerate(path.kind.tolist()):
         text = texts.get(row, "")
@@ -227,7 +231,7 @@ def _rows(path: Toolpath) -> Iterator[_Row]:
             if not np.array_equal(path.corners_mm[row], corner, equal_nan=True):
                 corner = float(path.corners_mm[row])
                 yield _Row("corners within", (corner,), (SHARE_WITHIN * abs(np.nan_to_num(corner)),))
-            system = " in machine coordinates" if path.system[row] == MACHINE_SYSTEM else ""
+            system = " in machine coordinates" if path.in_machine[row] else ""
             pose = tuple(path.poses[row].tolist())
             yield _Row(f"{'rapid' if kind == RowKind.RAPID else 'feed'}{system} to", pose, (POSE_WITHIN,) * 6)
             if kind == RowKind.FEED:

@@ -7,17 +7,16 @@ name and line.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.nc.dialect import Dialect
-from dbbstation.nc.toolpath import MACHINE_SYSTEM, RowKind, rounded
+from dbbstation.nc.toolpath import RowKind, rounded
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -80,12 +79,12 @@ class WordDialect(Dialect):
             CannotSayError: the dialect has no words for something in it.
         """
         # What does not move by the decimals that are written does not move.
-        toolpath = replace(toolpath, poses=rounded(toolpath.poses, self.decimals))
+        toolpath = toolpath.with_numbers(rounded(toolpath.numbers_written, self.decimals))
         yield from self.before_header(toolpath)
         for text in header:
             yield self.comment(text)
-        if toolpath.guard is not None:
-            yield self.guard(toolpath.guard)
+        if toolpath.holds is not None:
+            yield from self.guard(toolpath.holds)
         corner_mm = toolpath.corner_mm
         around = [*self.begin(toolpath), *([] if corner_mm is None else [self.corner(corner_mm)])]
         if toolpath.numbers and around:
@@ -150,13 +149,17 @@ class WordDialect(Dialect):
         """Return words of spindle and coolant that every control knows: `S800 M3`."""
         raise self.cannot_say(words)
 
-    def system(self, name: str) -> str:
-        """Return the work system, `G54` to `G59.3`."""
-        raise self.cannot_say(f"the work system {name}")
+    def system(self, text: str) -> str:
+        """Return the words of a `SYSTEM` row: work system, offset or tool length."""
+        raise self.cannot_say(text)
 
-    def guard(self, systems: Sequence[str]) -> str:  # noqa: ARG002
-        """Return lines that end the program if an offset of these work systems is not zero."""
-        raise self.cannot_say("a stop where offsets are not zero")
+    def guard(self, holds: Mapping[str, Sequence[float]]) -> Iterable[str]:  # noqa: ARG002
+        """Return lines that end the program if offsets are not as `Toolpath.holds` says; none if the control cannot."""
+        return ()
+
+    def length_guard(self, text: str, holds: Mapping[str, Sequence[float]], row: int) -> Iterable[str]:  # noqa: ARG002
+        """Return the same for a tool length that `text` brings in force."""
+        return ()
 
     def cannot_say(self, what: str) -> CannotSayError:
         """Return the error for something that this dialect has no words for."""
@@ -169,17 +172,20 @@ class WordDialect(Dialect):
             rows = slice(begin, min(begin + AT_ONCE, len(toolpath)))
             words = self._words(toolpath, changed, rows)
             kinds, feeds = toolpath.kind[rows].tolist(), toolpath.feed[rows].tolist()
-            corners, systems = toolpath.corners_mm[rows].tolist(), toolpath.system[rows].tolist()
+            corners, in_machine = toolpath.corners_mm[rows].tolist(), toolpath.in_machine[rows].tolist()
             for place, kind in enumerate(kinds):
                 try:
                     if kind not in _MOVES:
                         yield self._row(RowKind(kind), toolpath, begin + place)
+                        if kind == RowKind.SYSTEM:
+                            said = toolpath.text[begin + place]
+                            yield from self.length_guard(said, toolpath.holds or {}, begin + place)
                         continue
                     if corners[place] != state.corner_mm and not math.isnan(corners[place]):
                         state.corner_mm = corners[place]
                         yield self.corner(corners[place])
                     line = self._move(kind, words[place], feeds[place], state)
-                    yield self.in_machine(line) if systems[place] == MACHINE_SYSTEM else line
+                    yield self.in_machine(line) if in_machine[place] else line
                 except CannotSayError as error:
                     source = int(toolpath.line[begin + place])
                     where = f"{toolpath.name}:{source}" if source else toolpath.name
@@ -209,7 +215,7 @@ class WordDialect(Dialect):
 
     def _words(self, toolpath: Toolpath, changed: NDArray[np.bool_], rows: slice) -> list[str]:
         """Return words of the axes that each row moves; empty for other rows."""
-        poses, changed = toolpath.poses[rows], changed[rows]
+        poses, changed = toolpath.numbers_written[rows], changed[rows]
         texts = [""] * len(poses)
         which = changed @ (1 << np.arange(6))
         for one in np.unique(which):
@@ -233,22 +239,26 @@ class _Modal:
 _MOVES = frozenset((int(RowKind.RAPID), int(RowKind.FEED)))
 
 
+SAME = 1e-9
+"""Places that differ by less are one: numbers and offsets have fifteen digits [mm, deg]."""
+
+
 def changed_axes(toolpath: Toolpath) -> NDArray[np.bool_]:
     """Return axes that each row must name, shape (n, 6); none in rows that are no moves.
 
-    A row names changed axes and axes last named in another system. The first move names all, except axes at the program's
-    start.
+    A row names axes that change or become known, and never unknown ones. The first move names all known axes, except those
+    at the program's start.
     """
     moves = np.flatnonzero(toolpath.is_move)
-    poses, frame = toolpath.poses[moves], toolpath.frame[moves]
-    home = frame == toolpath.system[moves][:, None]
-    must = np.ones(poses.shape, dtype=np.bool_)
-    must[1:] = (poses[1:] != poses[:-1]) | (home[1:] & (frame[1:] != frame[:-1]))
-    if toolpath.start is not None and len(moves):
-        must[0] = home[0] | (poses[0] != toolpath.start)
+    poses = toolpath.poses[moves]
+    known = (toolpath.unknown[moves][:, None] >> np.arange(6)) & 1 == 0
+    start = np.full(6, np.nan) if toolpath.start is None else toolpath.start
+    before = np.vstack([start, poses])[: len(poses)]
+    was_known = np.vstack([~np.isnan(start), known])[: len(poses)]
+    must = known & (~was_known | ~(np.abs(poses - before) <= SAME))
     # A move to where the machine stands already is a move: most controls want an axis in it.
     stays = ~must.any(axis=1)
-    must[stays] = home[stays] & (np.cumsum(home[stays], axis=1) == 1)
+    must[stays] = known[stays] & (np.cumsum(known[stays], axis=1) == 1)
     named = np.zeros((len(toolpath), 6), dtype=np.bool_)
     named[moves] = must
     return named

@@ -20,12 +20,12 @@ from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.registry import dialect_of_file
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.programs import ProgramsResult, programs_result
-from dbbstation.tasks.programs import inverse_of, origin_of, program_text, sha256_of
+from dbbstation.tasks.programs import inverse_of, origin_of, program_text, setup_of, sha256_of
 from dbbstation.tasks.provenance import from_python
 from dbbstation.tasks.telling import Telling, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -40,6 +40,9 @@ UNITS_NOT_SAID = (
 )
 
 
+OLDER = "the {} is older than the program: its values may be from before the last touch-off"
+
+
 @in_a_book
 def compensate(
     program: str | PathLike[str],
@@ -49,6 +52,11 @@ def compensate(
     dialect: str = "linuxcnc",
     written_in: str | None = None,
     start: ArrayLike | None = None,
+    angles_deg: ArrayLike | None = None,
+    offsets: Mapping[str, Sequence[float]] | None = None,
+    parameters: str | PathLike[str] | None = None,
+    tool_lengths_mm: Mapping[int, float] | None = None,
+    tools: str | PathLike[str] | None = None,
     chord_um: float = 1e3 * CHORD_MM,
     prefer: str = "accuracy",
     strict: bool = False,
@@ -63,12 +71,17 @@ def compensate(
     """Compensate an NC program, so that the real machine follows `program`.
 
     Args:
-        program: file in machine coordinates, whole, not compensated, of no other machine.
+        program: file, whole, not compensated, of no other machine.
         model: a model, its file, or the result of `calibrate` or `diagnose`.
         out: file; None: only the text in the result.
         dialect: to write: a name, or a Python file.
         written_in: dialect of `program`; None: by its extension.
-        start: pose before the program, X, Y, Z [mm], A, B, C [deg]; None: its first move names all six.
+        start: pose before the program in machine coordinates, X, Y, Z [mm], A, B, C [deg]; None: its first rapids tell.
+        angles_deg: A, B, C at which a program of three axes runs; None: it names them.
+        offsets: `G54` to `G59.3`, `G92`, `G28`, `G30` of the control, X, Y, Z or X to C [mm, deg]; work offsets not given are zero.
+        parameters: LinuxCNC's parameter file, for offsets not given.
+        tool_lengths_mm: by number of the tool, for G43.
+        tools: LinuxCNC's tool table, for lengths not given.
         chord_um: greatest distance of a move from the path.
         prefer: `accuracy`, or `position-only` to leave A, B and C as they are.
         strict: refuse a program that misses the chord error or a feed.
@@ -88,16 +101,24 @@ def compensate(
         ModelError: the model has a source that needs what a program lacks.
         MachineError: a feed that the machine does not reach.
         StationError: the control corrects already; the program is compensated or for another machine, corrections are too large, or `strict` refuses it.
-        ValueError: an unknown `prefer`, or `start` is no pose.
+        ValueError: an unknown `prefer` or offset, or `start` is no pose.
     """
     source = Path(program)
-    pose = None if start is None else np.asarray(start, dtype=np.float64).reshape(6)
+    pose = np.full(6, np.nan) if start is None else np.array(start, dtype=np.float64).reshape(6)
+    if angles_deg is not None:
+        pose[3:] = np.asarray(angles_deg, dtype=np.float64).reshape(3)
+    files = {
+        what: Path(file) for what, file in (("parameter file", parameters), ("tool table", tools)) if file is not None
+    }
+    setup = None
+    if offsets or tool_lengths_mm or files:
+        setup = setup_of(offsets or {}, tool_lengths_mm or {}, files.get("parameter file"), files.get("tool table"))
     if out is not None:
         refuse_existing(Path(out), force=force)
     writer = dialect_given(dialect)
     text = program_text(source)
     reader = dialect_of_file(str(source), text) if written_in is None else dialect_given(written_in)
-    path = reader.toolpath(text, str(source), start=pose)
+    path = reader.toolpath(text, str(source), start=None if np.isnan(pose).all() else pose, setup=setup)
     inverse = inverse_of(
         model,
         known,
@@ -115,7 +136,8 @@ def compensate(
     telling.note(*warnings)
     if not path.units_said:
         telling.note(UNITS_NOT_SAID)
-    origin = origin_of({"program file": source}, inverse, provenance())
+    telling.note(*(OLDER.format(what) for what, file in files.items() if file.stat().st_mtime < source.stat().st_mtime))
+    origin = origin_of({"program file": source, **files}, inverse, provenance())
     done = compensated_program(path, writer, inverse, chord_mm=chord_um / 1e3, origin=origin)
     if out is not None:
         write_text(Path(out), done.text, force=force)

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.source_text import read_bytes
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse
+from dbbstation.nc.setup import FIRST_PARAMETERS, Setup, lengths_of, parameters_of
 from dbbstation.results.model_warnings import model_warnings, unknown_causes
 from dbbstation.tasks.models import model_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from dbbstation.files.provenance import Provenance
     from dbbstation.sources.contract import ErrorSource
@@ -77,16 +79,49 @@ def sha256_of(path: Path) -> str:
 
 
 def program_text(path: Path) -> str:
-    """Return the text of a program.
+    """Return the text of a program: UTF-8, UTF-16 with its mark, else Windows' letters, which only comments have.
 
     Raises:
-        InputError: it cannot be read, or is not UTF-8.
+        InputError: it cannot be read.
     """
-    faults: list[Problem] = []
-    text = decode(_content(path), str(path), faults)
-    if text is None:
-        raise InputError(faults)
-    return text
+    data = _content(path)
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
+
+
+def setup_of(
+    offsets: Mapping[str, Sequence[float]],
+    lengths: Mapping[int, float],
+    parameters: Path | None,
+    tools: Path | None,
+) -> Setup:
+    """Return the offsets and tool lengths of a control as declared and from its files; what is declared comes first.
+
+    Args:
+        offsets: X, Y, Z, and A, B, C if not zero, of `G54` to `G59.3`, `G92`, `G28` and `G30` [mm, deg].
+        lengths: of tools by number [mm].
+        parameters: LinuxCNC's parameter file.
+        tools: its tool table.
+
+    Raises:
+        InputError: faults of the files.
+        ValueError: an unknown place, or not three or six numbers.
+    """
+    places = {}
+    for name, values in offsets.items():
+        if name not in FIRST_PARAMETERS or len(values) not in {3, 6}:
+            raise ValueError(
+                f"{name} with {len(values)} numbers is no offset: G54 to G59.3, G92, G28, G30 have three or six"
+            )
+        places[name] = tuple([*map(float, values), 0.0, 0.0, 0.0][:6])
+    table = {} if tools is None else lengths_of(program_text(tools), str(tools))
+    own = {tool: (0.0, 0.0, float(length), 0.0, 0.0, 0.0) for tool, length in lengths.items()}
+    known = None if parameters is None else parameters_of(program_text(parameters), str(parameters))
+    return Setup(places, table | own, known)
 
 
 def _content(path: Path) -> bytes:

@@ -14,9 +14,10 @@ import numpy as np
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.nc.dialect import plain
-from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, RowKind, ToolpathBuilder
+from dbbstation.nc.toolpath import Ending, RowKind, ToolpathBuilder
 from dbbstation.nc.words import WordDialect, digits
 
+SYSTEMS = ("G54", "G55", "G56", "G57")
 BEGIN = "G90 G94 G71 G17 G40"
 GUARD = 'MSG("work offset and tool length must be zero: check, then continue")'
 NAMES = re.compile(r'MSG\("(?P<text>[^"]*)"\)')
@@ -79,15 +80,15 @@ class Sinumerik(WordDialect):
             raise self.cannot_say(words)
         return words
 
-    def system(self, name):
+    def system(self, text):
         """G54 to G57; what others call G58 and G59 are offsets of another kind here."""
-        if name not in SYSTEMS[:4]:
-            raise self.cannot_say(f"the work system {name}")
-        return name
+        if text not in SYSTEMS:
+            raise self.cannot_say(text)
+        return text
 
-    def guard(self, systems):  # noqa: ARG002 - the operator looks at all of them
+    def guard(self, holds):  # noqa: ARG002 - the operator looks at all of them
         """A stop: the operator looks, since the program does not."""
-        return f'{GUARD}\nM0\nMSG("")'
+        return [GUARD, "M0", 'MSG("")']
 
     def read(self, text, name, *, start=None):
         """Return what a program commands, line by line."""
@@ -130,7 +131,6 @@ class _Reader:
         elif first == "G4":
             self.path.dwell(float(words[0][1:]), line=line)
         elif first in SYSTEMS:
-            self.path.system = SYSTEMS.index(first) + 1
             self.path.say(RowKind.SYSTEM, first, line=line)
         elif first in {"G60", "G64", "G641"}:
             self.path.corner_mm = {"G60": 0.0, "G64": math.inf}.get(first) if not words else float(words[0][5:])
@@ -144,21 +144,17 @@ class _Reader:
 
     def stop(self, line):
         """A stop with the message before it, or the guard."""
-        if message(self.shown) == GUARD and math.isnan(self.pose[0]):
-            self.path.guard = ()
-        else:
+        if message(self.shown) != GUARD:
             self.path.say(RowKind.PAUSE, self.shown, line=line)
         self.shown = ""
 
     def move(self, words, line):
         """A move to the axes that it names."""
-        system = MACHINE_SYSTEM if words[0] == "G53" else None
         numbers = {word[0]: float(word[1:]) for word in words if word[0] != "G"}
         self.feed = numbers.pop("F", self.feed)
-        named = ["XYZABC".index(axis) for axis in numbers]
         self.pose = self.pose.copy()
-        self.pose[named] = list(numbers.values())
+        self.pose[["XYZABC".index(axis) for axis in numbers]] = list(numbers.values())
         if "G0" in words:
-            self.path.rapid(self.pose, line=line, named=named, system=system)
+            self.path.rapid(self.pose, line=line, in_machine=words[0] == "G53")
         else:
-            self.path.feed(self.pose[None], self.feed, line=line, named=named, system=system)
+            self.path.feed(self.pose[None], self.feed, line=line, in_machine=words[0] == "G53")

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.rs274.guard import guard_lines
-from dbbstation.nc.toolpath import RowKind, ToolpathBuilder
+from dbbstation.nc.toolpath import IN_FORCE, RowKind, ToolpathBuilder
 from dbbstation.nc.words import digits
 from dbbstation.plan.circle import Circle, Direction
 
@@ -26,7 +26,7 @@ SMALL = Circle(
     direction=Direction.CCW,
 )
 
-GUARD = "\n".join(guard_lines())
+GUARD = "\n".join(guard_lines({IN_FORCE: (0.0,) * 6}))
 
 # From 270 degrees (-Y) counter-clockwise through 540 degrees to 90 degrees (+Y), a point every 90 degrees. The chord
 # error is 100 (1 - cos 45°) = 29.289322 mm, and as much may be cut off the corners.

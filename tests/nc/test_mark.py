@@ -37,8 +37,9 @@ def in_inches(text: str) -> str:
 
 def edited(text: str) -> str:
     """Slower, without its stop, with a move of one's own at the end, and a part taken out."""
-    lines = [line for line in without_numbers(text).splitlines() if line != "M0"]
-    del lines[5]
+    lines = [line for line in without_numbers(text).splitlines() if line[0] != ";"]
+    begin = lines.index("G21 G90 G94 G17 G40 G49")
+    lines = [*lines[: begin + 5], *(line for line in lines[begin + 6 :] if line != "M0")]
     lines[-1:] = ["G1 X100 F50", "M2"]
     return re.sub(r"F500", "F77", "\n".join(lines) + "\n")
 

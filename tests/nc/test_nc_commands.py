@@ -189,9 +189,15 @@ def test_a_start_pose_lets_a_program_begin_anywhere(tmp_path, model_file):
 def test_bad_files_are_told(tmp_path, model_file):
     with pytest.raises(InputError, match="no such file"):
         run(compensate, tmp_path / "none.ngc", "--model", model_file, "--out", tmp_path / "x.ngc")
-    (tmp_path / "latin.ngc").write_bytes(b"G0 X1\n(\xb5)\n")
-    with pytest.raises(InputError, match=r"latin\.ngc:2:2"):
-        run(compensate, tmp_path / "latin.ngc", "--model", model_file, "--out", tmp_path / "x.ngc")
+
+
+def test_comments_may_be_in_any_letters(tmp_path, model_file):
+    for number, letters in enumerate(("cp1252", "utf-8-sig", "utf-16", "latin-1")):
+        part, out = tmp_path / f"{number}.ngc", tmp_path / f"{number}-true.ngc"
+        text = "G21 G90 (Fräser Ø 6 µm)\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X10 F100\nM2\n"
+        part.write_bytes(text.replace("\n", "\r" if number == 1 else "\n").encode(letters))
+        run(compensate, part, "--model", model_file, "--out", out)
+        assert "; Fr?ser ? 6 um" in out.read_text()
 
 
 @pytest.mark.parametrize("command", [program, compensate])

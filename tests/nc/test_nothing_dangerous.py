@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import resource
 import subprocess
 import sys
@@ -382,7 +383,7 @@ def rewritten(text: str) -> str:
 
 
 def without_first_number(text: str) -> str:
-    return bare(text).split(" ", 1)[1]
+    return re.sub(r"(?m)^N\d+ ", "", bare(text), count=1)
 
 
 @pytest.mark.parametrize("change", [str, bare, rewritten, without_first_number])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -53,7 +55,7 @@ def test_linuxcnc_reads_back_what_was_written(first, steps):
     np.testing.assert_allclose(read.feed, written.feed, rtol=1e-6)
     np.testing.assert_allclose(read.dwell_s, written.dwell_s, rtol=1e-6, atol=1e-15)
     assert read.text == written.text
-    assert dialect.write(read) == text
+    assert dialect.write(replace(read, holds=None)) == text
 
 
 @pytest.mark.parametrize("step", [4, pytest.param(1, marks=pytest.mark.nightly)])

@@ -15,11 +15,12 @@ import pytest
 
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, compensated_program
+from dbbstation.nc.setup import Setup
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from tests.nc.grammar import part
 from tests.nc.interpreter import events, needs_rs274
-from tests.nc.through_rs274 import MOVES, DiffersError, compare, compare_elsewhere
+from tests.nc.through_rs274 import MOVES, DiffersError, compare
 
 pytestmark = needs_rs274
 
@@ -33,6 +34,29 @@ PASSED = os.environ.get("DBBSTATION_FUZZ_PASSED")
 OFFSETS = {5220: 2, 5221: 10.0, 5222: -3.0, 5223: 1.0, 5224: 2.0, 5241: -7.0, 5242: 4.0, 5243: 2.0, 5246: 3.0}
 """G55 in force, G54 and G55 both off zero: 254 mm in X and more [in, deg]."""
 
+PLACES = {
+    "G54": (4.0, -3.0, 5.0, 0.5, -0.4, 0.3),
+    "G55": (-6.0, 2.5, -7.0, 0.0, 0.2, -0.1),
+    "G92": (1.5, 0.0, -2.0, 0.0, 0.1, 0.0),
+    "G28": (10.0, -5.0, -955.0, 0.5, 0.0, 0.0),
+    "G30": (0.0, 0.0, -950.0, 0.0, 0.0, 0.0),
+}
+LENGTHS = {1: 7.5, 2: -4.0}
+"""What some programs are compensated for [mm, deg]."""
+
+FIRST_OF = {"G28": 5161, "G30": 5181, "G92": 5211, "G54": 5221, "G55": 5241}
+
+
+def declared(seed: int) -> tuple[Setup, dict[int, float], str]:
+    """The setup of a program, and the same as LinuxCNC's parameters and tool table, in inches."""
+    places = PLACES if seed % 3 == 0 else {name: PLACES[name] for name in ("G28", "G30")}
+    lengths = {tool: (0.0, 0.0, length, 0.0, 0.0, 0.0) for tool, length in LENGTHS.items()}
+    stored = {5210: float(seed % 3 == 0)}
+    for name, values in places.items():
+        stored |= {FIRST_OF[name] + axis: value / (25.4 if axis < 3 else 1.0) for axis, value in enumerate(values)}
+    table = "".join(f"T{tool} P{tool} Z{length / 25.4:.9f}\n" for tool, length in LENGTHS.items())
+    return Setup(places, lengths), stored, table
+
 
 @pytest.fixture(scope="module")
 def bent(reference):
@@ -44,25 +68,37 @@ def bent(reference):
     return MachineModel(reference, (struts, joints))
 
 
+def in_inches(text: str) -> str:
+    """What a program expects of its offsets, for `rs274` without a machine, which stores them in inches."""
+
+    def inches(match: re.Match[str]) -> str:
+        number = int(match[1])
+        axis = (number - 5401) % 20 if number < 5420 else (number - 5201) % 20
+        axis = number - 5211 if 5211 <= number < 5220 else axis
+        return f"#{match[2]}-[{float(match[3]) / (25.4 if axis < 3 else 1.0):.9f}]"
+
+    return _EXPECTED.sub(inches, text)
+
+
+_EXPECTED = re.compile(r"#(?=\[?(\d{4}))(\[?\d{4}(?:\+20\*#5220\])?)-\[([-\d.]+)\]")
+
+
 @pytest.fixture
 def does_the_same(linuxcnc, bent, tmp_path):
     def check(seed: int) -> None:
         text = part(seed)
-        wanted = events(text, tmp_path)
+        setup, stored, table = declared(seed)
+        wanted = events(text, tmp_path, stored, table)
         assert wanted is not None, f"seed {seed}: LinuxCNC refuses\n{text}"
-        path = linuxcnc.read(text, "part.ngc")
-        written = compensated_program(path, linuxcnc, Inverse(bent)).text
-        done = events(written, tmp_path)
+        path = linuxcnc.read(text, "part.ngc", setup=setup)
+        written = in_inches(compensated_program(path, linuxcnc, Inverse(bent)).text)
+        done = events(written, tmp_path, stored, table)
         assert done is not None, f"seed {seed}: LinuxCNC refuses what was written\n{text}\n{written}"
         try:
-            groups = compare(wanted, done, bent)
-            if "G5" not in text.upper() and seed % 8:
-                return
-            away = events(written, tmp_path, OFFSETS)
-            if "o100" in written:
+            compare(wanted, done, bent)
+            if seed % 8 == 0:
+                away = events(written, tmp_path, OFFSETS, table)
                 assert [event.kind for event in away if event.kind != "SAID"] == ["PAUSE"]
-            else:
-                compare_elsewhere(groups, events(text, tmp_path, OFFSETS), away)
         except DiffersError as error:
             raise AssertionError(f"seed {seed}: {error}\n{text}\n{written}") from None
 
@@ -137,10 +173,11 @@ def wavy(bent):
 
 
 def test_a_right_program_passes(linuxcnc, wavy, tmp_path):
-    written = compensated_program(linuxcnc.read(PART, "part.ngc"), linuxcnc, Inverse(wavy)).text
-    groups = compare(events(PART, tmp_path), events(written, tmp_path), wavy)
-    compare_elsewhere(groups, events(PART, tmp_path, OFFSETS), events(written, tmp_path, OFFSETS))
-    assert sum(event.kind in MOVES for event in events(PART, tmp_path)) == len(groups)
+    setup, stored, table = declared(0)
+    written = compensated_program(linuxcnc.read(PART, "part.ngc", setup=setup), linuxcnc, Inverse(wavy)).text
+    wanted = events(PART, tmp_path, stored, table)
+    groups = compare(wanted, events(in_inches(written), tmp_path, stored, table), wavy)
+    assert sum(event.kind in MOVES for event in wanted) == len(groups)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -154,8 +191,8 @@ def test_the_comparison_finds(fault, linuxcnc, wavy, tmp_path):
 
 @pytest.mark.parametrize("word", ["G54", "G55"])
 def test_with_offsets_the_comparison_finds_a_work_system_that_is_missing(word, linuxcnc, wavy, tmp_path):
-    written = compensated_program(linuxcnc.read(PART, "part.ngc"), linuxcnc, Inverse(wavy)).text
-    groups = compare(events(PART, tmp_path), events(written, tmp_path), wavy)
-    wrong = written.replace(f"{word}\n", "")
-    with pytest.raises(DiffersError, match="ends at"):
-        compare_elsewhere(groups, events(PART, tmp_path, OFFSETS), events(wrong, tmp_path, OFFSETS))
+    setup, stored, table = declared(0)
+    written = compensated_program(linuxcnc.read(PART, "part.ngc", setup=setup), linuxcnc, Inverse(wavy)).text
+    wrong = in_inches(written.replace(f"{word}\n", "G56\n"))
+    with pytest.raises(DiffersError):
+        compare(events(PART, tmp_path, stored, table), events(wrong, tmp_path, stored, table), wavy)

@@ -38,7 +38,7 @@ def path():
 def test_times_and_ways(path):
     np.testing.assert_allclose(path.duration_s, [0.0, 0.0, 1.0, 2.0, 1.0, 60.0 * 50.0 / RAPID_MM_MIN])
     np.testing.assert_allclose(np.cumsum(path.tip_mm), [0, 0, 50, 50, 50, 100])
-    np.testing.assert_array_equal(np.isnan(path.poses[:, 0]), [True, False, False, False, False, False])
+    np.testing.assert_array_equal(path.poses[0], HOME)
 
 
 def test_samples_by_time(path):

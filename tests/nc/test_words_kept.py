@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
@@ -12,14 +13,15 @@ from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.rs274.guard import guard_lines
 from dbbstation.nc.rs274.reader import read_program
-from dbbstation.nc.toolpath import PIECE_CORNER_MM, Ending
+from dbbstation.nc.setup import ZERO, Setup
+from dbbstation.nc.toolpath import IN_FORCE, PIECE_CORNER_MM, Ending
 from tests.nc.interpreter import events, needs_rs274, printed
 
 FIRST = "G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\n"
 
 
 def written(linuxcnc, text: str) -> list[str]:
-    return linuxcnc.write(linuxcnc.read(text, "part.ngc")).splitlines()[1:]
+    return linuxcnc.write(replace(linuxcnc.read(text, "part.ngc"), holds=None)).splitlines()[1:]
 
 
 @pytest.mark.parametrize(
@@ -29,7 +31,6 @@ def written(linuxcnc, text: str) -> list[str]:
         "S12345.678",
         "M1",
         "(MSG, look)",
-        "(DEBUG, system #5220)",
         "(PRINT, here)",
         "(LOG, begun)",
         "(msg,small)",
@@ -44,6 +45,12 @@ def written(linuxcnc, text: str) -> list[str]:
 )
 def test_a_word_is_written_as_it_was(linuxcnc, line):
     assert line in written(linuxcnc, f"{FIRST}{line}\nG1 X1 F100\nM2\n")
+
+
+def test_a_message_has_the_values_that_its_parameters_had(linuxcnc):
+    """What is written sets none of them; LinuxCNC prints six decimals."""
+    text = f"{FIRST}#1=[2+3]\n#<deep>=-0.5\n(DEBUG, system #5220, hole #1 #<deep> #<else>)\nM2\n"
+    assert "(DEBUG, system 1.000000, hole 5.000000 -0.500000 #<else>)" in written(linuxcnc, text)
 
 
 @pytest.mark.parametrize(
@@ -103,57 +110,21 @@ def test_moves_in_machine_coordinates_stay_so(linuxcnc):
     ]
 
 
-def test_a_retract_in_machine_coordinates_stays_one_whatever_the_offsets(linuxcnc, crooked):
-    text = FIRST + "G1 X5 F100\nG53 G0 Z-950\nG0 X50 Y20 A1 B1 C1\nG0 Z-1000\nG1 X60\nM2\n"
-    done = compensated_program(linuxcnc.read(text, "part.ngc"), linuxcnc, Inverse(crooked)).text
-    assert "o100" not in done
-    lines = done.splitlines()
-    (up,) = [line for line in lines if line.startswith("G53")]
-    assert up.split()[:2] == ["G53", "G0"]
-    assert [word[0] for word in up.split()[2:]] == ["Z"]
-    over = lines[lines.index(up) + 1]
-    assert "Z" not in over
-    assert "Z" in lines[lines.index(up) + 2]
-
-
-def test_a_feed_that_mixes_systems_is_guarded(linuxcnc, crooked):
-    text = FIRST + "G54\nG53 G1 Z-990 F100\nG1 X5\nM2\n"
-    done = compensated_program(linuxcnc.read(text, "part.ngc"), linuxcnc, Inverse(crooked)).text
-    assert "\n".join(guard_lines(["G54"])) in done
-    assert linuxcnc.read(done, "done.ngc").guard == ("G54",)
-
-
-@pytest.mark.parametrize("move", ["G0 X60 Y23", "G1 X60 F100"])
-def test_an_increment_in_another_system_is_guarded(linuxcnc, crooked, move):
-    """From X5 in the system in force by 60 mm is X65 there, and in G54 only where the two are one."""
-    text = FIRST + f"G1 X5 F100\nG54 G91\n{move}\nM2\n"
-    done = compensated_program(linuxcnc.read(text, "part.ngc"), linuxcnc, Inverse(crooked)).text
-    assert linuxcnc.read(done, "done.ngc").guard == ("G54",)
-    again = FIRST + f"G1 X5 F100\nG91\n{move}\nG90 G54 G0 X1 Y2 Z-1000 A0 B0 C0\nG91 {move}\nM2\n"
-    done = compensated_program(linuxcnc.read(again, "part.ngc"), linuxcnc, Inverse(crooked)).text
-    assert linuxcnc.read(done, "done.ngc").guard is None
-
-
 # The guard.
 
 
-@pytest.mark.parametrize("systems", [(), ("G55",), ("G54", "G59.3")])
+@pytest.mark.parametrize(
+    "held", [{IN_FORCE: ZERO}, {"G54": (10.0, 0.0, -3.0, 0.0, 0.0, 0.0), "G92": (0.0, 1.5, 0.0, 0.0, 0.0, 0.0)}]
+)
 @pytest.mark.parametrize("change", [str, str.lower, lambda line: f"N5 {line}", lambda line: line.replace(" ", "\t")])
-def test_a_guard_is_known_however_it_is_spelt(systems, change):
-    lines = "\n".join(change(line) for line in guard_lines(systems))
-    assert read_program(f"; part\n{lines}\n{FIRST}M2\n", "part.ngc").guard == systems
-
-
-def test_another_condition_is_no_guard():
-    lines = "\n".join(guard_lines()).replace("NE 0", "NE 1", 1)
-    with pytest.raises(InputError, match="letter O"):
-        read_program(f"{lines}\n{FIRST}M2\n", "part.ngc")
-
-
-def test_a_guard_behind_a_move_is_refused():
-    lines = "\n".join(guard_lines())
-    with pytest.raises(InputError, match="a guard against offsets after the first move"):
-        read_program(f"{FIRST}{lines}\nM2\n", "part.ngc")
+def test_a_guard_lets_pass_what_it_holds_for_and_nothing_else(held, change):
+    lines = "\n".join(change(line) for line in guard_lines(held))
+    setup = Setup(places={name: values for name, values in held.items() if name != IN_FORCE})
+    assert len(read_program(f"; part\n{lines}\n{FIRST}M2\n", "part.ngc", setup=setup)) > 0
+    for name, values in setup.places.items():
+        off = Setup(places={**setup.places, name: (*values[:5], 0.001)})
+        with pytest.raises(InputError, match="moves nothing"):
+            read_program(f"; part\n{lines}\n{FIRST}M2\n", "part.ngc", setup=off)
 
 
 OFFSETS = {

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.sources.contract import Motion
+from tests.nc.interpreter import PLANES
 
 if TYPE_CHECKING:
     from dbbstation.model.machine_model import MachineModel
@@ -60,26 +61,6 @@ def compare(wanted: list[Event], done: list[Event], model: MachineModel) -> list
         DiffersError: they differ, with where.
     """
     return _Walk(wanted, done, model).groups()
-
-
-def compare_elsewhere(groups: list[Group], wanted: list[Event], done: list[Event]) -> None:
-    """With offsets in force, every move must end where the nominal one ends, but for its correction.
-
-    Raises:
-        DiffersError: a move ends elsewhere.
-    """
-    nominal = [event for event in wanted if event.kind in MOVES]
-    compensated = [event for event in done if event.kind in MOVES]
-    _same("number of moves", sum(len(group.done) for group in groups), len(compensated))
-    place = 0
-    for group, event in zip(groups, nominal, strict=True):
-        place += len(group.done)
-        if not group.done:
-            continue
-        last = compensated[place - 1]
-        off = np.abs(event.pose + event.offset - last.pose - last.offset)
-        if off[:3].max() > SHIFT_MM or off[3:].max() > SHIFT_MM:
-            raise DiffersError(f"ends at {last.pose + last.offset} in place of {event.pose + event.offset}")
 
 
 def said(events: list[Event]) -> list[str]:
@@ -150,7 +131,7 @@ class _Walk:
         first, second = event.pose - before.pose, on.pose - event.pose
         ways = first[:3] @ second[:3], np.linalg.norm(first[:3]) * np.linalg.norm(second[:3])
         straight = ways[1] > 0.0 and ways[0] > (1.0 - 1e-6) * ways[1] and not first[3:].any() and not second[3:].any()
-        alike = (event.kind, event.corner) == (on.kind, on.corner) and np.array_equal(event.offset, on.offset)
+        alike = (event.kind, event.corner) == (on.kind, on.corner)
         return bool(straight and alike and event.kind == "RAPID" and self.spoken[index] == self.spoken[index + 1])
 
     def _end_of(self, index: int, place: int) -> int:
@@ -233,12 +214,12 @@ class _Line:
 
 
 class _Arc:
-    """An arc of XY with everything else moving evenly along it; a spiral where its radii differ by a rounding."""
+    """An arc with everything beside its plane moving evenly along it; a spiral where its radii differ by a rounding."""
 
     def __init__(self, before: Event, event: Event) -> None:
         self.start, self.end = before.pose, event.pose
-        self.centre = np.array(event.centre_mm)
-        first, last = self.start[:2] - self.centre, self.end[:2] - self.centre
+        self.centre, self.plane = np.array(event.centre_mm), list(PLANES[event.plane])
+        first, last = self.start[self.plane] - self.centre, self.end[self.plane] - self.centre
         self.sign = math.copysign(1.0, event.turns)
         swept = (self.sign * (math.atan2(last[1], last[0]) - math.atan2(first[1], first[0]))) % math.tau
         # Ends that are one within what is printed: a full turn.
@@ -251,7 +232,7 @@ class _Arc:
         self.turned = 0.0
 
     def nearest(self, pose: np.ndarray) -> np.ndarray:
-        x, y = pose[:2] - self.centre
+        x, y = pose[self.plane] - self.centre
         now = math.atan2(y, x)
         step = (self.sign * (now - self.at) + math.pi) % math.tau - math.pi
         self.at, self.turned = now, self.turned + step
@@ -265,7 +246,7 @@ class _Arc:
         there: np.ndarray = self.start + share * (self.end - self.start)
         angle = self.first + self.sign * share * self.swept
         radius = self.radii[0] + share * (self.radii[1] - self.radii[0])
-        there[:2] = self.centre + radius * np.array([math.cos(angle), math.sin(angle)])
+        there[self.plane] = self.centre + radius * np.array([math.cos(angle), math.sin(angle)])
         return there
 
     def is_at_end(self, pose: np.ndarray, slack: float) -> bool:
@@ -273,7 +254,7 @@ class _Arc:
 
     def minutes(self, event: Event) -> float | None:
         flat = self.swept * sum(self.radii) / 2.0
-        return math.hypot(flat, float(self.end[2] - self.start[2])) / event.feed[0]
+        return math.hypot(flat, float((self.end - self.start)[3 - sum(self.plane)])) / event.feed[0]
 
 
 def _same(what: str, one: object, other: object) -> None:

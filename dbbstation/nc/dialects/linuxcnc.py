@@ -8,17 +8,18 @@ from typing import TYPE_CHECKING
 
 from dbbstation.nc.dialect import plain
 from dbbstation.nc.planner import LookAhead
-from dbbstation.nc.rs274.guard import guard_lines
+from dbbstation.nc.rs274.guard import guard_lines, length_lines
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import Ending
 from dbbstation.nc.words import WordDialect, digits
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
 
+    from dbbstation.nc.setup import Setup
     from dbbstation.nc.toolpath import Toolpath
 
 MODES = "G21 G90 G94 G17 G40 G49"
@@ -26,7 +27,8 @@ MODES = "G21 G90 G94 G17 G40 G49"
 tool tip. A program must not inherit any of these from the one before it."""
 
 
-_FUNCTION = re.compile(r"S[0-9.]+|M[345789]")
+_FUNCTION = re.compile(r"[ST][0-9.]+|G97|M(?:[3-9]|48|49)")
+"""Words of spindle, coolant, tool changes, override switches."""
 
 
 class LinuxCNC(WordDialect):
@@ -46,10 +48,13 @@ class LinuxCNC(WordDialect):
     extension = ".ngc"
     what = "LinuxCNC (RS274/NGC)"
     look_ahead = LookAhead(share=0.5)
+    takes_setup = True
 
-    def read(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
+    def read(
+        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: Setup | None = None
+    ) -> Toolpath:
         """Return what a program commands."""
-        return read_program(text, name, start=start)
+        return read_program(text, name, start=start, setup=setup)
 
     def before_header(self, toolpath: Toolpath) -> Iterable[str]:
         """Return the percent sign, if the program ends with one."""
@@ -76,9 +81,9 @@ class LinuxCNC(WordDialect):
         return f"G53 {move}"
 
     def corner(self, corner_mm: float) -> str:
-        """Return G61, G64, or G64 with P and Q0."""
-        if corner_mm == 0.0:
-            return "G61"
+        """Return G61, G61.1, G64, or G64 with P and Q0."""
+        if corner_mm <= 0.0:
+            return "G61" if corner_mm == 0.0 else "G61.1"
         return "G64" if math.isinf(corner_mm) else f"G64 P{digits(corner_mm)} Q0"
 
     def dwell(self, seconds: float) -> str:
@@ -102,18 +107,23 @@ class LinuxCNC(WordDialect):
         return f"({text})"
 
     def function(self, words: str) -> str:
-        """Return the words of spindle and coolant; refuse a tool, whose tip the model does not know."""
+        """Return the words of spindle, coolant and tool changes."""
         if not all(_FUNCTION.fullmatch(word) for word in words.split()):
             raise self.cannot_say(words)
         return words
 
-    def system(self, name: str) -> str:
-        """Return the word."""
-        return name
+    def system(self, text: str) -> str:
+        """Return the words."""
+        return text
 
-    def guard(self, systems: Sequence[str]) -> str:
-        """Return a condition of O-words on LinuxCNC's parameters."""
-        return "\n".join(guard_lines(systems))
+    def guard(self, holds: Mapping[str, Sequence[float]]) -> Iterable[str]:
+        """Return conditions of O-words on LinuxCNC's parameters."""
+        return guard_lines(holds)
+
+    def length_guard(self, text: str, holds: Mapping[str, Sequence[float]], row: int) -> Iterable[str]:
+        """Return the same behind G43."""
+        tool = text.removeprefix("G43 ")
+        return length_lines(tool, holds[tool], row) if tool != text and tool in holds else ()
 
 
 def message_before_stop(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Arcs in the XY plane as straight moves."""
+"""Arcs and helices in a plane as straight moves."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from dbbstation.nc.toolpath import PLANES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,13 +32,15 @@ FULL_TURN_RAD = 1e-6
 
 @dataclass(frozen=True)
 class Arc:
-    """An arc in XY, with all other axes moving evenly along it.
+    """An arc, with all axes beside its plane moving evenly along it.
 
     Attributes:
         start: pose before it, shape (6,) [mm, deg].
         end: pose after it, shape (6,) [mm, deg].
-        clockwise: seen from +Z.
+        centre_mm: in first and second axis of its plane.
+        clockwise: seen from the positive end of the third axis.
         turns: each above 1 adds a full turn.
+        plane: as in `PLANES`.
     """
 
     start: NDArray[np.float64]
@@ -44,11 +48,13 @@ class Arc:
     centre_mm: tuple[float, float]
     clockwise: bool
     turns: int = 1
+    plane: int = 0
 
     def radii_mm(self) -> tuple[float, float]:
         """Distances of start and end from the centre [mm]."""
-        x, y = self.centre_mm
-        return math.hypot(self.start[0] - x, self.start[1] - y), math.hypot(self.end[0] - x, self.end[1] - y)
+        (x, y), (first, second) = self.centre_mm, PLANES[self.plane]
+        ends = (math.hypot(pose[first] - x, pose[second] - y) for pose in (self.start, self.end))
+        return next(ends), next(ends)
 
     def is_round(self) -> bool:
         """Return whether both ends lie on one circle within LinuxCNC's tolerance."""
@@ -73,9 +79,17 @@ class Arc:
         return max(1, math.ceil(self.swept_rad / math.sqrt(8.0 * CHORD_ERROR_MM / max(self.radii_mm()))))
 
     @property
-    def chord(self) -> tuple[float, float, float]:
-        """Return centre [mm] and angle of each chord [rad], counter-clockwise positive."""
-        return *self.centre_mm, (-self.swept_rad if self.clockwise else self.swept_rad) / self.chords
+    def chord(self) -> tuple[float, float, float, float]:
+        """Return a row of `Toolpath.arc`."""
+        turned = -self.swept_rad if self.clockwise else self.swept_rad
+        return *self.centre_mm, turned / self.chords, float(self.plane)
+
+    @property
+    def length_mm(self) -> float:
+        """Return the way of the tip: the arc with its rise."""
+        flat = self.swept_rad * sum(self.radii_mm()) / 2.0
+        rise = 3 - int(PLANES[self.plane].sum())
+        return math.hypot(flat, float(self.end[rise] - self.start[rise]))
 
     def poses(self) -> NDArray[np.float64]:
         """End points of the chords, shape (k, 6) [mm, deg]."""
@@ -84,13 +98,14 @@ class Arc:
         share = np.arange(1, self.chords + 1) / self.chords
         poses = self.start + share[:, None] * (self.end - self.start)
         radius, angle = first + share * (last - first), self._angle_rad(self.start) + share * turned
-        poses[:, 0] = x + radius * np.cos(angle)
-        poses[:, 1] = y + radius * np.sin(angle)
+        poses[:, PLANES[self.plane, 0]] = x + radius * np.cos(angle)
+        poses[:, PLANES[self.plane, 1]] = y + radius * np.sin(angle)
         poses[-1] = self.end
         return poses
 
     def _angle_rad(self, pose: NDArray[np.float64]) -> float:
-        return math.atan2(pose[1] - self.centre_mm[1], pose[0] - self.centre_mm[0])
+        first, second = PLANES[self.plane]
+        return math.atan2(pose[second] - self.centre_mm[1], pose[first] - self.centre_mm[0])
 
 
 def centre_by_radius(
@@ -100,11 +115,11 @@ def centre_by_radius(
     *,
     clockwise: bool,
 ) -> tuple[float, float] | None:
-    """Return the centre of the arc through two points, shapes (2,) or longer, or None.
+    """Return the centre of the arc through two points of its plane, shapes (2,), or None.
 
     Args:
         radius_mm: positive for at most half a turn, negative for more.
-        clockwise: seen from +Z.
+        clockwise: as in `Arc`.
     """
     dx, dy = float(end[0] - start[0]), float(end[1] - start[1])
     half = math.hypot(dx, dy) / 2.0

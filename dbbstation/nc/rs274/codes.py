@@ -19,79 +19,75 @@ class ModalGroup(StrEnum):
     FEED_MODE = "feed mode"
     CUTTER = "cutter compensation"
     TOOL_LENGTH = "tool length"
-    CYCLE = "cycle"
+    RETRACT = "retract"
     OFFSET = "work offset"
     PATH = "path control"
+    SPEED = "spindle speed"
+    TURNED = "rotation"
+    CYCLE_END = "end of a cycle"
     STOP = "stop"
+    TOOL = "tool change"
     SPINDLE = "spindle"
     COOLANT = "coolant"
+    OVERRIDE = "override switches"
+    CALL = "subprogram"
 
+
+CYCLES = (73, 81, 82, 83, 85, 86, 89)
 
 G_CODES: dict[float, ModalGroup] = {
-    0: ModalGroup.MOTION,
-    1: ModalGroup.MOTION,
-    2: ModalGroup.MOTION,
-    3: ModalGroup.MOTION,
-    4: ModalGroup.ONCE,
-    17: ModalGroup.PLANE,
-    20: ModalGroup.UNITS,
-    21: ModalGroup.UNITS,
+    **dict.fromkeys((0, 1, 2, 3, *CYCLES), ModalGroup.MOTION),
+    **dict.fromkeys((4, 10, 28, 30, 52, 53, 92, 92.1, 92.2, 92.3), ModalGroup.ONCE),
+    **dict.fromkeys((17, 18, 19), ModalGroup.PLANE),
+    **dict.fromkeys((20, 21), ModalGroup.UNITS),
     40: ModalGroup.CUTTER,
-    49: ModalGroup.TOOL_LENGTH,
-    53: ModalGroup.ONCE,
+    **dict.fromkeys((43, 43.4, 49), ModalGroup.TOOL_LENGTH),
     **{float(name[1:]): ModalGroup.OFFSET for name in SYSTEMS},
-    61: ModalGroup.PATH,
-    64: ModalGroup.PATH,
-    80: ModalGroup.CYCLE,
-    90: ModalGroup.DISTANCE,
-    91: ModalGroup.DISTANCE,
-    90.1: ModalGroup.ARC_DISTANCE,
-    91.1: ModalGroup.ARC_DISTANCE,
-    94: ModalGroup.FEED_MODE,
+    **dict.fromkeys((61, 61.1, 64), ModalGroup.PATH),
+    69: ModalGroup.TURNED,
+    80: ModalGroup.CYCLE_END,
+    **dict.fromkeys((90, 91), ModalGroup.DISTANCE),
+    **dict.fromkeys((90.1, 91.1), ModalGroup.ARC_DISTANCE),
+    **dict.fromkeys((93, 94), ModalGroup.FEED_MODE),
+    97: ModalGroup.SPEED,
+    **dict.fromkeys((98, 99), ModalGroup.RETRACT),
 }
 
 M_CODES: dict[float, ModalGroup] = {
-    0: ModalGroup.STOP,
-    1: ModalGroup.STOP,
-    2: ModalGroup.STOP,
-    30: ModalGroup.STOP,
-    3: ModalGroup.SPINDLE,
-    4: ModalGroup.SPINDLE,
-    5: ModalGroup.SPINDLE,
-    7: ModalGroup.COOLANT,
-    8: ModalGroup.COOLANT,
-    9: ModalGroup.COOLANT,
+    **dict.fromkeys((0, 1, 2, 30), ModalGroup.STOP),
+    **dict.fromkeys((3, 4, 5), ModalGroup.SPINDLE),
+    6: ModalGroup.TOOL,
+    **dict.fromkeys((7, 8, 9), ModalGroup.COOLANT),
+    **dict.fromkeys((48, 49), ModalGroup.OVERRIDE),
+    **dict.fromkeys((98, 99), ModalGroup.CALL),
 }
 
-LETTERS = frozenset("ABCFGIJMNPQRSXYZ")
+LETTERS = frozenset("ABCFGHIJKLMNPQRSTXYZ")
 
-_OTHER_COORDINATES = "the model holds in machine coordinates: post the program without commands that set offsets"
-_TOOL = "the model is about one tool tip: post the program for the tool tip, without compensation in the control"
+_TOOL = "post the program for the centre of the tool, without compensation of its radius in the control"
+_TURNED = "post the program without rotation: the model is not turned with it"
+_SPINDLE = "motion that follows the spindle has no path in time: run it without compensation"
 _REMEDIES: dict[float, str] = {
-    **dict.fromkeys((18, 19), "only arcs in the XY plane (G17) are read"),
-    **dict.fromkeys((41, 41.1, 42, 42.1, 43, 43.1, 43.2, 43.4, 43.5), _TOOL),
+    **dict.fromkeys((41, 41.1, 42, 42.1), _TOOL),
+    **dict.fromkeys((43.1, 43.2, 43.5), "post the program with G43 and H"),
     **dict.fromkeys((5, 5.1, 5.2, 5.3, 6.2), "post curves as lines or arcs"),
-    **dict.fromkeys((33, 33.1, 32), "motion that follows the spindle has no path in time: run it without compensation"),
+    **dict.fromkeys((32, 33, 33.1, 74, 76, 84, 95, 96), _SPINDLE),
     **dict.fromkeys(
-        (38.2, 38.3, 38.4, 38.5, 31), "where probing ends is not known before: run it without compensation"
+        (31, 38, 38.2, 38.3, 38.4, 38.5), "where probing ends is not known before: run it without compensation"
     ),
-    **dict.fromkeys((10, 52, 92, 92.1, 92.2, 92.3), _OTHER_COORDINATES),
-    **dict.fromkeys((93, 95), "post the program with feed per minute (G94)"),
-    **dict.fromkeys((73, 74, 76, 81, 82, 83, 84, 85, 86, 87, 88, 89), "post cycles as single moves"),
-    **dict.fromkeys((28, 28.1, 30, 30.1), "name the pose instead"),
-}
-
-
-_LETTERS_NOT_READ = {
-    "O": "write subroutines, conditions and loops out as single moves, and remove program numbers",
-    "T": "post one program for each tool, for its tip, without tool changes",
-    "K": "only arcs in the XY plane (G17), with I and J, are read",
+    **dict.fromkeys((28.1, 30.1), "set reference points by hand, not in the program"),
+    **dict.fromkeys((51, 51.1, 68, 68.2), _TURNED),
+    **dict.fromkeys((87, 88), "post this cycle as single moves"),
 }
 
 
 def remedy_of_letter(letter: str) -> str:
     """Return what to do about a letter that is not read."""
-    return _LETTERS_NOT_READ.get(letter, "post the program without it")
+    if letter == "D":
+        return _TOOL
+    return (
+        "the model has no such axis: post the program without it" if letter in "UVW" else "post the program without it"
+    )
 
 
 def name(letter: str, value: float) -> str:
@@ -101,8 +97,4 @@ def name(letter: str, value: float) -> str:
 
 def remedy(letter: str, value: float) -> str:
     """Return what to do about a code that is not read."""
-    if letter == "M" and value in {98, 99}:
-        return _LETTERS_NOT_READ["O"]
-    if letter == "M":
-        return "post the program without it" + (" and without tool changes" if value == 6 else "")  # noqa: PLR2004
-    return _REMEDIES.get(value, "post the program without it")
+    return "post the program without it" if letter == "M" else _REMEDIES.get(value, "post the program without it")

@@ -1,81 +1,75 @@
-"""The guard of a program: O-words that stop it if a LinuxCNC offset is not zero.
+"""The guard of a program: O-words that stop it unless LinuxCNC's offsets are those that it was made for.
 
 Parameters [LinuxCNC, G-code overview, Numbered Parameters]: #5220 is the number n of the work system in force, 1 to 9;
-#5201 + 20 n and the next eight are its offsets in X to W, #5210 + 20 n its rotation about Z; #5211 to #5219 are G92;
-#<_tool_offset> is 1 while a tool length is in force.
+#5201 + 20 n and the next eight are its offsets in X to W, #5210 + 20 n its rotation about Z; #5211 to #5219 are G92, #5401 to
+#5409 the tool length in force, #<_tool_offset> is 1 while there is one. All count in the machine's units.
 """
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
-from dbbstation.nc.toolpath import SYSTEMS
+from dbbstation.nc.toolpath import IN_FORCE, SYSTEMS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-FIRST_LABEL = 100
+FIRST_LABEL, FIRST_LENGTH_LABEL = 100, 1000
 
-_SYSTEM, _PER_SYSTEM = 5200, 20
+WITHIN = 5e-4
+"""How far offsets may be off the declared ones, the sum of all [mm, deg]."""
+
+_SYSTEM, _PER_SYSTEM, _G92, _LENGTH = 5201, 20, 5211, 5401
+_AXES = 9
 _TERMS = 5
 """In one line; a line of LinuxCNC has an end."""
 
-_WORK = (
-    "work system {} is not zero: this program is in machine coordinates. Clear offsets and rotation, then start again"
-)
-_G92 = "G92 is not zero: this program is in machine coordinates. Clear it with G92.1, then start again"
-_TOOL = "a tool length is in force: this program is for the tool tip of the machine model. Cancel it with G49, then start again"
+_WORK = "work system {} is not {}: this program is right for that only. Set it, or compensate anew"
+_OTHER = "G92 is not {}. Clear it with G92.1, or compensate anew"
+_TOOL = "a tool length is in force: this program has none. Cancel it with G49, then start again"
+_LENGTHS = "the length of tool {} is not {}. Compensate anew with it"
 
 
-def guard_lines(systems: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return a guard for the work system in force and those named, `G54` to `G59.3`."""
-    offsets = range(1, 11)  # X to W, and the rotation
-    checks = [([f"#[{_SYSTEM + k}+{_PER_SYSTEM}*#5220]" for k in offsets], _WORK.format("in force"))]
-    for name in systems:
-        base = _SYSTEM + _PER_SYSTEM * (SYSTEMS.index(name) + 1)
-        checks.append(([f"#{base + k}" for k in offsets], _WORK.format(name)))
-    checks.append(([f"#{parameter}" for parameter in range(5211, 5220)], _G92))
-    checks.append((["#<_tool_offset>"], _TOOL))
-    lines: list[str] = []
-    label = FIRST_LABEL
-    for parameters, message in checks:
-        for first in range(0, len(parameters), _TERMS):
-            condition = " OR ".join(f"[{one} NE 0]" for one in parameters[first : first + _TERMS])
-            lines += [f"o{label} if [{condition}]", f"(MSG, {message})", "M0", "M02", f"o{label} endif"]
+def guard_lines(holds: Mapping[str, Sequence[float]]) -> list[str]:
+    """Return a guard for offsets by `IN_FORCE`, `G54` and so on, and `G92`; lengths such as `H1` are checked in their place."""
+    checks = []
+    for name in (IN_FORCE, *SYSTEMS):
+        if name in holds:
+            number = f"[{{}}+{_PER_SYSTEM}*#5220]" if name == IN_FORCE else "{}"
+            first = _SYSTEM + (0 if name == IN_FORCE else _PER_SYSTEM * (SYSTEMS.index(name) + 1))
+            parameters = [f"#{number.format(first + k)}" for k in range(_AXES + 1)]
+            checks.append((parameters, holds[name], _WORK.format(name, _said(holds[name]))))
+    g92 = holds.get("G92", (0.0,) * 6)
+    checks.append(([f"#{_G92 + k}" for k in range(_AXES)], g92, _OTHER.format(_said(g92))))
+    if not any(name.startswith("H") for name in holds):
+        checks.append((["#<_tool_offset>"], (), _TOOL))
+    return list(_stops(checks, FIRST_LABEL))
+
+
+def length_lines(tool: str, length: Sequence[float], row: int) -> Iterator[str]:
+    """Yield the same for the length of a tool, `H1`, that has come in force in a row of the toolpath."""
+    parameters = [f"#{_LENGTH + k}" for k in range(_AXES)]
+    check = parameters, length, _LENGTHS.format(tool[1:], _said(length))
+    yield from _stops([check], FIRST_LENGTH_LABEL + 2 * row)
+
+
+def _said(offset: Sequence[float]) -> str:
+    said = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", offset, strict=True) if value)
+    return said or "zero"
+
+
+def _stops(checks: Sequence[tuple[Sequence[str], Sequence[float], str]], label: int) -> Iterator[str]:
+    """Yield conditions that parameters are, in sum, off what is expected of them."""
+    for parameters, expected, message in checks:
+        wanted = [*expected, *(0.0 for _ in parameters[len(expected) :])]
+        off = [f"ABS[{one}{f'-[{value:.6f}]' if value else ''}]" for one, value in zip(parameters, wanted, strict=True)]
+        for place in range(0, len(off), _TERMS):
+            condition = "+".join(off[place : place + _TERMS])
+            yield from (
+                f"o{label} if [[{condition}] GT {WITHIN:g}]",
+                f"(MSG, {message})",
+                "M0",
+                "M02",
+                f"o{label} endif",
+            )
             label += 1
-    return tuple(lines)
-
-
-_NAMED = re.compile(r"if\[\[#(\d{4})ne0\]")
-_OF_A_GUARD = re.compile(r"o\d+|m0$|m02$")
-
-
-def guard_at(lines: Sequence[str]) -> tuple[tuple[str, ...], int] | None:
-    """Return the guard at the beginning of lines: its systems and line count, or None.
-
-    Comments, blanks, line numbers and letter case are ignored.
-    """
-    found: list[tuple[int, str]] = []
-    systems: list[str] = []
-    for place, text in _bare(lines):
-        if not _OF_A_GUARD.match(text) or (place > 0 and not found):
-            break
-        found.append((place, text))
-        named = _NAMED.search(text)
-        system, offset = divmod(int(named[1]) - _SYSTEM, _PER_SYSTEM) if named else (0, 0)
-        if offset == 1 and 1 <= system <= len(SYSTEMS):
-            systems.append(SYSTEMS[system - 1])
-    expected = [text for _, text in _bare(guard_lines(systems))]
-    if [text for _, text in found[: len(expected)]] != expected:
-        return None
-    return tuple(systems), found[len(expected) - 1][0] + 1
-
-
-def _bare(lines: Sequence[str]) -> Iterator[tuple[int, str]]:
-    """Return number and text of lines with content, without blanks and line numbers, in small letters."""
-    for place, line in enumerate(lines):
-        text = re.sub(r"\([^()]*\)|;.*|\s+", "", line).lower()
-        text = re.sub(r"^n\d+", "", text)
-        if text:
-            yield place, text

@@ -1,22 +1,23 @@
-"""Words and comments of one line of RS274/NGC, each with its column."""
+"""Words, settings of parameters and comments of one line of RS274/NGC, each with its column."""
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from dbbstation.errors import Problem
+from dbbstation.nc.rs274.expressions import NUMBER, Reader
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
-# White space inside a number is legal: `X1 0` is X10 to LinuxCNC, and so it must be here. Every repeat is possessive
-# (`*+`), so that no line is gone through twice.
 _TOKEN = re.compile(
-    r"""[ \t]*+(?:
-        (?P<letter>[A-Za-z])[ \t]*+
-        (?P<number>[+-]?+[ \t]*+(?:[0-9][0-9 \t]*+(?:\.[0-9 \t]*+)?+|\.[ \t]*+[0-9][0-9 \t]*+))
+    rf"""[ \t]*+(?:
+        (?P<letter>[A-Za-z])[ \t]*+(?P<number>{NUMBER.pattern})
+      | (?P<word>[A-Za-z])(?=[ \t]*+[-+]?[ \t]*+(?:[\[#]|[A-Za-z]{{2,6}}[ \t]*+\[))
+      | (?P<setting>\#)
       | \((?P<comment>[^()]*+)\)
       | ;(?P<rest>.*+)
       | (?P<end>\Z)
@@ -30,8 +31,7 @@ LARGEST_OTHER = 100_000.0
 slip of the pen, and would be drawn out into millions of points before any limit of the machine is looked at."""
 
 _NOT_READ = {
-    "#": ("a parameter (#) is not read", "write its value"),
-    "[": ("an expression ([ ]) is not read", "write its value"),
+    "[": ("an expression ([ ]) without its letter", "write the letter before it"),
     "/": ("a line that can be skipped (/) is not read", "decide: remove the line, or the slash"),
     "@": ("polar coordinates (@, ^) are not read", "write X and Y"),
     "^": ("polar coordinates (@, ^) are not read", "write X and Y"),
@@ -48,6 +48,14 @@ class Word(NamedTuple):
     """
 
     letter: str
+    value: float
+    column: int
+
+
+class Setting(NamedTuple):
+    """A parameter by number or lower-case name, and the value that it takes once the line is read."""
+
+    parameter: int | str
     value: float
     column: int
 
@@ -85,11 +93,18 @@ class Place:
         return BadLine(Problem(self.file, self.line, column, what, remedy))
 
 
-def tokens(text: str, place: Place) -> Iterator[Word | Comment]:
-    """Words and comments of a line, in order.
+def unknown_value(_which: int | str) -> float:
+    """Stand for the value of any parameter while a line is only looked at."""
+    return math.nan
+
+
+def tokens(
+    text: str, place: Place, value_of: Callable[[int | str], float | None] = unknown_value
+) -> Iterator[Word | Setting | Comment]:
+    """Yield what stands in a line, in order.
 
     Raises:
-        BadLine: something that is neither.
+        BadLine: something that is neither, or has no value.
     """
     position = 0
     while True:
@@ -99,20 +114,38 @@ def tokens(text: str, place: Place) -> Iterator[Word | Comment]:
         position = match.end()
         kind = match.lastgroup
         if kind == "number":
-            yield _word(match, place)
+            yield _number(match, place)
         elif kind == "end":
             return
+        elif kind in {"word", "setting"}:
+            reader = Reader(text, place, value_of)
+            reader.position = match.end() if kind == "word" else match.start("setting")
+            yield _computed(match, reader, place)
+            position = reader.position
         else:
             yield Comment(match[kind or 0], kind == "comment", match.start(kind or 0))
 
 
-def _word(match: re.Match[str], place: Place) -> Word:
+def _computed(match: re.Match[str], reader: Reader, place: Place) -> Word | Setting:
+    if match["word"] is not None:
+        return _word(match["word"], reader.value(), match.start("word") + 1, place)
+    column, which = match.start("setting") + 1, reader.parameter()
+    if reader.blanks() != "=":
+        raise place.fault(column, "a parameter (#) without a letter before it or = behind it", "write #1=5 or X#1")
+    reader.position += 1
+    return Setting(which, reader.value(), column)
+
+
+def _number(match: re.Match[str], place: Place) -> Word:
     letter, number = match.group("letter", "number")
-    letter, column = letter.upper(), match.start("letter") + 1
     number = number.replace(" ", "").replace("\t", "")
-    if letter == "N" and not number.isdecimal():
-        raise place.fault(column, f"N{number} is no line number", "write a whole number, or none")
-    value = float(number)
+    if letter in "Nn" and not number.isdecimal():
+        raise place.fault(match.start("letter") + 1, f"N{number} is no line number", "write a whole number, or none")
+    return _word(letter, float(number), match.start("letter") + 1, place)
+
+
+def _word(letter: str, value: float, column: int, place: Place) -> Word:
+    letter = letter.upper()
     largest = LARGEST.get(letter, LARGEST_OTHER)
     if abs(value) > largest:
         what = f"the number after {letter} is {value:g}, beyond {largest:g}"
@@ -124,10 +157,7 @@ def _unreadable(text: str, position: int, place: Place) -> BadLine:
     while text[position] in " \t":
         position += 1
     letter = text[position]
-    following = text[position + 1 :].lstrip()[:1]
     if letter.isascii() and letter.isalpha():
-        if following in {"#", "["}:
-            return place.fault(position + 1, *_NOT_READ[following])
         what = f"the letter {letter.upper()} has no number"
         return place.fault(position + 1, what, f"write a number after {letter.upper()}, or remove it")
     what, remedy = _NOT_READ.get(letter, (f"{letter!r} does not belong in a program", "remove it"))

@@ -1,0 +1,346 @@
+"""The lines of a program in the order in which a control runs them: O-words, subprograms, their parameters."""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+from dbbstation.errors import Problem
+from dbbstation.nc.rs274.blocks import BLANKS
+from dbbstation.nc.rs274.expressions import Reader
+from dbbstation.nc.rs274.tokens import BadLine, Place
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+MOST_AGAIN = 500_000
+"""Lines that loops and subprograms may run again: what does more is taken to run for ever."""
+
+DEEPEST = 10
+"""Subprograms within each other [LinuxCNC, INTERP_SUB_ROUTINE_LEVELS]."""
+
+LOCAL = 30
+"""Numbered parameters up to this belong to the subprogram that runs."""
+
+_O_LINE = re.compile(
+    r"(?m)^[ \t]*(?:[nN][ \t]*[0-9]+[ \t]*)?[oO][ \t]*(?P<label><[^>\n]*>|[0-9]+)[ \t]*(?P<keyword>[A-Za-z]*)(?P<rest>[^\n]*)$"
+)
+_KEYWORDS = frozenset(
+    "sub endsub return call if elseif else endif while endwhile do repeat endrepeat break continue".split()  # noqa: SIM905 - words
+)
+_COMMENT = re.compile(r"\([^()]*\)|;.*")
+
+OPENED_BY = {
+    "elseif": ("if",),
+    "else": ("if",),
+    "endif": ("if",),
+    "endwhile": ("while",),
+    "endrepeat": ("repeat",),
+    "endsub": ("sub",),
+}
+
+
+class OLine(NamedTuple):
+    """A line that begins with an O-word.
+
+    Attributes:
+        line: from 1.
+        keyword: in small letters; empty for the number of a program.
+        column: at which `rest` begins, from 0.
+    """
+
+    line: int
+    label: str
+    keyword: str
+    rest: str
+    column: int
+
+
+@dataclass(slots=True)
+class _Frame:
+    """A subprogram that runs: where it was called, how often it is to run again, and its own parameters."""
+
+    back: int
+    begin: int
+    again: int
+    by_number: bool
+    parameters: dict[int | str, float] = field(default_factory=dict)
+
+
+class Flow:
+    """Runs a program line by line.
+
+    Args:
+        outer: value of a parameter that belongs to the control; None if it has none.
+    """
+
+    def __init__(self, text: str, file: str, outer: Callable[[int | str], float | None]) -> None:
+        self._lines, self._file, self._outer = text.split("\n"), file, outer
+        self.percent, self._next = self._opening()
+        found = _O_LINE.finditer(text) if re.search(r"(?m)^[ \t]*(?:[nN][ \t]*[0-9]+[ \t]*)?[oO]", text) else ()
+        starts = [0]
+        for line in self._lines[:-1] if found else ():
+            starts.append(starts[-1] + len(line) + 1)
+        self._o_lines: dict[int, OLine] = {}
+        self._labels: dict[str, list[OLine]] = {}
+        for match in found:
+            one = self._o_line(match, bisect_right(starts, match.start()), starts)
+            self._o_lines[one.line] = one
+            self._labels.setdefault(one.label, []).append(one)
+        self._frames: list[_Frame] = []
+        self._globals: dict[int | str, float] = {}
+        self._counts: dict[tuple[int, int], int] = {}
+        self._begun = False
+
+    def lines(self) -> Iterator[tuple[str, Place]]:
+        """Yield lines without O-words in the order in which they run.
+
+        Raises:
+            BadLine: an O-word that makes no sense, or the program does not end.
+        """
+        ran = 0
+        while self._next < len(self._lines):
+            ran += 1
+            place = Place(self._file, self._next + 1)
+            if ran > len(self._lines) + MOST_AGAIN:
+                what = f"its loops and subprograms run more than {MOST_AGAIN} lines: they may never end"
+                raise place.fault(1, what, "check the conditions of its loops")
+            line = self._lines[self._next]
+            self._next += 1
+            word = self._o_lines.get(self._next)
+            if word is not None:
+                self._run(word, place)
+            elif self.percent and is_percent(line):
+                return
+            else:
+                self._begun |= bool(_COMMENT.sub("", line).strip(BLANKS))
+                yield line, place
+        raise BadLine(self._cut_short(percent=self.percent))
+
+    def ended(self) -> None:
+        """Check behind M2 and M30 that nothing of the program is lacking.
+
+        Raises:
+            BadLine: the percent sign that closes it.
+        """
+        if self.percent and not any(is_percent(line) for line in self._lines[self._next :]):
+            raise BadLine(self._cut_short(percent=True))
+
+    def all_lines(self) -> Iterator[tuple[str, Place]]:
+        """Yield all lines without O-words as they stand in the file, up to the percent sign that ends it."""
+        begin = self._opening()[1]
+        for number, line in enumerate(self._lines[begin:], begin + 1):
+            if self.percent and is_percent(line):
+                return
+            if number not in self._o_lines:
+                yield line, Place(self._file, number)
+
+    def value_of(self, which: int | str) -> float | None:
+        """Return the value of a parameter, None if it has none."""
+        own = self._frames[-1].parameters if self._frames and _is_local(which) else self._globals
+        if which in own:
+            return own[which]
+        if own is not self._globals and not self._frames[-1].by_number:
+            return None
+        return self._outer(which)
+
+    def set(self, which: int | str, value: float) -> None:
+        """Give a parameter its value."""
+        (self._frames[-1].parameters if self._frames and _is_local(which) else self._globals)[which] = value
+
+    def call(self, number: float, times: float, place: Place) -> None:
+        """Go to a subprogram by its number (M98).
+
+        Raises:
+            BadLine: the program has none of this number.
+        """
+        found = [each for each in self._labels.get(f"{number:.0f}", []) if not each.keyword]
+        if len(found) != 1 or number != int(number):
+            what = f"M98 calls the subprogram O{number:g}, of which there is {'none' if not found else 'more than one'}"
+            raise place.fault(1, what, "put it into this file behind M30, from its O number to M99")
+        if times >= 1.0:
+            self._enter(found[0].line, int(times) - 1, place, by_number=True, parameters=dict(self._own()))
+
+    def back(self, place: Place) -> None:
+        """Return from such a subprogram (M99).
+
+        Raises:
+            BadLine: none runs.
+        """
+        if not self._frames or not self._frames[-1].by_number:
+            raise place.fault(1, "M99 in a main program repeats it for ever", "end it with M2 or M30")
+        self._leave(place)
+
+    def _own(self) -> dict[int | str, float]:
+        own = self._frames[-1].parameters if self._frames else self._globals
+        return {which: value for which, value in own.items() if _is_local(which)}
+
+    def _opening(self) -> tuple[bool, int]:
+        """Return whether the first line that is not empty is a percent sign, and the index of the first line to read.
+
+        Between percent signs a program needs no other end. Elsewhere a percent sign is a fault, as for LinuxCNC.
+        """
+        start = next((index for index, line in enumerate(self._lines) if line.strip(BLANKS)), 0)
+        return (True, start + 1) if is_percent(self._lines[start]) else (False, 0)
+
+    def _cut_short(self, *, percent: bool) -> Problem:
+        end = "the % that closes it" if percent else "M2 or M30"
+        what = f"the program ends without {end}: it may have been cut short"
+        return Problem(self._file, len(self._lines), 0, what, "copy it again, or add its end where it is whole")
+
+    @staticmethod
+    def _o_line(match: re.Match[str], line: int, starts: list[int]) -> OLine:
+        label = re.sub(r"\s", "", match["label"]).lower()
+        keyword, column = match["keyword"].lower(), match.start("rest") - starts[line - 1]
+        rest = _COMMENT.sub(lambda comment: " " * len(comment[0]), match["rest"]).rstrip(BLANKS)
+        return OLine(line, label if label[0] == "<" else str(int(label)), keyword, rest, column)
+
+    def _run(self, word: OLine, place: Place) -> None:
+        if word.keyword and word.keyword not in _KEYWORDS:
+            raise place.fault(word.column, f"O-words have no {word.keyword!r}", "check its spelling")
+        made = getattr(self, f"_{word.keyword or 'number'}", self._if)
+        made(word, place)
+
+    def _number(self, word: OLine, place: Place) -> None:
+        """The number of the program; one behind that begins a subprogram, which is called and not run into."""
+        if word.rest:
+            raise place.fault(
+                word.column + 1, "something behind the number of a program", "write it in a line of its own"
+            )
+        if self._begun:
+            raise place.fault(1, f"the program runs into the subprogram O{word.label}", "end it with M2 or M30 before")
+
+    def _sub(self, word: OLine, place: Place) -> None:
+        self._next = self._find(word, place, ("endsub",)).line
+
+    def _call(self, word: OLine, place: Place) -> None:
+        subs = [each for each in self._labels[word.label] if each.keyword == "sub"]
+        if len(subs) != 1:
+            what = f"the subprogram O{word.label} is {'not in this file' if not subs else 'in it more than once'}"
+            raise place.fault(1, what, "put it into the program, from its sub to its endsub")
+        given, reader = [], self._reader(word, place)
+        while reader.blanks() == "[":
+            given.append(reader.bracket())
+        if reader.blanks() or len(given) > LOCAL:
+            raise place.fault(reader.position + 1, "a call has values in brackets only", "write o100 call [1] [2]")
+        parameters: dict[int | str, float] = dict.fromkeys(range(1, LOCAL + 1), 0.0)
+        self._enter(subs[0].line, 0, place, by_number=False, parameters=parameters | dict(enumerate(given, 1)))
+
+    def _enter(
+        self, begin: int, again: int, place: Place, *, by_number: bool, parameters: dict[int | str, float]
+    ) -> None:
+        if len(self._frames) >= DEEPEST:
+            raise place.fault(1, f"more than {DEEPEST} subprograms within each other", "check what calls itself")
+        self._frames.append(_Frame(self._next, begin, again, by_number, parameters))
+        self._next = begin
+
+    def _leave(self, place: Place) -> None:
+        if not self._frames:
+            raise place.fault(1, "the end of a subprogram that does not run", "remove it")
+        frame = self._frames[-1]
+        if frame.again:
+            frame.again -= 1
+            self._next = frame.begin
+            return
+        self._frames.pop()
+        if frame.by_number:  # it has the parameters of its caller
+            for which, value in frame.parameters.items():
+                self.set(which, value)
+        self._next = frame.back
+
+    def _endsub(self, word: OLine, place: Place) -> None:
+        if word.rest:
+            reader = self._reader(word, place)
+            self._globals["_value"] = reader.value()
+        self._globals["_value_returned"] = float(bool(word.rest))
+        self._leave(place)
+
+    _return = _endsub
+
+    def _if(self, word: OLine, place: Place) -> None:
+        """If; else and elseif are reached from the branch that ran."""
+        if word.keyword in {"else", "elseif"}:
+            self._next = self._find(word, place, ("endif",)).line
+            return
+        if word.keyword == "endif" or self._holds(word, place):
+            return
+        branch = self._find(word, place, ("elseif", "else", "endif"))
+        while branch.keyword == "elseif" and not self._holds(branch, Place(self._file, branch.line)):
+            branch = self._find(branch, place, ("elseif", "else", "endif"))
+        self._next = branch.line
+
+    def _while(self, word: OLine, place: Place) -> None:
+        opened = self._opened(word, ("do",))
+        if opened is not None:  # the end of do … while
+            self._next = opened.line if self._holds(word, place) else self._next
+        elif not self._holds(word, place):
+            self._next = self._find(word, place, ("endwhile",)).line
+
+    def _endwhile(self, word: OLine, place: Place) -> None:
+        self._next = self._must_be_opened(word, place, ("while",)).line - 1
+
+    def _do(self, _word: OLine, _place: Place) -> None:
+        """A loop begins; its `while` leads back."""
+
+    def _repeat(self, word: OLine, place: Place) -> None:
+        times = self._reader(word, place).value()
+        self._counts[len(self._frames), word.line] = int(times)
+        if times < 1.0:
+            self._next = self._find(word, place, ("endrepeat",)).line
+
+    def _endrepeat(self, word: OLine, place: Place) -> None:
+        begin = self._must_be_opened(word, place, ("repeat",))
+        key = len(self._frames), begin.line
+        self._counts[key] = self._counts.get(key, 1) - 1
+        if self._counts[key] > 0:
+            self._next = begin.line
+
+    def _break(self, word: OLine, place: Place) -> None:
+        self._next = self._end_of_loop(word, place).line
+
+    def _continue(self, word: OLine, place: Place) -> None:
+        self._next = self._end_of_loop(word, place).line - 1
+
+    def _end_of_loop(self, word: OLine, place: Place) -> OLine:
+        return self._find(word, place, ("endwhile", "endrepeat", "while"))
+
+    def _find(self, word: OLine, place: Place, keywords: tuple[str, ...]) -> OLine:
+        """Return the next O-word of this label with one of the keywords."""
+        for each in self._labels[word.label]:
+            if each.line > word.line and each.keyword in keywords:
+                return each
+        raise place.fault(1, f"O{word.label} {word.keyword} has no {' or '.join(keywords)}", "add it")
+
+    def _opened(self, word: OLine, keywords: tuple[str, ...]) -> OLine | None:
+        """Return the O-word before of this label, if it has one of the keywords; breaks and continues between do not count."""
+        before = [each for each in self._labels[word.label] if each.line < word.line]
+        before = [each for each in before if each.keyword not in {"break", "continue"}]
+        return before[-1] if before and before[-1].keyword in keywords else None
+
+    def _must_be_opened(self, word: OLine, place: Place, keywords: tuple[str, ...]) -> OLine:
+        opened = self._opened(word, keywords)
+        if opened is None:
+            raise place.fault(1, f"O{word.label} {word.keyword} without its {keywords[0]}", "add it")
+        return opened
+
+    def _holds(self, word: OLine, place: Place) -> bool:
+        reader = self._reader(word, place)
+        value = reader.value()
+        if reader.blanks() or math.isnan(value):
+            raise place.fault(reader.position + 1, "a condition is one value in brackets", "write o100 if [#1 GT 2]")
+        return value != 0.0
+
+    def _reader(self, word: OLine, place: Place) -> Reader:
+        return Reader(" " * word.column + word.rest, place, self.value_of)
+
+
+def _is_local(which: int | str) -> bool:
+    return which <= LOCAL if isinstance(which, int) else not which.startswith("_")
+
+
+def is_percent(line: str) -> bool:
+    """Return whether a line is a percent sign alone."""
+    return line.strip(BLANKS) == "%"

@@ -1,0 +1,171 @@
+"""Where a control stands and from where it counts: pose, work offsets, G92, tool lengths, their parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.nc.rs274.codes import ModalGroup, name
+from dbbstation.nc.setup import FIRST_PARAMETERS, ZERO
+from dbbstation.nc.toolpath import SYSTEMS
+from dbbstation.nc.words import digits
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.rs274.blocks import ProgramBlock
+    from dbbstation.nc.rs274.tokens import Word
+    from dbbstation.nc.setup import Setup
+
+AXES = "XYZABC"
+
+POSITION, SYSTEM, TOOL, LENGTH = 5420, 5220, 5400, 5401
+
+
+class ControlState:
+    """Pose in machine coordinates, and what is added to numbers.
+
+    Attributes:
+        pose: shape (6,) [mm, deg], NaN for unknown axes.
+        unit_mm: of lengths.
+        system: number of the work system, from 1.
+        g92: in force, shape (6,) [mm, deg].
+        length: of the tool in force, shape (6,) [mm, deg].
+        length_said: whether there is one.
+        tool: in the spindle; None if not known.
+    """
+
+    def __init__(self, setup: Setup, pose: NDArray[np.float64]) -> None:
+        self.setup, self.pose, self.unit_mm, self.system = setup, pose, 1.0, 1
+        self._systems: dict[int, tuple[float, ...]] = {}
+        self.g92 = setup.place("G92") or ZERO
+        self._suspended = self.g92
+        self.length: tuple[float, ...] = ZERO
+        self.length_said = False
+        self.tool: int | None = None
+        self.tool_selected: int | None = None
+        self._counted()
+
+    def _counted(self) -> None:
+        parts = zip(self.offset_of(self.system), self.g92, self.length, strict=True)
+        self.offset = tuple(sum(part) for part in parts)
+
+    def offset_of(self, system: int) -> tuple[float, ...]:
+        """Return the offset of a work system, shape (6,) [mm, deg]."""
+        return self._systems.get(system) or self.setup.place(SYSTEMS[system - 1]) or ZERO
+
+    def use_system(self, system: str, block: ProgramBlock) -> None:
+        """Count in a work system."""
+        turned = self.setup.rotation_deg(system)
+        if turned:
+            what = f"{system} is turned by {turned:g} degrees about Z in the parameter file"
+            raise block.place.fault(block.codes[ModalGroup.OFFSET].column, what, "set its rotation to zero (G10 L2 R0)")
+        self.system = SYSTEMS.index(system) + 1
+        self._counted()
+
+    def set_system(self, block: ProgramBlock) -> tuple[str, str, tuple[float, ...]]:
+        """Run G10 L2 or L20; return what does the same, the system and its offset before."""
+        word = block.codes[ModalGroup.ONCE]
+        kind, which, turned = (block.words.pop(letter, None) for letter in "LPR")
+        if kind is None or kind.value not in {2.0, 20.0} or which is None or which.value not in range(10):
+            said = "" if kind is None else f" L{kind.value:g}"
+            what = f"G10{said} is not read"
+            raise block.place.fault(
+                word.column, what, "G10 L2 and L20 with P0 to P9 are; declare tools with --tool-length"
+            )
+        if turned is not None and turned.value != 0.0:
+            raise block.place.fault(turned.column, "G10 with a rotation (R)", "post the program without rotation")
+        system = int(which.value) or self.system
+        before, offset = self.offset_of(system), list(self.offset_of(system))
+        for axis, letter in enumerate(AXES):
+            value = self._taken(block, axis, letter)
+            if value is not None:
+                beside = self.g92[axis] + self.length[axis]
+                offset[axis] = value if kind.value == 2.0 else self._known(axis, block, word) - beside - value  # noqa: PLR2004
+        self._systems[system] = tuple(offset)
+        self._counted()
+        words = " ".join(f"{letter}{digits(value)}" for letter, value in zip(AXES, offset, strict=True))
+        return f"G10 L2 P{system} {words}", SYSTEMS[system - 1], before
+
+    def shift(self, code: float, block: ProgramBlock) -> None:
+        """Run G52 or G92 to G92.3."""
+        word, shift = block.codes[ModalGroup.ONCE], list(self.g92)
+        for axis, letter in enumerate(AXES):
+            value = self._taken(block, axis, letter) if code in {52.0, 92.0} else None
+            if value is not None:
+                beside = self.offset_of(self.system)[axis] + self.length[axis]
+                shift[axis] = value if code == 52.0 else self._known(axis, block, word) - beside - value  # noqa: PLR2004
+        if code in {92.1, 92.2}:
+            self._suspended = self.g92 if code == 92.2 else ZERO  # noqa: PLR2004
+            self.g92 = ZERO
+        else:
+            self.g92 = self._suspended if code == 92.3 else tuple(shift)  # noqa: PLR2004
+        self._counted()
+
+    def use_length(self, tool: Word | None, block: ProgramBlock, code: Word) -> int:
+        """Use the length of a tool, or none for G49; return its number."""
+        if code.value == 49.0:  # noqa: PLR2004
+            self.length, self.length_said = ZERO, False
+            self._counted()
+            return 0
+        which = self.tool if tool is None else tool.value
+        column = code.column if tool is None else tool.column
+        if which is None or which < 1.0 or which != int(which):
+            what = f"{name('G', code.value)} without the number of a tool" if tool is None else f"H{which:g} is no tool"
+            raise block.place.fault(column, what, "give H, a whole number from 1")
+        if int(which) not in self.setup.lengths:
+            what = f"the length of tool {which:g} is not known"
+            remedy = f"give it with --tool-length {which:g}=MM, or LinuxCNC's tool table with --tools"
+            raise block.place.fault(column, what, remedy)
+        self.length, self.length_said = self.setup.lengths[int(which)], True
+        self._counted()
+        return int(which)
+
+    def parameter(self, which: int | str) -> float | None:
+        """Return a parameter of the control; None if it is not known."""
+        if isinstance(which, str):
+            return self._named(which)
+        if POSITION <= which < POSITION + 6:
+            return self._position(which - POSITION)
+        for first, values in self._rows():
+            if first <= which < first + len(values):
+                return values[which - first]
+        return None if self.setup.parameters is None else self.setup.parameters.get(which, 0.0)
+
+    def _rows(self) -> list[tuple[int, tuple[float, ...]]]:
+        """Return what is stored in successive parameters; behind C come U, V, W and a rotation, which are zero."""
+        rows = [(FIRST_PARAMETERS[each], self.offset_of(number)) for number, each in enumerate(SYSTEMS, 1)]
+        rows += [(FIRST_PARAMETERS["G92"], self.g92), (LENGTH, self.length)]
+        known = ((FIRST_PARAMETERS[each], self.setup.place(each)) for each in ("G28", "G30"))
+        rows += [(first, values) for first, values in known if values is not None]
+        rows = [(first, (*values, *ZERO[:4])) for first, values in rows]
+        tool = [] if self.tool is None else [(TOOL, (float(self.tool),))]
+        return [(SYSTEM, (float(self.system),)), *tool, *rows]
+
+    def _named(self, which: str) -> float | None:
+        if len(which) == 2 and which[0] == "_" and which[1].upper() in AXES:  # noqa: PLR2004 - _x
+            return self._position(AXES.index(which[1].upper()))
+        known = {
+            "_tool_offset": float(self.length_said),
+            "_metric": float(self.unit_mm == 1.0),
+            "_imperial": float(self.unit_mm != 1.0),
+            "_coord_system": 530.0 + 10.0 * self.system if self.system < 7 else 584.0 + self.system,  # noqa: PLR2004
+            "_current_tool": None if self.tool is None else float(self.tool),
+            "_selected_tool": None if self.tool_selected is None else float(self.tool_selected),
+        }
+        return known.get(which)
+
+    def _position(self, axis: int) -> float | None:
+        place = float(self.pose[axis]) - self.offset[axis]
+        return None if np.isnan(place) else place / (self.unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
+
+    def _taken(self, block: ProgramBlock, axis: int, letter: str) -> float | None:
+        word = block.words.pop(letter, None)
+        return None if word is None else word.value * (self.unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
+
+    def _known(self, axis: int, block: ProgramBlock, word: Word) -> float:
+        if np.isnan(self.pose[axis]):
+            what = f"{name('G', word.value)} counts from where {AXES[axis]} stands, which nobody knows yet"
+            raise block.place.fault(word.column, what, f"move {AXES[axis]} to a place before, or give --start")
+        return float(self.pose[axis])

@@ -17,7 +17,7 @@ from dbbstation.cli.progress import Compiling
 from dbbstation.cli.streams import drop_output, drop_unwritable, flush_output, open_missing
 from dbbstation.computing.compiling import tell_of_compiling
 from dbbstation.errors import StationError
-from dbbstation.files.inputs import input_book
+from dbbstation.files.inputs import input_book, virtual_so_far
 from dbbstation.files.refused import in_a_sentence
 from dbbstation.system.signals import politely_ended
 
@@ -118,6 +118,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             cli.make_context("dbbstation", _own_first(given), obj=tuple(given)) as context,
         ):
             code = _invoked(context)
+            if virtual := virtual_so_far():
+                echo(f"VIRTUAL MACHINE: {', '.join(virtual)}: computed, and not measured on a real machine", err=True)
             flush_output()
     except click.exceptions.Exit as left:
         code = left.exit_code

@@ -10,9 +10,10 @@ import click
 
 from dbbstation.cli.instrument_options import chosen_protocol, protocol_options
 from dbbstation.cli.number_types import Finite
-from dbbstation.cli.output import echo, json_text
+from dbbstation.cli.output import echo, json_text, say
 from dbbstation.cli.source_files import source_file_option
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, interrupt_on
+from dbbstation.system.virtual_ports import marked_virtual
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,7 +111,11 @@ def emulate(
     from dbbstation.virtual.wire import VirtualInstrument
     from dbbstation.virtual.wire_clock import ScaledClock, WaitingClock
 
-    protocol = at_rate(chosen_protocol(instrument, profile, zero_mm), rate_hz)
+    usual = chosen_protocol(instrument, profile, zero_mm)
+    protocol = at_rate(usual, rate_hz)
+    sent_hz, usual_hz = protocol.fastest_hz(baud) * time_scale, usual.fastest_hz(baud)
+    if not wait and sent_hz > usual_hz:
+        say(f"note: sends {sent_hz:g} readings a second, {instrument} has {usual_hz:g}")
     machine, plan = read_machine(machine_file), read_plan(plan_file)
     model = _truth(machine, truth, source_files, seed)
     virtual = VirtualMachine(model, plan, seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))
@@ -121,6 +126,7 @@ def emulate(
     with ExitStack() as stack:
         wire = stack.enter_context(VirtualInstrument(protocol, cell.length_mm_at, clock=clock, baud=baud))
         control = stack.enter_context(ControlServer(commands))
+        stack.enter_context(marked_virtual(wire.port))
         if as_json:
             echo(json_text({"port": wire.port, "control": control.url}))
         else:

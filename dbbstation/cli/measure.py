@@ -22,6 +22,7 @@ from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import SessionOptions, require_bar, session_options
 from dbbstation.service.patience import RECONNECT_S, driver_patience
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, answered, interrupt_on
+from dbbstation.system.virtual_ports import is_virtual
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -169,7 +170,7 @@ def _measured(asked: MeasureOptions) -> None:
             chosen.name,
             asked.profile or "",
             f"{asked.port}, in machine time" if waits else asked.port,
-            virtual=asked.auto is not None or asked.time_scale != 1.0,
+            virtual=asked.auto is not None or asked.time_scale != 1.0 or is_virtual(asked.port),
         ),
     )
     job.check(str(asked.plan_file))

@@ -47,10 +47,10 @@ _GIVEN = frozenset({ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP, Pa
 
 def provenance() -> Provenance:
     """Return the provenance with the inputs read so far."""
-    from dbbstation.files.inputs import inputs_so_far
+    from dbbstation.files.inputs import inputs_so_far, virtual_so_far
     from dbbstation.files.provenance import Provenance
 
-    return Provenance(PROGRAM, command_of(click.get_current_context()), inputs_so_far())
+    return Provenance(PROGRAM, command_of(click.get_current_context()), inputs_so_far(), virtual_so_far())
 
 
 def command_of(context: click.Context) -> str:

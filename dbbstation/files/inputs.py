@@ -23,9 +23,11 @@ _LOG = logging.getLogger(__name__)
 class InputBook:
     """Inputs in the order of their first reading."""
 
-    def __init__(self) -> None:
+    def __init__(self, around: InputBook | None = None) -> None:
         self._digests: dict[Path, str] = {}
         self._read: set[Path] = set()
+        self._around = around
+        self.virtual: dict[str, None] = {}
 
     def note_read(self, path: Path) -> None:
         """Note a reading that outputs need not name."""
@@ -34,6 +36,12 @@ class InputBook:
     def was_read(self, path: Path) -> bool:
         """Whether a file was read so far."""
         return real_path(path) in self._read
+
+    def note_virtual(self, name: str) -> None:
+        """Note that something read comes from a virtual machine, in all books around too."""
+        self.virtual[name] = None
+        if self._around is not None:
+            self._around.note_virtual(name)
 
     def note(self, path: Path, digest: str) -> None:
         """Note a file; the last reading of a changed file counts."""
@@ -61,7 +69,7 @@ _BOOK: ContextVar[InputBook | None] = ContextVar("inputs", default=None)
 @contextmanager
 def input_book() -> Iterator[InputBook]:
     """Note every input read inside."""
-    book = InputBook()
+    book = InputBook(_BOOK.get())
     token = _BOOK.set(book)
     try:
         yield book
@@ -94,6 +102,19 @@ def note_known(path: Path, digest: str) -> None:
     if book is not None:
         book.note(path, digest)
         book.note_read(path)
+
+
+def note_virtual(name: str) -> None:
+    """Note that what was read under a name comes from a virtual machine."""
+    book = _BOOK.get()
+    if book is not None:
+        book.note_virtual(name)
+
+
+def virtual_so_far() -> tuple[str, ...]:
+    """Return names of sessions and models of virtual machines that were read so far."""
+    book = _BOOK.get()
+    return () if book is None else tuple(book.virtual)
 
 
 def note_read(path: Path) -> None:

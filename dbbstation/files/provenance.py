@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 BESIDE_TABLE = ".provenance.json"
 """What follows the name of a table in the name of the file that says where it comes from."""
 
+VIRTUAL = "VIRTUAL MACHINE"
+"""Marks everything that says nothing of a real machine."""
+
 _COMMENT = 170
 """Characters of a command in one comment: controls cut longer ones."""
 
@@ -30,15 +33,18 @@ class Provenance:
     Attributes:
         command: without options that only direct the result.
         inputs: SHA-256 of every file read, by name.
+        virtual: names of inputs that come from a virtual machine.
     """
 
     program: str
     command: str
     inputs: Mapping[str, str] = field(default_factory=dict)
+    virtual: tuple[str, ...] = ()
 
     def data(self) -> dict[str, object]:
         """Return it for JSON and YAML."""
-        return {"program": self.program, "command": self.command, "inputs": dict(self.inputs)}
+        virtual = {"virtual": list(self.virtual)} if self.virtual else {}
+        return {"program": self.program, "command": self.command, "inputs": dict(self.inputs), **virtual}
 
     def comments(self, said: Mapping[str, str]) -> dict[str, str]:
         """Return it as comments of an NC program, text by title.
@@ -47,7 +53,8 @@ class Provenance:
             said: comments already there; inputs hashed in them are left out.
         """
         words = textwrap.wrap(self.command, _COMMENT, break_long_words=False, break_on_hyphens=False)
-        comments = {"written by": self.program}
+        comments = {VIRTUAL: f"computed from {', '.join(self.virtual)}"} if self.virtual else {}
+        comments["written by"] = self.program
         comments |= {f"command {k}" if k > 1 else "command": text for k, text in enumerate(words, start=1)}
         known = " ".join(said.values())
         comments |= {f"input {name}": f"sha256 {digest}" for name, digest in self.inputs.items() if digest not in known}
@@ -55,7 +62,10 @@ class Provenance:
 
     def text(self) -> str:
         """Return it as lines of text."""
-        return "\n".join([self.command, *(f"{name}: sha256 {digest}" for name, digest in self.inputs.items())])
+        virtual = [f"{VIRTUAL}: {', '.join(self.virtual)}"] if self.virtual else []
+        return "\n".join(
+            [*virtual, self.command, *(f"{name}: sha256 {digest}" for name, digest in self.inputs.items())]
+        )
 
 
 def beside_table(path: Path) -> Path:

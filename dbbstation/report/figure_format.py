@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from dbbstation.files.provenance import VIRTUAL
 from dbbstation.report.svg import as_svg
 
 if TYPE_CHECKING:
@@ -50,6 +51,8 @@ def in_format(figure: Figure, wanted: FigureFormat | Stamped) -> bytes:
         wanted: format, with provenance for its metadata.
     """
     kind = wanted.format if isinstance(wanted, Stamped) else wanted
+    if isinstance(wanted, Stamped) and wanted.provenance.virtual:
+        figure.text(0.005, 0.995, VIRTUAL, va="top", color="#d55e00", weight="bold", fontsize=8)
     metadata = _metadata(wanted.provenance, kind) if isinstance(wanted, Stamped) else {}
     if kind is FigureFormat.SVG:
         return as_svg(figure, metadata)

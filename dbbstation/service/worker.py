@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from dbbstation import __version__
 from dbbstation.errors import StationError
 from dbbstation.files.formats.settings import read_settings, settings_files
-from dbbstation.files.inputs import input_book, inputs_so_far
+from dbbstation.files.inputs import input_book, inputs_so_far, virtual_so_far
 from dbbstation.files.places import name_of
 from dbbstation.files.provenance import Provenance
 from dbbstation.files.refused import in_a_sentence
@@ -168,7 +168,7 @@ def _needed(path: Path | None, what: str) -> Path:
 def _provenance(*words: str | Path) -> Provenance:
     """Return the provenance: equivalent command, files without folders, inputs so far."""
     command = shlex.join(["dbbstation", *(name_of(word) if isinstance(word, Path) else word for word in words)])
-    return Provenance(f"dbbstation {__version__}", command, inputs_so_far())
+    return Provenance(f"dbbstation {__version__}", command, inputs_so_far(), virtual_so_far())
 
 
 def _stage(text: str, done: int = 0, of: int = 0) -> None:  # noqa: ARG001 - as `Progress` has it; the station shows no counts

@@ -17,7 +17,7 @@ from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import model_text
 from dbbstation.files.formats.settings import Settings
 from dbbstation.files.gateway import content_of, digest_of
-from dbbstation.files.inputs import input_book, inputs_so_far
+from dbbstation.files.inputs import input_book, inputs_so_far, virtual_so_far
 from dbbstation.files.own_sources import every_source
 from dbbstation.files.places import name_of
 from dbbstation.files.provenance import Provenance
@@ -221,7 +221,7 @@ TASKS = {"calibrate": _calibrated, "circles": _circles, "diagnose": _diagnosed, 
 def _provenance(piece: FleetPiece) -> Provenance:
     """Return the provenance as of a single session's command."""
     command = shlex.join(["dbbstation", piece.task, name_of(piece.folder), *piece.options.words()])
-    return Provenance(f"dbbstation {__version__}", command, inputs_so_far())
+    return Provenance(f"dbbstation {__version__}", command, inputs_so_far(), virtual_so_far())
 
 
 def _size(name: str, value_um: float) -> FleetValue:

@@ -49,7 +49,8 @@ def session_figures(folder: Path) -> SessionFigures:
     return SessionFigures(
         name=session.name,
         sha256=session.sha256,
-        machine=session.serial_number or session.machine.name,
+        # Virtual and real circles never stand in one chart.
+        machine=("virtual " if session.virtual else "") + (session.serial_number or session.machine.name),
         started=min(moments, default=None),
         runs=runs,
         bar="" if session.bar is None else session.bar.serial_number,

@@ -24,6 +24,7 @@ from dbbstation.service.session_list import list_sessions
 from dbbstation.station.assembly import Job, Workplace, assemble
 from dbbstation.station.commands import Accept, Quit, Start
 from dbbstation.station.storage import time_of_day
+from dbbstation.system.virtual_ports import _mark, is_virtual, marked_virtual
 from tests.cli.conftest import call
 from tests.station.bench import MACHINE_FILE
 from tests.station.readings import run_readings
@@ -139,3 +140,13 @@ def test_no_virtual_session_stands_before_a_real_one(plan_file: Path, tmp_path: 
         now = read_session(measured(plan_file, tmp_path / f"now-{by.name}", by))
         found = [session.folder for _, session in former_sessions(now, tmp_path)]
         assert (before in found) is (by is REAL)
+
+
+def test_the_port_of_emulate_is_marked_while_it_runs() -> None:
+    port = "/dev/no-such-port-57"
+    assert not is_virtual(port)
+    with marked_virtual(port):
+        assert is_virtual(port)
+        _mark(port).write_text("999999999", "ascii")  # of a program that was killed
+        assert not is_virtual(port)
+    assert not is_virtual(port)

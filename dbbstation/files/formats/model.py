@@ -15,6 +15,7 @@ from dbbstation.files.atomic import refuse_existing, write_text
 from dbbstation.files.formats.machine import machine_data, machine_parts
 from dbbstation.files.formats.model_schema import CovarianceSchema, ModelFile, SourceSchema
 from dbbstation.files.formats.quantities import Quantity
+from dbbstation.files.inputs import note_virtual
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import dotted, format_of, read_document, validate
 from dbbstation.model.identified import IdentifiedModel
@@ -77,6 +78,8 @@ def parse_model(path: Path, known: Mapping[str, ErrorSource], faults: list[Probl
     file = None if document is None else validate(document, ModelFile, faults)
     if document is None or file is None:
         return None
+    if file.provenance is not None and file.provenance.virtual:
+        note_virtual(path.name)
     machine = file.machine.to_domain()
     reader = _Sources(document, machine, known, faults)
     fitted = [reader.fitted(("sources", i), source) for i, source in enumerate(file.sources)]

@@ -56,6 +56,8 @@ class ProvenanceSchema(Schema):
     """What was asked for, files without their folders."""
     inputs: dict[str, Sha256Hex]
     """SHA-256 of every file that was read, by name; recordings have theirs in the session file."""
+    virtual: tuple[str, ...] = ()
+    """Inputs that come from a virtual machine; the model then says nothing of a real one."""
 
 
 class ModelFile(Schema):

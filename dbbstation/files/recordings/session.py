@@ -15,6 +15,7 @@ from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.gateway import digest_of
+from dbbstation.files.inputs import note_virtual
 from dbbstation.files.places import name_of
 from dbbstation.files.recordings import session_name
 from dbbstation.files.recordings.entries import (
@@ -260,6 +261,8 @@ def read_session(path: Path, *, keeps: bool = False) -> SessionFolder:
     session = parse_session(path, faults)
     if session is None or faults:
         raise InputError(faults)
+    if session.virtual:
+        note_virtual(session.name)
     return replace(session, keeps=keeps)
 
 

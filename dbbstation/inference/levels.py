@@ -241,9 +241,9 @@ def difference_of(
     if probability >= SURE:
         predicts = gains is None or gains.predicts or any(one.answer in SAYS_YES for one in classes)
         answer = Differs.YES if predicts else Differs.CANNOT_TELL
-        why = "" if predicts else "it is found in these rows, and held-out rows gain nothing by it"
+        why = "" if predicts else "it is found here, and held-out parts gain nothing by it"
         if gains is None:
-            why = "not tested on held-out rows"
+            why = "not tested on held-out parts"
     elif doubts:
         answer, why = Differs.CANNOT_TELL, doubts[0]
     elif probability > ABSENT:

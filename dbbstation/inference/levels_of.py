@@ -88,17 +88,20 @@ def levels_of(
 
 def _doubts(settled: Settled, left: LeftOver, sizes: tuple[Detectable, ...], matters: float) -> tuple[str, ...]:
     """Return why an effect of interest may be hidden."""
-    channel, unit, found = settled.channel, settled.channel.unit, list[str]()
+    channel, found = settled.channel, list[str]()
+    per, unit = (1e3, "µm") if channel.unit == "mm" and channel.rows_are == "tests" else (1.0, channel.unit)
     if settled.stopped:
         found.append("the search ended at its limit of work")
     if not left.is_noise:
-        found.append(f"what is left is not noise: {left.worst.rms:.2g} {unit} in {left.worst.name}".replace("  ", " "))
+        found.append(
+            f"what is left is not noise: {per * left.worst.rms:.2g} {unit} in {left.worst.name}".replace("  ", " ")
+        )
     for one in sizes:
         if one.size is None:
             parameters = ", ".join(channel.base.names)
             found.append(f"{one.name} could be concealed by {parameters}")
         elif one.size > matters:
-            found.append(f"{one.name} is not found below {one.size:.2g} {unit}".rstrip())
+            found.append(f"{one.name} is not found below {per * one.size:.2g} {unit}".rstrip())
     return tuple(found)
 
 

@@ -13,36 +13,50 @@ from types import ModuleType
 __version__ = "0.1.0"
 
 _PUBLIC = {
+    "ArgumentError": "dbbstation.errors",
+    "Program": "dbbstation.tasks.programs",
     "StationError": "dbbstation.errors",
     "calibrate": "dbbstation.tasks.calibrate",
+    "circle": "dbbstation.tasks.circles",
     "circles": "dbbstation.tasks.circles",
+    "compare": "dbbstation.tasks.compare",
     "compensate": "dbbstation.tasks.compensate",
     "diagnose": "dbbstation.tasks.diagnose",
     "evaluate": "dbbstation.tasks.evaluate",
+    "history": "dbbstation.tasks.history",
     "known_instruments": "dbbstation.instrument.library",
     "known_sources": "dbbstation.tasks.known",
+    "identify": "dbbstation.tasks.drive",
     "load": "dbbstation.tasks.load",
     "mismatch": "dbbstation.tasks.mismatch",
     "predict": "dbbstation.tasks.predict",
     "read_model": "dbbstation.tasks.models",
+    "simulate": "dbbstation.tasks.simulate",
     "write_model": "dbbstation.tasks.models",
 }
 """Public names, and the module of each; their types stand in `__init__.pyi`."""
 
 __all__ = [
+    "ArgumentError",
+    "Program",
     "StationError",
     "__version__",
     "calibrate",
+    "circle",
     "circles",
+    "compare",
     "compensate",
     "diagnose",
     "evaluate",
+    "history",
+    "identify",
     "known_instruments",
     "known_sources",
     "load",
     "mismatch",
     "predict",
     "read_model",
+    "simulate",
     "write_model",
 ]
 

@@ -18,11 +18,12 @@ if TYPE_CHECKING:
 
     import pytest
 
-OF_TABLES = ("dbbstation.tasks.mismatch.mismatch", "dbbstation.tasks.drive.drive")
+OF_TABLES = ("dbbstation.tasks.mismatch.mismatch", "dbbstation.tasks.drive.identify")
 """Tasks on tables of the package, which documents show and tests look at."""
 
-OF_SESSIONS = tuple(
-    f"dbbstation.tasks.{name}.{name}" for name in ("calibrate", "diagnose", "compare", "evaluate", "drive")
+OF_SESSIONS = (
+    *(f"dbbstation.tasks.{name}.{name}" for name in ("calibrate", "diagnose", "compare", "evaluate")),
+    "dbbstation.tasks.drive.identify",
 )
 """Tasks that a command carries out for each way of printing what it found."""
 

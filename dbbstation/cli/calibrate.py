@@ -9,20 +9,9 @@ from dbbstation.cli.output import echo
 from dbbstation.tasks.calibrate import calibrate as task
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from dbbstation.calibration.checks.plan_check import PlanCheck
     from dbbstation.calibration.checks.scatter import ScatterCheck
     from dbbstation.results.calibration import CalibrationResult
-    from dbbstation.tasks.models import HasModel
-
-
-def write_model(result: HasModel, path: Path, *, force: bool) -> None:
-    """Write the model with its provenance."""
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.files.formats.model import write_model as write
-
-    write(path, result.model, provenance=provenance(), force=force)
 
 
 def names_in(text: str | None) -> list[str] | None:
@@ -146,7 +135,7 @@ def _print_scatter(check: ScatterCheck, *, missing_physics: bool) -> None:
 calibrate = command(
     task,
     show,
-    CommandOutput("out", "Write the calibrated model here.", write_model, said="model written to {path}"),
+    CommandOutput("out", "Write the calibrated model here.", said="model written to {path}"),
     figure(said="figure written to {path}"),
     remarks=lambda result: (f"outlier, kept out of the fit: {one.text}" for one in result.outliers),
 )

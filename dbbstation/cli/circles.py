@@ -34,18 +34,7 @@ def show(
         _print_quick_looks(result.quick_look)
 
 
-def _write_table(result: CirclesResult, path: Path, *, force: bool) -> None:
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.files.provenance import write_table
-    from dbbstation.files.recordings.table_csv import table_csv
-
-    rows = result.rows()
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    columns = [[row.get(name, "") for name in names] for row in rows]
-    write_table(path, table_csv(names, list(zip(*columns, strict=True))), provenance(), force=force)
-
-
-circles = command(task, show, CommandOutput("csv", "Write the table here, as CSV.", _write_table, table=True))
+circles = command(task, show, CommandOutput("csv", "Write the table here, as CSV.", table=True))
 
 
 def _print(result: CirclesResult, *, several: bool) -> None:

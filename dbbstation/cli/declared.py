@@ -7,6 +7,7 @@ import re
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
@@ -15,7 +16,7 @@ import click
 from dbbstation.cli.figure_option import _known_format, format_of
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import ShopOption
-from dbbstation.errors import ArgumentError
+from dbbstation.errors import ArgumentError, OutputError
 from dbbstation.tasks.declare import options_of
 
 if TYPE_CHECKING:
@@ -25,6 +26,13 @@ if TYPE_CHECKING:
     from dbbstation.tasks.declare import Declared, TaskParameter
 
 
+def save(result: Any, path: Path, *, force: bool) -> None:  # noqa: ANN401 - any result
+    """Save the main product with its provenance."""
+    from dbbstation.cli.provenance import provenance
+
+    result.save(path, force=force, provenance=provenance)
+
+
 @dataclass(frozen=True)
 class CommandOutput:
     """A file that a command writes of its result.
@@ -32,7 +40,8 @@ class CommandOutput:
     Attributes:
         name: of the option.
         field: of the result, which gets the file's name; empty: as the option.
-        write: takes result, path and `force`.
+        write: takes result, path and `force`; by default saves the main product.
+        folder: a new session's, which is required.
         table: has its provenance in a file beside it.
         said: printed on standard error once written, with `{path}`.
         check: of the path, before any work.
@@ -42,7 +51,8 @@ class CommandOutput:
 
     name: str
     help: str
-    write: Callable[..., None]
+    write: Callable[..., None] = save
+    folder: bool = False
     table: bool = False
     said: str = ""
     check: Callable[..., Path | None] | None = None
@@ -105,10 +115,12 @@ def command(
             raise error
 
     options = [_option(one) for one in {**task.parameters, **shown}.values() if one.name != "force"]
-    options += [
-        click.Option([f"--{one.name}"], type=_PATHS.get("file"), callback=one.check, help=one.help) for one in outputs
-    ]
-    if outputs or with_force:
+    for one in outputs:
+        kind = _PATHS.get("folder" if one.folder else "file")
+        options.append(
+            click.Option([f"--{one.name}"], type=kind, required=one.folder, callback=one.check, help=one.help)
+        )
+    if with_force or any(not one.folder for one in outputs):
         options.append(click.Option(["--force"], is_flag=True, help="Replace existing files."))
     options.append(click.Option(["--json", "as_json"], is_flag=True, help="Print the result as JSON."))
     return click.Command(task.name, params=options, callback=run, help=task.help)
@@ -123,7 +135,8 @@ def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]
         asked = {**asked, "provenance": provenance}
     try:
         with _bar(task, asked) as progress:
-            return function(**asked, progress=progress, say=lambda text: say(f"note: {text}"))
+            now = getattr(import_module(function.__module__), function.__name__)  # a test may have put another there
+            return now(**{"progress": progress, "say": lambda text: say(f"note: {text}"), **asked})
     except ArgumentError as error:
         flags = {name: one.flag for name, one in task.parameters.items()}
         what = f"{error.what}; {error.remedy}" if error.remedy else error.what
@@ -149,9 +162,11 @@ def _refuse(paths: Mapping[CommandOutput, Path], *, force: bool) -> None:
     from dbbstation.files.provenance import refuse_existing_table
 
     for one, path in paths.items():
+        if one.folder and path.exists():
+            raise OutputError("the session folder exists already", where=str(path), remedy="choose another name")
         if one.table:
             refuse_existing_table(path, force=force)
-    refuse_outputs(paths.values(), force=force)
+    refuse_outputs((path for one, path in paths.items() if not one.folder), force=force)
 
 
 def _written(

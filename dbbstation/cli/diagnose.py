@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from dbbstation.cli.calibrate import write_model
-from dbbstation.cli.declared import CommandOutput, command, figure
+from dbbstation.cli.declared import CommandOutput, command, figure, save
 from dbbstation.cli.effects import cancelling_text
 from dbbstation.cli.output import echo
 from dbbstation.tasks.declare import Option
@@ -47,7 +46,7 @@ def _further() -> dict[str, object]:
 def _write(result: DiagnosisResult, path: Path, *, force: bool) -> None:
     from dbbstation.cli.model_warnings import say_model_warnings
 
-    write_model(result, path, force=force)
+    save(result, path, force=force)
     say_model_warnings(result.model)
 
 

@@ -7,23 +7,14 @@ from typing import TYPE_CHECKING
 from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.effects import cancelling_text
 from dbbstation.cli.output import echo
-from dbbstation.tasks.drive import drive as task
+from dbbstation.tasks.drive import identify as task
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from dbbstation.diagnosis.drive.findings import DriveFinding, ForceLocation, HeldOutForce
     from dbbstation.facts.value import Value
     from dbbstation.results.drive import DriveResult
-
-
-def _write(result: DriveResult, path: Path, *, force: bool) -> None:
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.files.provenance import write_table
-    from dbbstation.files.recordings.drive_csv import compared_csv
-
-    write_table(path, compared_csv(result.table), provenance(), force=force)
 
 
 def show(result: DriveResult) -> None:
@@ -144,6 +135,6 @@ def _number(number: Value) -> str:
 drive = command(
     task,
     show,
-    CommandOutput("out", "Write what was compared here, as CSV.", _write, table=True, field="compared"),
+    CommandOutput("out", "Write what was compared here, as CSV.", table=True, field="compared"),
     figure("Draw force and friction here"),
 )

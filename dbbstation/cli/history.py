@@ -2,113 +2,43 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
-from dbbstation.cli.chosen_tests import chosen_tests_options
-from dbbstation.cli.number_types import Finite
-from dbbstation.cli.output import echo, echo_line
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.cli.declared import CommandOutput, command
+from dbbstation.cli.output import COVERAGE_FACTOR, echo, echo_line
+from dbbstation.cli.shop import shop_settings
+from dbbstation.tasks.history import history as task
+from dbbstation.tasks.telling import silent
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
     from dbbstation.results.history import HistoryResult, MachineHistoryResult, QuantityHistory
 
 MOST_NOTES = 12
 """Notes that the terminal shows; `--json` and `--html` have all."""
 
 
-@click.command()
-@click.argument("folder", type=click.Path(path_type=Path), metavar="FOLDER")
-@click.option(
-    "--false-alarms",
-    type=Finite(1e-6, 0.1),
-    default=1e-3,
-    show_default=True,
-    help="False alarms per session, all quantities of a machine together.",
-)
-@chosen_tests_options
-@source_file_option
-@click.option("--rebuild", is_flag=True, help="Read every session anew, whatever the index knows.")
-@click.option(
-    "--html", "page", type=click.Path(path_type=Path, dir_okay=False), help="Write a page with all trends here."
-)
-@click.option("--csv", "out", type=click.Path(path_type=Path, dir_okay=False), help="Write every value here, as CSV.")
-@click.option("--force", is_flag=True, help="Replace existing files.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def history(
-    folder: Path,
-    *,
-    false_alarms: float,
-    tests: tuple[str, ...],
-    exclude: tuple[str, ...],
-    source_files: tuple[Path, ...],
-    rebuild: bool,
-    page: Path | None,
-    out: Path | None,
-    force: bool,
-    as_json: bool,
-) -> None:
-    r"""Show what the sessions of a folder say over time, machine by machine, and what changed beyond uncertainty.
-
-    Of every test and direction G, centre X and Y, mean radial error R and centre distance C; parameters of models that lie in
-    the folder and come from one of its sessions. Limits are those of the shop's settings. A two-sided CUSUM with a limit for
-    single sessions watches each quantity, from its second session on; the rate of false alarms is that of the whole table.
-    No model is fitted. What was read is kept in an index in the user's cache folder.
-
-    \b
-    Examples:
-      dbbstation history sessions
-      dbbstation history sessions --html history.html --csv history.csv
-      dbbstation history sessions --test a,f --false-alarms 0.0001 --json
-    """
-    from dbbstation.cli.output import COVERAGE_FACTOR, print_result, say
-    from dbbstation.cli.progress import count_bar
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.cli.shop import shop_settings
-    from dbbstation.files.atomic import refuse_outputs, write_bytes
-    from dbbstation.files.provenance import refuse_existing_table, write_table
-    from dbbstation.files.recordings.table_csv import table_csv
-    from dbbstation.history.trend import TrendOptions
-    from dbbstation.tasks.history import history as history_of
-
-    refuse_outputs([page, out], force=force)
-    if out is not None:
-        refuse_existing_table(out, force=force)
-    settings = shop_settings()
-    asked = TrendOptions(COVERAGE_FACTOR, settings.tolerances, false_alarms, tests, exclude)
-    with count_bar("sessions") as counted:
-        found = history_of(
-            folder, asked, source_files, rebuild=rebuild, progress=lambda _text, done=0, of=0: counted(done, of)
-        )
-    _say(found)
-    if page is not None:
-        from dbbstation.report.history_page import history_html
-
-        write_bytes(page, history_html(found, provenance(), settings.tolerances_from), force=force)
-        say(f"page written to {page}")
-    if out is not None:
-        rows = found.rows()
-        columns = [["" if row[name] is None else row[name] for row in rows] for name in rows[0]]
-        write_table(out, table_csv(list(rows[0]), columns), provenance(), force=force)
-        say(f"table written to {out}")
-    if as_json:
-        print_result(found)
-        return
+def show(found: HistoryResult) -> None:
+    """Print the history of every machine."""
     for machine in found.machines:
         _print(machine, found)
 
 
-def _say(found: HistoryResult) -> None:
-    from dbbstation.cli.output import say
+def _write_page(found: HistoryResult, path: Path, *, force: bool) -> None:
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.files.atomic import write_bytes
+    from dbbstation.report.history_page import history_html
 
-    for one in found.left_out:
-        say(f"left out: {one.name}: {one.problem}")
-    for note in found.remarks[:MOST_NOTES]:
-        say(f"note: {note}")
+    write_bytes(path, history_html(found, provenance(), shop_settings().tolerances_from), force=force)
+
+
+def _remarks(found: HistoryResult) -> Iterator[str]:
+    yield from (f"left out: {one.name}: {one.problem}" for one in found.left_out)
+    yield from (f"note: {note}" for note in found.remarks[:MOST_NOTES])
     if len(found.remarks) > MOST_NOTES:
-        say(f"and {len(found.remarks) - MOST_NOTES} more notes, in --json and --html")
+        yield f"and {len(found.remarks) - MOST_NOTES} more notes, in --json and --html"
 
 
 def _print(machine: MachineHistoryResult, found: HistoryResult) -> None:
@@ -153,3 +83,13 @@ def _pair(value: float | None, u: float | None, k: float) -> tuple[str, str]:
     from dbbstation.report.history_words import rounded
 
     return rounded(value, u, k), rounded(None if u is None else k * u, u, k)
+
+
+history = command(
+    task,
+    show,
+    CommandOutput("html", "Write a page with all trends here.", _write_page, said="page written to {path}"),
+    CommandOutput("csv", "Write every value here, as CSV.", table=True, said="table written to {path}"),
+    remarks=_remarks,
+    more=lambda: {"tolerances": shop_settings().tolerances, "coverage_factor": COVERAGE_FACTOR, "say": silent},
+)

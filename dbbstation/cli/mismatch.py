@@ -38,19 +38,6 @@ def show(result: MismatchResult | SimulatorResult) -> None:
         _print(result)
 
 
-def _write(result: MismatchResult | SimulatorResult, path: Path, *, force: bool) -> None:
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.files.atomic import write_text
-    from dbbstation.files.provenance import write_table
-    from dbbstation.files.recordings.table_csv import table_csv
-    from dbbstation.results.simulator import SimulatorResult
-
-    if isinstance(result, SimulatorResult):
-        write_text(path, result.code, force=force)
-    else:
-        write_table(path, table_csv(list(result.table), list(result.table.values())), provenance(), force=force)
-
-
 def _write_rows(result: SimulatorResult, path: Path, *, force: bool) -> None:
     from dbbstation.cli.provenance import provenance
     from dbbstation.files.provenance import write_table
@@ -72,7 +59,7 @@ ROWS = "With --simulator: write measured, simulated, refitted and corrected valu
 mismatch = command(
     task,
     show,
-    CommandOutput("out", OUT, _write, table=True, refused=_refused),
+    CommandOutput("out", OUT, table=True, refused=_refused),
     CommandOutput("corrected", ROWS, _write_rows, table=True, only_with="simulator"),
     figure("Draw what differs here"),
     more=_allowed,

@@ -23,6 +23,7 @@ _NO_CONTENT = frozenset(
     {
         "out",
         "csv",
+        "html",
         "corrected",
         "allow",
         "page",

@@ -10,7 +10,9 @@ import textwrap
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from dbbstation import __version__
 from dbbstation.files.atomic import refuse_existing, write_folder
+from dbbstation.files.inputs import inputs_so_far, virtual_so_far
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -94,3 +96,8 @@ def write_table(path: Path, text: str, provenance: Provenance, *, force: bool = 
     beside = beside_table(path)
     told = json.dumps(provenance.data(), indent=1, ensure_ascii=False) + "\n"
     write_folder(path.parent, {path.name: text, beside.name: told}, force=force)
+
+
+def from_python() -> Provenance:
+    """Return the provenance of a Python script's output, without command."""
+    return Provenance(f"dbbstation {__version__}", "from Python", inputs_so_far(), virtual_so_far())

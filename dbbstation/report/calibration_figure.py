@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle as Ring
 
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
@@ -13,8 +13,9 @@ from dbbstation.calibration.checks.visibility import visibility
 from dbbstation.calibration.reporting.on_the_plate import ball_shifts, circle_tests
 from dbbstation.calibration.reporting.residual_map import residual_map
 from dbbstation.plan.circle import Direction
-from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, SET, draw_maps, in_style
-from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
+from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, SET, ShownFigure, draw_maps, in_style
+from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
+from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -35,18 +36,24 @@ LONGEST_MM = 60.0
 LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
-def calibration_figure(calibration: Calibration, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+def calibration_figure(calibration: Calibration, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
     """Draw the figure as SVG."""
     with in_style():
+        if isinstance(wanted, OnePanel):
+            tests = circle_tests(calibration)
+            reach = max(float(np.abs(circle.before_um).max()) for test in tests for circle in test.circles)
+            panels = {test.name: partial(_circle, test=test, ring=_round(reach / 2.0)) for test in tests}
+            centres = {"centres": partial(_centres, tests=tests, k=1, title="calibrated")}
+            return wanted.draw(centres | {"balls": partial(_balls, balls=ball_shifts(calibration))} | panels)
         return in_format(draw_calibration(calibration), wanted)
 
 
-def draw_calibration(calibration: Calibration) -> Figure:
+def draw_calibration(calibration: Calibration) -> ShownFigure:
     """Draw all parts, one below the other."""
     tests = circle_tests(calibration)
     rows = -(-len(tests) // COLUMNS)
     heights = [2.3 * rows + 0.3, 1.2 + ROW_IN * len(tests), 4.3]
-    figure = Figure(figsize=(WIDTH_IN, sum(heights)), layout="constrained")
+    figure = ShownFigure(figsize=(WIDTH_IN, sum(heights)), layout="constrained")
     parts: Any = figure.subfigures(3, 1, height_ratios=heights, hspace=0.03)
     _circles(parts[0], tests, rows)
     _left_and_leverage(parts[1], calibration)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from dbbstation.diagnosis.compare.words import by_angle_um
 from dbbstation.plan.circle import Direction
-from dbbstation.report.drawing import AFTER, BEFORE, DIVERGING, QUARTERS, in_style
-from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
+from dbbstation.report.drawing import AFTER, BEFORE, DIVERGING, QUARTERS, ShownFigure, in_style
+from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
+from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,15 +23,18 @@ OVERLAYS = 3
 COLOUR_A, COLOUR_B = AFTER, BEFORE
 
 
-def compare_figure(found: Comparison, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+def compare_figure(found: Comparison, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
     """Draw maps over test and angle, and the worst runs of three tests, as SVG."""
     tests = list(dict.fromkeys((run.pair.test, run.pair.number) for run in found.runs))
     with in_style():
-        figure = Figure(figsize=(11.0, 6.0 + 0.2 * len(tests)), layout="constrained")
+        reach = max(1e3 * float(np.abs(run.smooth_mm).max()) for run in found.runs) or 1.0
+        if isinstance(wanted, OnePanel):
+            draw = partial(_map, found=found, tests=tests, reach=reach)
+            return wanted.draw({str(direction): partial(draw, direction=direction) for direction in Direction})
+        figure = ShownFigure(figsize=(11.0, 6.0 + 0.2 * len(tests)), layout="constrained")
         halves: Any = figure.subfigures(2, 1, height_ratios=(1.2 + 0.2 * len(tests), 4.2))
         upper, lower = halves
         maps: Any = upper.subplots(1, 2, sharey=True)
-        reach = max(1e3 * float(np.abs(run.smooth_mm).max()) for run in found.runs) or 1.0
         drawn = [_map(axes, found, tests, direction, reach) for axes, direction in zip(maps, Direction, strict=True)]
         upper.colorbar(drawn[0], ax=maps, label="B less A, µm")
         worst = _worst(found)

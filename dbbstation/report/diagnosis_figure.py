@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
 from dbbstation.calibration.reporting.evaluation import rms_um
@@ -14,9 +14,10 @@ from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.diagnosis.source_curves import found_sources, source_curves
 from dbbstation.inference.verdict import Verdict
 from dbbstation.plan.circle import Direction
-from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, draw_maps, in_style
-from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, ShownFigure, draw_maps, in_style
+from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.report.unexplained_panel import draw_unexplained
+from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,18 +38,27 @@ MARKER_OF = {"": "o", "lengthening": "^", "shortening": "v"}
 LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
-def diagnosis_figure(diagnosis: Diagnosis, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+def diagnosis_figure(diagnosis: Diagnosis, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
     """Draw maps, errors over their variables, traces and gains, as SVG."""
     with in_style():
+        if isinstance(wanted, OnePanel):
+            gains, found = gains_by_test(diagnosis), diagnosis.after is not diagnosis.before
+            draw = partial(_pairs, names=[one.name for one in gains], found=found)
+            return wanted.draw(
+                {
+                    "residual": partial(draw, values=[one.residual_um for one in gains]),
+                    "circularity": partial(draw, values=[one.circularity_um for one in gains]),
+                }
+            )
         return in_format(draw_diagnosis(diagnosis), wanted)
 
 
-def draw_diagnosis(diagnosis: Diagnosis) -> Figure:
+def draw_diagnosis(diagnosis: Diagnosis) -> ShownFigure:
     """Draw all non-empty parts, one below the other."""
     found = diagnosis.after is not diagnosis.before
     curves, gains, unnamed = source_curves(diagnosis), gains_by_test(diagnosis), diagnosis.unexplained.curve
     heights = [1.0 + ROW_IN * len(gains), *(2.1 for _ in curves), *([2.1] if unnamed else []), 4.6, 2.4]
-    figure = Figure(figsize=(WIDTH_IN, sum(heights) + 0.4), layout="constrained")
+    figure = ShownFigure(figsize=(WIDTH_IN, sum(heights) + 0.4), layout="constrained")
     figure.suptitle(_headline(diagnosis), fontsize=11, fontweight="bold")
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights, hspace=0.03)
     _maps(parts[0], diagnosis, found=found)

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from dbbstation.plan.circle import Direction
+from dbbstation.report.svg import as_svg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,6 +20,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.reporting.residual_map import ResidualMap
+
+
+class ShownFigure(Figure):
+    """A figure that a notebook shows without pyplot."""
+
+    def _repr_svg_(self) -> str:
+        return as_svg(self, {}).decode("utf-8")
+
 
 STYLE: Any = {
     "svg.hashsalt": "dbbstation",

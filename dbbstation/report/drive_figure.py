@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
-from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style
+from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
+from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,10 +20,13 @@ MOST_POINTS = 3000
 """Points of a line that are drawn: more make a large file and the same picture."""
 
 
-def drive_figure(diagnosis: DriveFindings, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+def drive_figure(diagnosis: DriveFindings, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
     """Draw a diagnosis of a drive, as SVG."""
     with in_style():
-        figure = Figure(figsize=(11.0, 6.2), layout="constrained")
+        if isinstance(wanted, OnePanel):
+            panels = {"force": _force, "residual": _left, "friction": _friction}
+            return wanted.draw({name: partial(draw, diagnosis=diagnosis) for name, draw in panels.items()})
+        figure = ShownFigure(figsize=(11.0, 6.2), layout="constrained")
         grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0))
         force = figure.add_subplot(grid[0, 0])
         left = figure.add_subplot(grid[1, 0], sharex=force)

@@ -1,14 +1,15 @@
-"""A figure's bytes by file extension."""
+"""What is drawn of a result: bytes by file extension, a figure, or one panel in given Axes."""
 
 from __future__ import annotations
 
 import io
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dbbstation.files.provenance import VIRTUAL
 from dbbstation.report.svg import as_svg
+from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,17 +40,23 @@ class Stamped:
     provenance: Provenance
 
 
-def figure_format(wanted: object) -> FigureFormat | Stamped:
+Wanted = FigureFormat | Stamped | OnePanel | None
+"""What is drawn: bytes in a format, one panel, or with None the figure itself."""
+
+
+def figure_format(wanted: object) -> Wanted:
     """Return a format, also from an extension such as `.svg`."""
-    return wanted if isinstance(wanted, Stamped) else FigureFormat(str(wanted))
+    return wanted if wanted is None or isinstance(wanted, Stamped | OnePanel) else FigureFormat(str(wanted))
 
 
-def in_format(figure: Figure, wanted: FigureFormat | Stamped) -> bytes:
-    """Return the figure's bytes, reproducible and without date.
+def in_format(figure: Figure, wanted: Wanted) -> Any:  # noqa: ANN401 - bytes or the figure
+    """Return the figure's bytes, reproducible and without date; the figure itself without a format.
 
     Args:
         wanted: format, with provenance for its metadata.
     """
+    if wanted is None or isinstance(wanted, OnePanel):
+        return figure
     kind = wanted.format if isinstance(wanted, Stamped) else wanted
     if isinstance(wanted, Stamped) and wanted.provenance.virtual:
         figure.text(0.005, 0.995, VIRTUAL, va="top", color="#d55e00", weight="bold", fontsize=8)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
-from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style
+from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
+from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,15 +26,21 @@ BINS = 40
 FEWEST_IN_BIN = 3
 
 
-def mismatch_figure(found: Mismatch, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+def mismatch_figure(found: Mismatch, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
     """Draw the difference over variables and rows, and each part's held-out error."""
     names = [share.variable for share in found.shares[:MOST_VARIABLES]]
     variables = [v for name in names for v in found.settled.channel.variables if v.name == name]
     wide = max(len(variables), 2)
+    before, after = _residuals(found)
     with in_style():
-        figure = Figure(figsize=(3.4 * wide, 6.4), layout="constrained")
+        if isinstance(wanted, OnePanel):
+            over = {
+                v.name: partial(_over, variable=v, before=before, after=after, unit=found.table.unit) for v in variables
+            }
+            rows = {"rows": partial(_over_rows, before=before, after=after, found=found)}
+            return wanted.draw(over | rows | {"held-out": partial(_held_out, found=found)})
+        figure = ShownFigure(figsize=(3.4 * wide, 6.4), layout="constrained")
         grid = figure.add_gridspec(2, wide)
-        before, after = _residuals(found)
         for k, variable in enumerate(variables):
             _over(figure.add_subplot(grid[0, k]), variable, before, after, found.table.unit)
         if not variables:

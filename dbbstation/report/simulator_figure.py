@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
-from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style
+from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
+from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,10 +20,13 @@ MOST_POINTS = 2000
 """Points of a cloud that are drawn: more make a large file and the same picture."""
 
 
-def simulator_figure(answer: SimulatorComparison, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+def simulator_figure(answer: SimulatorComparison, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
     """Draw refitted and corrected differences, and each part's held-out error."""
     with in_style():
-        figure = Figure(figsize=(7.2, 6.4), layout="constrained")
+        if isinstance(wanted, OnePanel):
+            panels = {"rows": _over_time, "signal": _over_signal, "held-out": _held_out}
+            return wanted.draw({name: partial(draw, answer=answer) for name, draw in panels.items()})
+        figure = ShownFigure(figsize=(7.2, 6.4), layout="constrained")
         grid = figure.add_gridspec(2, 2)
         _over_time(figure.add_subplot(grid[0, :]), answer)
         _over_signal(figure.add_subplot(grid[1, 0]), answer)

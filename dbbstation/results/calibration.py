@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 from dbbstation.calibration.reporting.figures import CalibrationFigures, Covariance
 from dbbstation.facts.serialise import AsItIs, Kept
-from dbbstation.facts.value import finite
+from dbbstation.facts.value import Value, finite
+from dbbstation.files.formats.model import write_model
+from dbbstation.files.provenance import Provenance
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.evaluation import rows_of
 from dbbstation.results.frame import Framed
@@ -20,12 +23,27 @@ class CalibrationResult(Framed, CalibrationFigures):
     Attributes:
         method: of ball positions: `jig`, `conv-a` or `conv-b`.
         covariance: of the machine's parameters.
-        model: for prediction, compensation or a file.
+        model: for prediction or compensation; `save` writes it.
+        recorded: what was fitted, for another task.
     """
 
     method: str
     covariance: Covariance
     model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)
+    recorded: Annotated[Any, AsItIs, Kept] = field(default=None, repr=False)
+
+    @property
+    def parameters(self) -> dict[str, Value]:
+        """Return the machine's parameters as `source.parameter`, with their standard uncertainties."""
+        return {f"{one.name}.{name}": value for one in self.sources for name, value in one.parameters.items()}
+
+    def headline(self) -> str:
+        """Return the number of parameters and what the model leaves."""
+        left = f"leaves {self.residual_rms_um:.2f} of {self.nominal_rms_um:.2f} µm rms"
+        return f"{self.parameters_identified} parameters, {left}"
+
+    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
+        write_model(path, self.model, provenance=provenance, force=force)
 
     def rows(self) -> list[dict[str, object]]:
         """Return the machine's parameters as rows; `u` is the standard uncertainty."""

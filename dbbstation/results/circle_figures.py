@@ -114,6 +114,9 @@ class CircleFiguresResult:
     uncertainty: Mapping[str, Budget]
     findings: Annotated[tuple[Finding, ...] | None, Absent] = None
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.test} {self.direction} {self.repeat}, G {self.g_um:.2f} µm>"
+
     def row(self) -> dict[str, object]:
         """Return all numbers of the circle for a table."""
         found: dict[str, object] = {}

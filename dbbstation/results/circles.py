@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from dbbstation.circles.path import Filter
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.quality.finding import Finding
     from dbbstation.quality.judge import Judgement
 
 
@@ -101,6 +102,15 @@ class CirclesResult(Framed):
     csv: Annotated[str | None, Absent] = None
     circles: Annotated[Circled, AsItIs, Kept] = field(repr=False)
 
+    def headline(self) -> str:
+        """Return the number of circles and their greatest G."""
+        found = [one.analysis.g_um for one in self.circles.circles if one.analysis is not None]
+        return (
+            f"{len(self.runs)} circles, G up to {max(found):.2f} µm"
+            if found
+            else f"{len(self.runs)} runs without a circle"
+        )
+
     def rows(self) -> list[dict[str, object]]:
         """Return all numbers, a row per circle."""
         return [run.row() for run in self.runs]
@@ -131,6 +141,14 @@ def _run(circle: MeasuredCircle) -> CircleFiguresResult | RunWithoutCircle:
     if one is None:
         name = (circle.session, entry.test, str(entry.direction), entry.repeat)
         return RunWithoutCircle(*name, circle.problem or None, findings)
+    return circle_figures(circle, one, findings)
+
+
+def circle_figures(
+    circle: MeasuredCircle, one: CircleAnalysis, findings: tuple[Finding, ...] | None = None
+) -> CircleFiguresResult:
+    """Return the figures of one circle with their uncertainties."""
+    entry = circle.entry
     figures, (x_mm, y_mm), raw = budgets(one, circle.known), one.centre_mm, one.raw
     value_um = {quantity: budget.value_um for quantity, budget in figures.items()}
     return CircleFiguresResult(

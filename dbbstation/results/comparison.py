@@ -204,6 +204,10 @@ class ComparisonResult(Framed):
         values = {one.name: one.parameters for one in self.causes if isinstance(one, ComparedCause)}
         return level_sentences(self.levels, "µm", values, rows="tests", what="The sessions")
 
+    def headline(self) -> str:
+        """Return whether they differ."""
+        return self.text
+
     def rows(self) -> list[dict[str, object]]:
         """Return one row per run."""
         return [

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 from pydantic import Field, computed_field
 
 from dbbstation.calibration.outliers.outlier import Outlier
+from dbbstation.facts.by_name import ByName
 from dbbstation.facts.run import OfRun
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value
+from dbbstation.files.formats.model import write_model
+from dbbstation.files.provenance import Provenance
 from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.limit_reached import LimitReached
@@ -253,7 +257,7 @@ class DiagnosisFigures(Framed):
     workspace: WorkspaceGain | None
     outliers: tuple[Outlier, ...]
     locations: tuple[MisfitLocation, ...]
-    sources: tuple[CauseResult, ...]
+    sources: ByName[CauseResult]
     cancelling: Cancelling | None
     unexplained: UnexplainedResult
     parameter_shift: tuple[ParameterShift, ...]
@@ -280,6 +284,13 @@ class DiagnosisFigures(Framed):
         """Causes with the verdict `identified`."""
         return tuple(one for one in self.sources if one.verdict == "identified")
 
+    def headline(self) -> str:
+        """Return the misfit and what is identified."""
+        named = ", ".join(one.name for one in self.identified) or "nothing"
+        if not self.mismatch:
+            return f"the recordings agree with the kinematic model, {self.noise_um:.2f} µm noise"
+        return f"misfit {self.misfit_rms_um:.2f} µm rms beyond noise; identified: {named}"
+
     def rows(self) -> list[dict[str, object]]:
         """Return one row per cause."""
         return [
@@ -300,8 +311,13 @@ class DiagnosisResult(DiagnosisFigures):
 
     Attributes:
         effects: contributions to circles, the greatest first.
-        model: joint model.
+        model: joint model, which `save` writes.
+        recorded: what was diagnosed, for another task.
     """
 
     effects: tuple[CauseContribution, ...]
     model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)
+    recorded: Annotated[Any, AsItIs, Kept] = field(default=None, repr=False)
+
+    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
+        write_model(path, self.model, provenance=provenance, force=force)

@@ -11,18 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from dbbstation.errors import OutputError, StationError
 from dbbstation.facts.serialise import AsItIs, Kept, json_of, plain
 from dbbstation.files.atomic import write_bytes
+from dbbstation.files.provenance import Provenance, from_python, write_table
+from dbbstation.files.recordings.table_csv import table_csv
+from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from os import PathLike
-
-
-class Picture(bytes):
-    """A figure as SVG for notebooks."""
-
-    __slots__ = ()
-
-    def _repr_svg_(self) -> str:
-        return self.decode("utf-8")
 
 
 FORMATS = (".svg", ".png", ".pdf")
@@ -37,11 +31,11 @@ class Framed:
     """A result that can be shown.
 
     Attributes:
-        drawing: draws by file extension; None without figure.
+        drawing: draws by file extension, a panel, or with None a figure; None without figure.
         notes: printed on standard error.
     """
 
-    drawing: Annotated[Callable[[object], bytes] | None, AsItIs, Kept] = field(default=None, repr=False, compare=False)
+    drawing: Annotated[Callable[[object], Any] | None, AsItIs, Kept] = field(default=None, repr=False, compare=False)
     notes: Annotated[tuple[str, ...], Kept] = field(default=(), repr=False)
 
     def rows(self) -> list[dict[str, object]]:
@@ -72,28 +66,77 @@ class Framed:
             raise StationError("pandas is not installed", remedy="install it, or use rows()") from error
         return pd.DataFrame(self.rows())
 
-    def plot(self, path: str | PathLike[str] | None = None, *, force: bool = False) -> Picture | None:
+    def plot(self, ax: Any = None, *, panel: str | None = None) -> Any:  # noqa: ANN401 - of Matplotlib, loaded when something is drawn
         """Draw the result.
 
         Args:
-            path: .svg, .png or .pdf; None: return the figure.
-            force: overwrite the file.
+            ax: Axes for one panel; None: a figure of all.
+            panel: its name, or the begin of it; None: the first.
 
         Returns:
-            The figure as SVG; None where it was written to a file.
+            The Axes or the Figure, which a notebook shows.
+
+        Raises:
+            OutputError: it has no figure.
+            ArgumentError: it has no such panel.
+        """
+        if ax is None and panel is None:
+            return self._drawing(None)
+        from matplotlib.figure import Figure  # noqa: PLC0415 - half a second for who draws nothing
+
+        return self._drawing(OnePanel(Figure(layout="constrained").subplots() if ax is None else ax, panel))
+
+    def save_figure(self, path: str | PathLike[str], *, force: bool = False) -> None:
+        """Write the figure as .svg, .png or .pdf.
 
         Raises:
             OutputError: no figure, another extension, or the file exists without `force`.
         """
-        if self.drawing is None:
-            raise OutputError(f"a {type(self).__name__} has no figure")
-        if path is None:
-            return Picture(self.drawing(FORMATS[0]))
         file = Path(path)
         if file.suffix.lower() not in FORMATS:
             raise OutputError("figures are written as .svg, .png or .pdf", where=str(file), remedy="name such a file")
-        write_bytes(file, self.drawing(file.suffix.lower()), force=force)
-        return None
+        write_bytes(file, self._drawing(file.suffix.lower()), force=force)
+
+    def save(
+        self, path: str | PathLike[str], *, force: bool = False, provenance: Callable[[], Provenance] = from_python
+    ) -> None:
+        """Write the main product, by default the table of `rows` as CSV.
+
+        Raises:
+            OutputError: the file exists without `force`.
+        """
+        self._save(Path(path), provenance(), force=force)
+
+    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
+        rows = self.rows()
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        columns = [["" if row.get(name) is None else row[name] for row in rows] for name in names]
+        write_table(path, table_csv(names, columns), provenance, force=force)
+
+    def _drawing(self, wanted: object) -> Any:  # noqa: ANN401 - as asked for
+        if self.drawing is None:
+            raise OutputError(f"a {type(self).__name__} has no figure")
+        return self.drawing(wanted)
+
+    def headline(self) -> str:
+        """Return the answer in one line."""
+        return next(iter(self.sentences()), f"{len(self.rows())} rows")
+
+    def summary(self) -> str:
+        """Return the answer in sentences and its table as text."""
+        rows = self.rows()
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        cells = [names, *([_shown(row.get(name)) for name in names] for row in rows)]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in cells]
+        return "\n".join([*(self.sentences() or [self.headline()]), "", *lines])
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.headline()}>"
+
+    def __init_subclass__(cls, **more: Any) -> None:  # noqa: ANN401 - as Python has it
+        super().__init_subclass__(**more)
+        cls.__repr__ = Framed.__repr__  # type: ignore[method-assign] # dataclasses keep one that is there
 
     def _repr_html_(self) -> str:
         rows = self.rows()
@@ -104,7 +147,7 @@ class Framed:
             for row in rows[:MOST_SHOWN]
         )
         more = f"<p>and {len(rows) - MOST_SHOWN} more rows</p>" if len(rows) > MOST_SHOWN else ""
-        said = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in self.sentences())
+        said = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in self.sentences() or [self.headline()])
         return f"{said}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
@@ -11,6 +12,8 @@ from pydantic import Field
 from dbbstation.diagnosis.table.mismatch import RefittedParameter, VariableShare
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value
+from dbbstation.files.provenance import Provenance, write_table
+from dbbstation.files.recordings.table_csv import table_csv
 from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.folds import Fold
 from dbbstation.inference.left_over import LeftOver
@@ -207,6 +210,9 @@ class MismatchResult(Framed):
     def sentences(self) -> list[str]:
         """The answer in three levels, in words; a notebook shows it above the table."""
         return level_sentences(self.levels, self.unit, {one.name: one.values for one in self.findings})
+
+    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
+        write_table(path, table_csv(list(self.table), list(self.table.values())), provenance, force=force)
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per effect."""

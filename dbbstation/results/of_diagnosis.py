@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.calibration.outliers.outlier import SOURCE_OF, OutlierKind
 from dbbstation.calibration.reporting.evaluation import rms_um
+from dbbstation.facts.by_name import ByName
 from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import Acts, Verdict
 from dbbstation.results.diagnosis import (
@@ -57,10 +58,12 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
         workspace=_workspace(diagnosis),
         outliers=tuple(outlier for outlier in diagnosis.outliers),
         locations=tuple(_location(location) for location in diagnosis.locations),
-        sources=(
-            *_mountings(diagnosis),
-            *(_cause(source) for source in diagnosis.sources),
-            *(CauseResult(name=name, verdict=str(Verdict.NOT_TESTABLE), text=why) for name, why in lacking.items()),
+        sources=ByName(
+            (
+                *_mountings(diagnosis),
+                *(_cause(source) for source in diagnosis.sources),
+                *(CauseResult(name=name, verdict=str(Verdict.NOT_TESTABLE), text=why) for name, why in lacking.items()),
+            )
         ),
         cancelling=diagnosis.cancelling,
         unexplained=UnexplainedResult(

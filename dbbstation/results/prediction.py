@@ -55,6 +55,10 @@ class PredictionResult(Framed):
     actual: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
     uncertainty_mm: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
 
+    def headline(self) -> str:
+        """Return the number of poses and their errors."""
+        return f"{self.poses} poses, position errors {self.error_rms_um:.2f} µm rms, {self.greatest_error_um:.2f} µm at most"
+
     def rows(self) -> list[dict[str, object]]:
         """Return actual poses with standard uncertainties, a row each."""
         rows = []

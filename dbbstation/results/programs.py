@@ -5,9 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.facts.serialise import Kept
+from dbbstation.files.atomic import write_text
+from dbbstation.files.provenance import Provenance
 from dbbstation.nc.remarks import said_acceleration
 from dbbstation.results.frame import Framed
 
@@ -69,6 +72,19 @@ class ProgramsResult(Framed):
     programs: tuple[WrittenProgram, ...]
     model_warnings: tuple[str, ...] = ()
     acceleration_in_words: Annotated[str, Kept] = ""
+
+    @property
+    def text(self) -> str:
+        """Return the text of the program; of several, one after the other."""
+        return "".join(one.text for one in self.programs)
+
+    @property
+    def greatest_correction_um(self) -> float | None:
+        """Return the greatest correction of all; None in nominal programs."""
+        return max((one.greatest_correction_um for one in self.programs if one.greatest_correction_um), default=None)
+
+    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:  # noqa: ARG002 - the text states it
+        write_text(path, self.text, force=force)
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per program."""

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
 
+from dbbstation.facts.serialise import AsItIs, Kept
+from dbbstation.files.provenance import Provenance
 from dbbstation.files.recordings.entries import Counts
+from dbbstation.results.frame import Framed
+from dbbstation.trace.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -73,10 +80,32 @@ class SessionEvents:
     anchor: str | None
 
 
-@dataclass(frozen=True)
-class SimulatedSession:
-    """A simulated session."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SimulatedSession(Framed):
+    """A simulated session.
 
-    session: str
+    Attributes:
+        session: folder; None if not written.
+        recordings: by run, such as `a ccw 1`.
+        writing: writes it to a new folder.
+    """
+
+    session: str | None = None
     runs: int
     tests: tuple[str, ...]
+    recordings: Annotated[Mapping[str, Recording], AsItIs, Kept]
+    writing: Annotated[Callable[[Path], None], AsItIs, Kept]
+
+    def headline(self) -> str:
+        """Return the number of runs."""
+        return f"{self.runs} runs of {', '.join(self.tests)}"
+
+    def rows(self) -> list[dict[str, object]]:
+        """Return one row per run."""
+        return [
+            {"run": name, "samples": len(one), "mean_length_mm": float(one.length_mm.mean())}
+            for name, one in self.recordings.items()
+        ]
+
+    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:  # noqa: ARG002 - a session replaces none
+        self.writing(path)

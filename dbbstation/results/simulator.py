@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 from dbbstation.diagnosis.simulator.answer import RefittedOfSimulator
 from dbbstation.diagnosis.simulator.separate import SeparatingInput
 from dbbstation.facts.serialise import Absent, Kept
 from dbbstation.facts.value import Value
+from dbbstation.files.atomic import write_text
+from dbbstation.files.provenance import Provenance
 from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.verdict import Gains
@@ -176,6 +179,9 @@ class SimulatorResult(Framed):
     def sentences(self) -> list[str]:
         """The answer in three levels, in words; a notebook shows it above the table."""
         return level_sentences(self.levels, self.unit, {one.name: one.values for one in self.findings})
+
+    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:  # noqa: ARG002 - code states none
+        write_text(path, self.code, force=force)
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per term."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from dbbstation.errors import ModelError
 from dbbstation.tasks import options as o
@@ -137,12 +137,13 @@ def calibrate(
         method=str(way),
         covariance=covariance_of(model),
         model=model,
+        recorded=recorded,
         drawing=partial(_drawn, calibration),
         notes=tuple(telling.notes),
     )
 
 
-def _drawn(calibration: Calibration, wanted: object) -> bytes:
+def _drawn(calibration: Calibration, wanted: object) -> Any:  # noqa: ANN401 - as asked for
     from dbbstation.report.calibration_figure import calibration_figure
     from dbbstation.report.figure_format import figure_format
 

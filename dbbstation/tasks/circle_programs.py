@@ -97,6 +97,7 @@ def program(
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.own_dialects import dialect_given
     from dbbstation.files.own_sources import every_source
+    from dbbstation.files.provenance import from_python
     from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.export import circle_programs
     from dbbstation.results.model_warnings import model_warnings
@@ -104,7 +105,6 @@ def program(
     from dbbstation.tasks.chosen import chosen_of
     from dbbstation.tasks.load import paths_of
     from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
-    from dbbstation.tasks.provenance import from_python
 
     telling = Telling(progress, stop, say)
     written_in, plan_file, machine_file, folder = dialect_given(dialect), Path(plan), Path(machine), Path(out)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option, task
 from dbbstation.tasks.telling import Telling, never, silent
@@ -11,7 +14,10 @@ from dbbstation.tasks.telling import Telling, never, silent
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.results.circles import CirclesResult
+    from numpy.typing import ArrayLike
+
+    from dbbstation.results.circle_figures import CircleFiguresResult
+    from dbbstation.results.circles import Circled, CirclesResult
     from dbbstation.tasks.telling import Progress
 
 
@@ -73,4 +79,62 @@ def circles(
         progress=telling.counted("circles"),
     )
     telling.note(*found.warnings)
-    return circles_result(found, chosen, quick_look=quick_look)
+    return replace(circles_result(found, chosen, quick_look=quick_look), drawing=partial(_drawn, found))
+
+
+def _drawn(found: Circled, wanted: object) -> Any:  # noqa: ANN401 - as asked for
+    from dbbstation.report.circles_figure import circles_figure
+    from dbbstation.report.figure_format import figure_format
+
+    return circles_figure(found, figure_format(wanted))
+
+
+@task("circle")
+def circle(
+    t_s: ArrayLike,
+    length_mm: ArrayLike,
+    *,
+    bar_mm: Annotated[float, Option("Nominal distance of the ball centres [mm].", above=0.0)],
+    feed_mm_min: Annotated[float, Option("Feed along the circle [mm/min].", above=0.0)] = 1000.0,
+    start_deg: Annotated[float, Option("Start of the full turn, from +X towards +Y [deg].")] = 0.0,
+    overshoot_deg: Annotated[float, Option("Overshoot before and after the full turn [deg].", least=0.0)] = 0.0,
+    feed_in_mm: Annotated[float, Option("Begin outside the circle, along the bar [mm].", least=0.0)] = 0.0,
+    direction: Annotated[Literal["ccw", "cw"], Option("Sense of travel seen from +Z.")] = "ccw",
+    filter: o.Filter = "none",  # noqa: A002 - the standard's word
+) -> CircleFiguresResult:
+    """Compute the figures of one circle after ISO 230-4 from arrays.
+
+    Args:
+        t_s: times, strictly rising, shape (n,) [s].
+        length_mm: readings of the bar from feed-in to feed-out, shape (n,) [mm].
+
+    Raises:
+        ArgumentError: a value that it does not take.
+        TraceError: the readings show no such circle.
+    """
+    from pathlib import Path
+
+    import numpy as np
+
+    from dbbstation.circles.analysis import analyse
+    from dbbstation.circles.budget import SetUpKnowledge
+    from dbbstation.circles.path import Filter
+    from dbbstation.files.recordings.entries import RunEntry, RunState
+    from dbbstation.plan.circle import Circle, Direction
+    from dbbstation.results.circles import MeasuredCircle, circle_figures
+    from dbbstation.trace.cut import cut
+    from dbbstation.trace.recording import Recording
+
+    times, lengths = np.asarray(t_s, dtype=np.float64), np.asarray(length_mm, dtype=np.float64)
+    if times.ndim != 1 or times.shape != lengths.shape:
+        raise ArgumentError(
+            "length_mm", f"times and lengths need one shape (n,), not {times.shape} and {lengths.shape}"
+        )
+    middle = (0.0, 0.0, 0.0)
+    planned = Circle(
+        middle, middle, bar_mm, middle, feed_mm_min, start_deg, overshoot_deg, feed_in_mm, 0.0, Direction(direction)
+    )
+    recording = Recording("circle", times, lengths)
+    entry = RunEntry("circle", planned.direction, 1, None, RunState.ACCEPTED, "", None, Path(), "", None, None)
+    analysis = analyse(cut(recording, planned), recording, Filter(0 if filter == "none" else int(filter)))
+    return circle_figures(MeasuredCircle("", entry, analysis, "", SetUpKnowledge(), None), analysis)

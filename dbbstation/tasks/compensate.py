@@ -13,6 +13,7 @@ from dbbstation.files.atomic import refuse_existing, write_text
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.inputs import in_a_book
 from dbbstation.files.own_dialects import dialect_given
+from dbbstation.files.provenance import from_python
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.nc.compensate import CHORD_MM
 from dbbstation.nc.export import compensated_program
@@ -20,8 +21,7 @@ from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.registry import dialect_of_file
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.programs import ProgramsResult, programs_result
-from dbbstation.tasks.programs import inverse_of, origin_of, program_text, setup_of, sha256_of
-from dbbstation.tasks.provenance import from_python
+from dbbstation.tasks.programs import ProgramText, inverse_of, origin_of, program_text, setup_of, sha256_of
 from dbbstation.tasks.telling import Telling, silent
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ OLDER = "the {} is older than the program: its values may be from before the las
 
 @in_a_book
 def compensate(
-    program: str | PathLike[str],
+    program: str | PathLike[str] | ProgramText,
     model: Model,
     out: str | PathLike[str] | None = None,
     *,
@@ -71,7 +71,7 @@ def compensate(
     """Compensate an NC program, so that the real machine follows `program`.
 
     Args:
-        program: file, whole, not compensated, of no other machine.
+        program: file, or `Program(text)`, whole, not compensated, of no other machine.
         model: a model, its file, or the result of `calibrate` or `diagnose`.
         out: file; None: only the text in the result.
         dialect: to write: a name, or a Python file.
@@ -103,7 +103,8 @@ def compensate(
         StationError: the control corrects already; the program is compensated or for another machine, corrections are too large, or `strict` refuses it.
         ValueError: an unknown `prefer` or offset, or `start` is no pose.
     """
-    source = Path(program)
+    source = program if isinstance(program, ProgramText) else Path(program)
+    name = source.name if isinstance(source, ProgramText) else str(source)
     pose = np.full(6, np.nan) if start is None else np.array(start, dtype=np.float64).reshape(6)
     if angles_deg is not None:
         pose[3:] = np.asarray(angles_deg, dtype=np.float64).reshape(3)
@@ -117,8 +118,8 @@ def compensate(
         refuse_existing(Path(out), force=force)
     writer = dialect_given(dialect)
     text = program_text(source)
-    reader = dialect_of_file(str(source), text) if written_in is None else dialect_given(written_in)
-    path = reader.toolpath(text, str(source), start=None if np.isnan(pose).all() else pose, setup=setup)
+    reader = dialect_of_file(name, text) if written_in is None else dialect_given(written_in)
+    path = reader.toolpath(text, name, start=None if np.isnan(pose).all() else pose, setup=setup)
     inverse = inverse_of(
         model,
         known,
@@ -136,8 +137,10 @@ def compensate(
     telling.note(*warnings)
     if not path.units_said:
         telling.note(UNITS_NOT_SAID)
-    telling.note(*(OLDER.format(what) for what, file in files.items() if file.stat().st_mtime < source.stat().st_mtime))
-    origin = origin_of({"program file": source, **files}, inverse, provenance())
+    named = {"program file": source} if isinstance(source, Path) else {}
+    older = min((one.stat().st_mtime for one in named.values()), default=0.0)
+    telling.note(*(OLDER.format(what) for what, file in files.items() if file.stat().st_mtime < older))
+    origin = origin_of({**named, **files}, inverse, provenance())
     done = compensated_program(path, writer, inverse, chord_mm=chord_um / 1e3, origin=origin)
     if out is not None:
         write_text(Path(out), done.text, force=force)

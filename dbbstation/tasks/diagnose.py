@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import ModelError
 from dbbstation.tasks import options as o
@@ -112,13 +113,14 @@ def diagnose(
     of_formulas = fit.layout.formula_variance(fit.x)
     covariance = fit.solution.covariance + np.diag(of_formulas)
     effects = effects_of(fit.model, fit.observations, names, covariance, fit.null_space, of_formulas)
-    return diagnosis_result(
+    result = diagnosis_result(
         figures,
         effects=effect_results(effects, {one.name: one.verdict for one in figures.sources}),
         model=model,
         drawing=partial(_drawn, found),
         notes=tuple(telling.notes),
     )
+    return replace(result, recorded=diagnosed.recorded)
 
 
 def _kept(found: Diagnosis, telling: Telling) -> JointFitWithCurve | None:
@@ -132,7 +134,7 @@ def _kept(found: Diagnosis, telling: Telling) -> JointFitWithCurve | None:
         return None
 
 
-def _drawn(diagnosis: Diagnosis, wanted: object) -> bytes:
+def _drawn(diagnosis: Diagnosis, wanted: object) -> Any:  # noqa: ANN401 - as asked for
     from dbbstation.report.diagnosis_figure import diagnosis_figure
     from dbbstation.report.figure_format import figure_format
 

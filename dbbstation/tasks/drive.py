@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.tasks.declare import Files, Names, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
@@ -20,7 +20,7 @@ STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-out
 
 
 @task("drive", label="identification", stages=STAGES)
-def drive(
+def identify(
     recordings: Annotated[
         Files,
         Option(
@@ -66,7 +66,7 @@ def drive(
         CalibrationError: the recordings have no strokes to and fro.
         StoppedError: `stop` returned True.
     """
-    from dbbstation.diagnosis.drive.identify import identify
+    from dbbstation.diagnosis.drive.identify import identify as identified_drive
     from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
     from dbbstation.files.recordings.drive_csv import read_drive
     from dbbstation.results.drive import drive_result
@@ -77,13 +77,13 @@ def drive(
     files = [read_drive(path) for path in paths_of(recordings)]
     telling.note(*(str(warning) for file in files for warning in file.warnings))
     raw = [file.recording(force_per_ampere) for file in files]
-    found = identify(raw, named, cutoff_hz, telling.stage, hold_out=held_out)
+    found = identified_drive(raw, named, cutoff_hz, telling.stage, hold_out=held_out)
     result = drive_result(found, partial(_drawn, found))
     telling.note(*result.noticed)
     return result
 
 
-def _drawn(found: DriveFindings, wanted: object) -> bytes:
+def _drawn(found: DriveFindings, wanted: object) -> Any:  # noqa: ANN401 - as asked for
     from dbbstation.report.drive_figure import drive_figure
     from dbbstation.report.figure_format import figure_format
 

@@ -13,7 +13,7 @@ from dbbstation.errors import InputError, OutputError, Problem, TraceError
 from dbbstation.files.atomic import refuse_existing, streamed, write_text
 from dbbstation.files.csv_rows import csv_text
 from dbbstation.files.inputs import in_a_book
-from dbbstation.files.provenance import beside_table, refuse_existing_table
+from dbbstation.files.provenance import beside_table, from_python, refuse_existing_table
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.run_lines import split_head
 from dbbstation.files.recordings.session import read_session
@@ -21,7 +21,6 @@ from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.results.export import ExportResult
 from dbbstation.tasks.chosen import chosen_of
 from dbbstation.tasks.load import paths_of
-from dbbstation.tasks.provenance import from_python
 from dbbstation.tasks.telling import Telling, never, silent
 from dbbstation.trace import columns
 from dbbstation.trace.cut import edges_of, progress_deg

@@ -16,6 +16,7 @@ from dbbstation.files.inputs import input_book, note_known
 from dbbstation.files.keys import files_of_session, key_of
 from dbbstation.files.places import real_path, text_of_name
 from dbbstation.files.program_identity import program_identity
+from dbbstation.files.provenance import from_python
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_name import SESSION_FILE
@@ -27,7 +28,6 @@ from dbbstation.tasks.fleet_compare import Sister, compared
 from dbbstation.tasks.fleet_table import write_fleet_table
 from dbbstation.tasks.fleet_work import TASKS, FleetOptions, FleetPiece, Worked, worked
 from dbbstation.tasks.load import paths_of
-from dbbstation.tasks.provenance import from_python
 from dbbstation.tasks.telling import Telling, never, silent
 from dbbstation.text.counting import natural
 

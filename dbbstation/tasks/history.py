@@ -1,334 +1,72 @@
-"""Histories of the machines in a folder of sessions, through an index."""
+"""Histories of the machines in a folder of sessions."""
 
 from __future__ import annotations
 
-import os
-from contextlib import closing
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
-from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.computing.processes import each
-from dbbstation.errors import InputError, Problem, StationError
-from dbbstation.facts.serialise import json_of, read_json
-from dbbstation.files.gateway import digest_of
-from dbbstation.files.inputs import note_known
-from dbbstation.files.kept import Kept, NotedAnchor, Stamp, stamp_of
-from dbbstation.files.keys import key_of
-from dbbstation.files.recordings.anchors import SHORTEST, links_of
-from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
-from dbbstation.files.recordings.session_name import SESSION_FILE
-from dbbstation.history.order import date_faults
-from dbbstation.history.record import ModelFigures, SessionFigures
-from dbbstation.history.trend import histories
-from dbbstation.results.of_history import history_result
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.telling import never, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-    from os import PathLike
+    from collections.abc import Callable, Sequence
 
-    from dbbstation.history.trend import TrendOptions
+    from dbbstation.plan.tolerance import Tolerance
     from dbbstation.results.history import HistoryResult
     from dbbstation.tasks.telling import Progress
 
-READING = "reading sessions"
-"""The stage that is counted."""
 
-
+@task("history", label="sessions")
 def history(
-    folder: str | PathLike[str],
-    asked: TrendOptions,
-    source_files: Sequence[Path] = (),
+    folder: Annotated[
+        File, Option("with sessions, and models of `calibrate` or `diagnose`.", kind="argument", metavar="FOLDER")
+    ],
     *,
-    rebuild: bool = False,
-    now: datetime | None = None,
+    false_alarms: Annotated[
+        float,
+        Option("False alarms per session, all quantities of a machine together.", least=1e-6, most=0.1),
+    ] = 1e-3,
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
+    source_files: o.SourceFiles = (),
+    anew: Annotated[bool, Option("Read every session anew, whatever the index knows.", flag="--rebuild")] = False,
+    tolerances: Sequence[Tolerance] = (),
+    coverage_factor: float = 2.0,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
 ) -> HistoryResult:
-    """Return the histories of all machines with sessions in a folder, at most four levels deep.
+    r"""Show what the sessions of a folder say over time, machine by machine, and what changed beyond uncertainty.
 
-    A session is read again only if its files' stamps and contents are unknown to the index. Unreadable sessions are named
-    and left out.
+    Of every test and direction G, centre X and Y, mean radial error R and centre distance C; parameters of models that lie in
+    the folder and come from one of its sessions. Limits are those of the shop's settings. A two-sided CUSUM with a limit for
+    single sessions watches each quantity, from its second session on; the rate of false alarms is that of the whole table.
+    No model is fitted. What was read is kept in an index in the user's cache folder.
+
+    \b
+    Examples:
+      dbbstation history sessions
+      dbbstation history sessions --html history.html --csv history.csv
+      dbbstation history sessions --test a,f --false-alarms 0.0001 --json
 
     Args:
-        folder: with sessions, and models of `calibrate` or `diagnose`.
-        rebuild: ignore the index.
-        now: None: the clock's time.
+        tolerances: limits of circles.
+        coverage_factor: k of the expanded uncertainty.
+        stop: asked after each session.
 
     Raises:
+        ArgumentError: a value that it does not take.
         InputError: no usable session; an unknown test.
         StoppedError: `stop` returned True; what was read is indexed.
     """
-    folder = Path(folder)
-    counted = Telling(progress, stop).counted(READING)
-    found = files_of(folder)
-    with Kept(folder, begin_anew=rebuild) as kept:
-        reading = _Reading(kept, counted, len(found.sessions) + len(found.models))
-        read = reading.every(found.sessions, SessionFigures, _session_data, _beside, _processes_for)
-        sessions = [replace(one, name=_called(name)) for name, one in read.items()]
-        work = partial(_model_data, source_files=tuple(source_files))
-        models = [
-            replace(one, file=name)
-            for name, one in reading.every(found.models, ModelFigures, work, lambda _model: source_files).items()
-        ]
-        kept.drop_others([*found.sessions, *found.models])
-        moment = now or datetime.now(UTC)
-        folders = {_called(name): path.parent for name, path in found.sessions.items()}
-        seals = [note for one in sessions if (note := _seal_note(kept, folders[one.name], one, moment))]
-        notes = [*([kept.problem] if kept.problem else []), *seals]
-    counted(reading.of, reading.of)
-    sessions, alike = _once(sessions)
-    dated = [one for one in sessions if one.started is not None]
-    left_out = [*found.closed, *reading.left_out] + [
-        (one.name, "none of its accepted runs says when it started: it has no place in time")
-        for one in sessions
-        if one.started is None
-    ]
-    if not dated:
-        first = f": {left_out[0][0]}: {left_out[0][1]}" if left_out else ""
-        what = f"none of its {len(found.sessions)} sessions can be used{first}"
-        raise InputError([Problem(str(folder), 0, 0, what, "`dbbstation check SESSION` names every fault")])
-    _check_tests(folder, dated, asked)
-    by_session, unlike = _of_one_session(models, dated)
-    notes = [*unlike, *notes, *alike]
-    machines = histories(dated, by_session, asked)
-    for machine in machines:
-        notes += date_faults(machine.sessions, now or datetime.now(UTC))
-        notes += _gathered(machine.sessions)
-    warned = {one.name: by_session[one.sha256].warnings for one in dated if one.sha256 in by_session}
-    return history_result(machines, asked, left_out, notes, reading.worked_out, warned)
+    from pathlib import Path
 
+    from dbbstation.history.trend import TrendOptions
+    from dbbstation.tasks.histories import histories_in
+    from dbbstation.tasks.load import paths_of
 
-def _seal_note(kept: Kept, folder: Path, one: SessionFigures, moment: datetime) -> str:
-    noted = kept.noted(one.name)
-    if noted is None or noted.anchor == one.anchor or noted.anchor in links_of(folder):
-        if one.anchor and (noted is None or noted.anchor != one.anchor):
-            kept.note(one.name, NotedAnchor(one.anchor, moment.isoformat(timespec="seconds")))
-        return ""
-    before = f"one ended with {noted.anchor[:SHORTEST]} on {noted.at[:10]}"
-    if not one.anchor:
-        return f"{one.name} carries no seal, {before}: the seal was taken out"
-    return (
-        f"{one.name} carries another seal, {before}, which is not part of it: it was sealed anew, or is another session"
-    )
-
-
-_Kind = TypeVar("_Kind", SessionFigures, ModelFigures)
-
-
-@dataclass(frozen=True)
-class _File:
-    """A file with its relative path and stamp."""
-
-    name: str
-    path: Path
-    stamp: Stamp
-
-
-@dataclass(frozen=True)
-class _Unreadable:
-    """Why a file cannot be read."""
-
-    reason: str
-
-
-class _Reading:
-    """Reads sessions and models through the index."""
-
-    def __init__(self, kept: Kept, progress: Callable[[int, int], None], of: int) -> None:
-        self.of = of
-        self.left_out: list[tuple[str, str]] = []
-        self.worked_out = 0
-        self._kept = kept
-        self._progress = progress
-        self._done = 0
-
-    def every(
-        self,
-        files: Mapping[str, Path],
-        kind: type[_Kind],
-        work: Callable[[Path], _Kind | _Unreadable],
-        others: Callable[[Path], Sequence[Path]],
-        processes: Callable[[Sequence[Path]], int] = lambda _paths: 1,
-    ) -> dict[str, _Kind]:
-        """Return the figures of readable files in order.
-
-        Args:
-            work: computes them, or says why not.
-            others: further files that decide the result.
-            processes: number.
-        """
-        found: dict[str, _Kind] = {}
-        reasons: dict[str, str] = {}
-        unknown: dict[str, list[_File]] = {}
-        for name, path in files.items():
-            try:
-                more = others(path)
-                file = _File(name, path, stamp_of(path, *more))
-                one = _understood(kind, self._kept.of(name, file.stamp))
-                if one is None:
-                    digest = key_of({"task": kind.__name__}, _contents(path, more))
-                    text = self._kept.of_content(digest)
-                    one = _understood(kind, text)
-                    if text is None or one is None:
-                        unknown.setdefault(digest, []).append(file)
-                        continue
-                    self._kept.keep(name, file.stamp, digest, text)
-                found[name] = one
-            except OSError as error:
-                reasons[name] = reason_of(error)
-            self._count()
-        digests, paths = list(unknown), [same[0].path for same in unknown.values()]
-        with closing(each(work, paths, processes(paths))) as outcomes:
-            for place, outcome in outcomes:
-                digest = digests[place]
-                self.worked_out += 1
-                for file in unknown[digest]:
-                    if isinstance(outcome, _Unreadable):
-                        reasons[file.name] = outcome.reason
-                    else:
-                        found[file.name] = outcome
-                        self._kept.keep(
-                            file.name, file.stamp, digest, json_of(found[file.name], indent=None, escaped=True)
-                        )
-                    self._count()
-        self.left_out += [(_called(name), reasons[name]) for name in files if name in reasons]
-        for name in (name for name in files if name in found):
-            note_known(files[name], found[name].sha256)
-        return {name: found[name] for name in files if name in found}
-
-    def _count(self) -> None:
-        self._done += 1
-        self._progress(self._done, self.of)
-
-
-def _beside(session_file: Path) -> list[Path]:
-    """Return a session's other files: machine, plan, runs, seal."""
-    folder = session_file.parent
-    names = sorted(os.path.join(place, name) for place, _, here in os.walk(folder) for name in here)  # noqa: PTH118 - hundreds of folders
-    return [Path(name) for name in names if name != str(session_file) and os.path.isfile(name)]  # noqa: PTH113 - the same
-
-
-def _contents(path: Path, others: Sequence[Path]) -> list[tuple[str, str]]:
-    """Return names and SHA-256 of files; of an unreadable one only the name."""
-    found = [("", digest_of(path))]
-    for other in others:
-        name = os.path.relpath(other, path.parent)
-        try:
-            found.append((name, digest_of(other)))
-        except OSError:
-            found.append((name, ""))
+    asked = TrendOptions(coverage_factor, tolerances, false_alarms, tuple(tests), tuple(exclude))
+    found = histories_in(Path(folder), asked, paths_of(source_files), rebuild=anew, progress=progress, stop=stop)
+    for note in found.remarks:
+        say(note)
     return found
-
-
-RUNS_WORTH_PROCESSES = 300
-"""Recordings from which on other cores help: ten seconds of work; a process needs two until it has begun."""
-
-
-def _processes_for(sessions: Sequence[Path]) -> int:
-    """Return how many processes are worth starting."""
-    runs = sum(1 for path in sessions for _ in path.parent.glob("runs/*.csv"))
-    return min(os.cpu_count() or 1, len(sessions)) if runs >= RUNS_WORTH_PROCESSES else 1
-
-
-def _session_data(path: Path) -> SessionFigures | _Unreadable:
-    """Return the kept facts of a session, or its fault."""
-    from dbbstation.tasks.session_figures import session_figures
-
-    try:
-        return session_figures(path.parent)
-    except (StationError, OSError) as error:
-        return _Unreadable(_why(error))
-
-
-def _model_data(path: Path, source_files: Sequence[Path]) -> ModelFigures | _Unreadable:
-    from dbbstation.tasks.session_figures import model_figures
-
-    try:
-        return model_figures(path, source_files)
-    except (StationError, OSError) as error:
-        return _Unreadable(_why(error))
-
-
-def _why(error: StationError | OSError) -> str:
-    return reason_of(error) if isinstance(error, OSError) else _first_of(error)
-
-
-def _called(name: str) -> str:
-    return name.removesuffix(f"/{SESSION_FILE}")
-
-
-def _understood(kind: type[_Kind], text: str | None) -> _Kind | None:
-    """Return the content of a kept text, or None."""
-    try:
-        return None if text is None else read_json(kind, text)
-    except ValueError:
-        return None
-
-
-def _first_of(error: StationError) -> str:
-    """Return an error on one line, with the count of further ones."""
-    lines = str(error).splitlines()
-    return lines[0] + (f" (and {len(lines) - 1} more)" if len(lines) > 1 else "")
-
-
-MOST_NAMED = 3
-"""Sessions that are named where many have the same remark."""
-
-
-def _gathered(sessions: Sequence[SessionFigures]) -> list[str]:
-    by_text: dict[str, list[str]] = {}
-    for one in sessions:
-        for note in one.notes:
-            by_text.setdefault(note, []).append(one.name)
-    notes = []
-    for note, names in by_text.items():
-        more = len(names) - MOST_NAMED
-        notes.append(f"{', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}: {note}")
-    return notes
-
-
-def _once(sessions: Iterable[SessionFigures]) -> tuple[list[SessionFigures], list[str]]:
-    first: dict[str, SessionFigures] = {}
-    notes = []
-    for one in sessions:
-        before = first.setdefault(one.sha256, one)
-        if before is not one:
-            notes.append(
-                f"{one.name} is a copy of {before.name}, by the SHA-256 of its session file: it is counted once"
-            )
-    return list(first.values()), notes
-
-
-def _check_tests(folder: Path, sessions: Sequence[SessionFigures], asked: TrendOptions) -> None:
-    known = {run.test for one in sessions for run in one.runs}
-    unknown = [name for name in (*asked.tests, *asked.exclude) if name not in known]
-    if unknown:
-        what = f"no session has a test {', '.join(unknown)}"
-        raise InputError([Problem(str(folder), 0, 0, what, f"tests are {', '.join(sorted(known))}")])
-
-
-def _of_one_session(
-    models: Sequence[ModelFigures], sessions: Sequence[SessionFigures]
-) -> tuple[dict[str, ModelFigures], list[str]]:
-    known = {one.sha256: one.name for one in sessions}
-    taken: dict[str, ModelFigures] = {}
-    notes = []
-    for model in sorted(models, key=lambda one: (-len(one.parameters), one.file)):
-        if len(model.sessions) != 1:
-            notes.append(
-                f"{model.file} comes from {len(model.sessions)} sessions together: it is no value of one of them"
-            )
-            continue
-        ((name, digest),) = model.sessions.items()
-        if digest not in known:
-            notes.append(f"{model.file} comes from a session {name} that is not here, or was changed since")
-        elif taken.setdefault(digest, model) is not model:
-            other = taken[digest].file
-            notes.append(f"{model.file} and {other} are of one session, {known[digest]}: {other} is taken")
-    said = [f"{one.file}: {text}" for one in taken.values() for text in one.warnings]
-    notes = [*said, *notes]  # of numbers that are shown, before those that are not
-    return taken, notes

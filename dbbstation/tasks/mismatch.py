@@ -247,7 +247,7 @@ def _unused(name: str, taken: Mapping[str, object]) -> str:
     return next(one for one in (name, *(f"{name}_{k}" for k in range(2, len(taken) + 3))) if one not in taken)
 
 
-def _drawn(found: Mismatch, wanted: object) -> bytes:
+def _drawn(found: Mismatch, wanted: object) -> Any:  # noqa: ANN401 - as asked for
     from dbbstation.report.figure_format import figure_format
     from dbbstation.report.mismatch_figure import mismatch_figure
 

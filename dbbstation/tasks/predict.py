@@ -2,33 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from dbbstation.control.commands import nominal_commands
+from dbbstation.errors import ArgumentError
 from dbbstation.files.formats.number_language import PLAIN
 from dbbstation.files.formats.pose_table import PoseTable, read_poses, write_poses
 from dbbstation.files.inputs import in_a_book
-from dbbstation.files.provenance import refuse_existing_table
+from dbbstation.files.provenance import from_python, refuse_existing_table
+from dbbstation.files.recordings.table_csv import given_table
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.uncertainty import predicted_poses
 from dbbstation.results.model_warnings import model_warnings
-from dbbstation.results.prediction import PredictionResult, prediction_result
+from dbbstation.results.prediction import NAMES, PredictionResult, prediction_result
 from dbbstation.sources.registry import known_sources
 from dbbstation.tasks.models import model_of
-from dbbstation.tasks.provenance import from_python
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from numpy.typing import ArrayLike
 
     from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.files.provenance import Provenance
+    from dbbstation.files.recordings.table_csv import Columns
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.models import Model
     from dbbstation.tasks.telling import Progress
@@ -42,7 +45,7 @@ AXES = 6
 @in_a_book
 def predict(
     model: Model,
-    poses: ArrayLike | str | PathLike[str],
+    poses: ArrayLike | Columns | str | PathLike[str],
     *,
     out: str | PathLike[str] | None = None,
     force: bool = False,
@@ -56,7 +59,7 @@ def predict(
 
     Args:
         model: a model, its file, or the result of `calibrate` or `diagnose`.
-        poses: commanded X, Y, Z [mm] and A, B, C [deg], shape (n, 6) or (6,), or a CSV file with x_mm, y_mm, z_mm, a_deg, b_deg,
+        poses: commanded X, Y, Z [mm] and A, B, C [deg], shape (n, 6) or (6,), a DataFrame or CSV file with x_mm, y_mm, z_mm, a_deg, b_deg,
             c_deg.
         out: CSV file; None: none.
         force: overwrite it.
@@ -72,7 +75,7 @@ def predict(
         KinematicsError: a pose that the actual machine cannot take.
         ModelError: a source needs more than poses.
         OutputError: `out` exists without `force`.
-        ValueError: another shape.
+        ArgumentError: another shape.
         StoppedError: `stop` returned True.
     """
     telling = Telling(progress, stop)
@@ -100,10 +103,16 @@ def predict(
     return prediction_result(identified, table.poses, actual, uncertainty_mm, None if out is None else str(out))
 
 
-def _table(poses: ArrayLike | str | PathLike[str], numbers: NumberLanguage) -> tuple[PoseTable, str]:
+def _table(poses: ArrayLike | Columns | str | PathLike[str], numbers: NumberLanguage) -> tuple[PoseTable, str]:
     if isinstance(poses, str | PathLike):
         return read_poses(Path(poses), numbers), str(poses)
-    given = np.atleast_2d(np.asarray(poses, dtype=np.float64))
+    if hasattr(poses, "columns") or isinstance(poses, Mapping):
+        table = given_table(cast("Columns", poses), NAMES, "poses")
+        others = {name: list(table.cells[name]) for name in table.names if name not in NAMES}
+        return PoseTable(np.column_stack([table.values[name] for name in NAMES]), others), "poses"
+    given = np.atleast_2d(np.asarray(cast("ArrayLike", poses), dtype=np.float64))
     if given.ndim != 2 or given.shape[1] != AXES or not np.isfinite(given).all():  # noqa: PLR2004 - rows and columns
-        raise ValueError(f"poses are rows of six finite numbers, X, Y, Z [mm], A, B, C [deg], not {given.shape}")
+        raise ArgumentError(
+            "poses", f"poses are rows of six finite numbers, X, Y, Z [mm], A, B, C [deg], not {given.shape}"
+        )
     return PoseTable(given, {}), "poses"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import hashlib
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +23,25 @@ if TYPE_CHECKING:
     from dbbstation.files.provenance import Provenance
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.models import Model
+
+
+@dataclass(frozen=True)
+class ProgramText:
+    """An NC program in memory.
+
+    Attributes:
+        name: for messages and the header; its ending tells the dialect.
+    """
+
+    text: str
+    name: str = "program.ngc"
+
+    def __repr__(self) -> str:
+        return f"<Program {self.name}: {len(self.text.splitlines())} lines>"
+
+
+Program = ProgramText
+"""As scripts call it."""
 
 
 def inverse_of(
@@ -78,12 +98,14 @@ def sha256_of(path: Path) -> str:
     return hashlib.sha256(_content(path)).hexdigest()
 
 
-def program_text(path: Path) -> str:
+def program_text(path: Path | ProgramText) -> str:
     """Return the text of a program: UTF-8, UTF-16 with its mark, else Windows' letters, which only comments have.
 
     Raises:
         InputError: it cannot be read.
     """
+    if isinstance(path, ProgramText):
+        return path.text
     data = _content(path)
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", "replace")

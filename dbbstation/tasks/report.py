@@ -12,6 +12,7 @@ from dbbstation.diagnosis.thinned import thinned
 from dbbstation.errors import StationError
 from dbbstation.files.atomic import refuse_outputs, write_bytes
 from dbbstation.files.inputs import in_a_book
+from dbbstation.files.provenance import from_python
 from dbbstation.files.recordings.session import read_session
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.report.content import Modelled, Reported, certified_of, content_of, numbers_of
@@ -24,7 +25,6 @@ from dbbstation.tasks.circle_runs import load_circles
 from dbbstation.tasks.evaluate import evaluate
 from dbbstation.tasks.load import READING, load_sessions, paths_of
 from dbbstation.tasks.models import model_of
-from dbbstation.tasks.provenance import from_python
 from dbbstation.tasks.telling import StoppedError, Telling, never, silent
 
 if TYPE_CHECKING:

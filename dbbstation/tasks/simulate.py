@@ -5,26 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.errors import OutputError
-from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.recordings.entries import ReadBy
-from dbbstation.files.recordings.new_session import FinishedRun, write_session
-from dbbstation.files.recordings.session_details import SessionDetails
-from dbbstation.model.simulation import setup_of, simulate_circle
-from dbbstation.results.sessions import SimulatedSession
-from dbbstation.tasks.chosen import chosen_of
-from dbbstation.tasks.models import model_of
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import File, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
-from dbbstation.virtual.under_spindle import SetUp, put_up
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from os import PathLike
+    from collections.abc import Callable, Mapping
 
+    from dbbstation.results.sessions import SimulatedSession
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.models import Model
     from dbbstation.tasks.telling import Progress
 
 BEGUN = datetime(2000, 1, 1, tzinfo=UTC)
@@ -34,40 +25,60 @@ SIMULATING = "simulating runs"
 """The stage that is counted."""
 
 
+@task("simulate", label="runs")
 def simulate(
-    model: Model,
-    plan: str | PathLike[str],
-    out: str | PathLike[str],
+    model: Annotated[o.Model, o.model("Model file of `calibrate`.")],
+    plan: Annotated[File, Option("Test plan.", kind="file")],
     *,
-    tests: Sequence[str] = (),
-    exclude: Sequence[str] = (),
-    samples: int = 720,
-    interval_s: float = 200.0,
+    source_files: o.SourceFiles = (),
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
+    samples: Annotated[int, Option("Samples per turn.", least=36)] = 720,
+    interval_s: Annotated[float, Option("Time from the start of one run to the next [s].")] = 200.0,
     known: Mapping[str, ErrorSource] | None = None,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
 ) -> SimulatedSession:
-    """Write the session that a ball bar would record on a model's machine, without noise.
+    r"""Write the session that a ball bar would record on the machine of a model, without noise.
 
-    Balls are at the plan's positions, balls under the spindle at the model's tool tip. Only the machine's own sources
-    act, under a nominal control. Lengths are written to 1 nm.
+    Balls are at the positions of the plan; balls under the spindle are at the tool tip of the model. Only the machine's
+    own error sources act, under a nominal control. Samples have commanded angles; lengths are written to 1 nm.
+
+    \b
+    Examples:
+      dbbstation simulate --model model.yaml --plan table2.yaml --out predicted
+      dbbstation evaluate predicted --model other-model.yaml
 
     Args:
-        model: a model, its file, or the result of `calibrate` or `diagnose`.
-        out: new session folder.
-        tests: names; empty for all.
-        interval_s: between starts of runs.
+        known: error sources by name; None: those of package, installed packages and `source_files`.
+        stop: asked before each run.
+
+    Returns:
+        Recordings in memory; `save` writes the session.
 
     Raises:
+        ArgumentError: a value that it does not take.
         InputError: faults of files.
-        OutputError: the folder exists.
         StationError: an unknown test; a circle that the machine cannot travel.
-        StoppedError: `stop` returned True; nothing was written.
+        StoppedError: `stop` returned True.
     """
-    folder, telling = Path(out), Telling(progress, stop)
-    if folder.exists():
-        raise OutputError("the session folder exists already", where=str(folder), remedy="choose another name")
-    machine_model = model_of(model, known).model.of_the_machine()
+    from dbbstation.files.formats.plan import read_inline_plan
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.files.recordings.entries import ReadBy
+    from dbbstation.files.recordings.new_session import FinishedRun, write_session
+    from dbbstation.files.recordings.session_details import SessionDetails
+    from dbbstation.model.simulation import setup_of, simulate_circle
+    from dbbstation.results.sessions import SimulatedSession
+    from dbbstation.tasks.chosen import chosen_of
+    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.models import model_of
+    from dbbstation.trace.recording import Recording
+    from dbbstation.virtual.under_spindle import SetUp, put_up
+
+    telling = Telling(progress, stop, say)
+    every = every_source(paths_of(source_files)) if known is None else known
+    machine_model = model_of(model, every).model.of_the_machine()
     machine_model = replace(machine_model, machine=replace(machine_model.machine, control=None))
     inline = read_inline_plan(Path(plan))
     planned = inline.to_domain()
@@ -90,5 +101,13 @@ def simulate(
                 FinishedRun(test.name, direction, columns, repeat, mounting, BEGUN + timedelta(seconds=started_s))
             )
     details = SessionDetails(instrument=ReadBy("simulate", virtual=True))
-    write_session(folder, machine_model.machine, inline, runs, details)
-    return SimulatedSession(str(out), len(runs), tuple(chosen))
+    return SimulatedSession(
+        runs=len(runs),
+        tests=tuple(chosen),
+        recordings={
+            label: Recording(label, run.columns["t_s"], run.columns["length_mm"], run.columns["theta_deg"])
+            for run in runs
+            if (label := f"{run.test} {run.direction} {run.repeat}")
+        },
+        writing=lambda folder: write_session(folder, machine_model.machine, inline, runs, details),
+    )

@@ -158,7 +158,7 @@ def test_several_processes_give_the_same(few, monkeypatch):
     run = few / "w003" / "runs" / "a-cw-2.csv"
     run.write_bytes(run.read_bytes()[:-40])
     before = call("history", few, "--json")
-    monkeypatch.setattr("dbbstation.tasks.history.RUNS_WORTH_PROCESSES", 1)
+    monkeypatch.setattr("dbbstation.tasks.histories.RUNS_WORTH_PROCESSES", 1)
     monkeypatch.setattr("os.cpu_count", lambda: 2)
     monkeypatch.setattr("dbbstation.tasks.session_figures.session_figures", None)
     again = call("history", few, "--json", "--rebuild")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -21,3 +23,14 @@ def test_the_notebook_prints_what_it_shows(notebook, tmp_path, monkeypatch):
     for before, now in zip(code, executed(shown), strict=True):
         assert printed(now) == printed(before)
         assert len(now["outputs"]) == len(before["outputs"])
+
+
+@pytest.mark.slow
+def test_the_ten_tasks_have_types(tmp_path):
+    shown = json.loads((NOTEBOOKS[0].parent / "python.ipynb").read_text(encoding="utf-8"))
+    cells = ["".join(cell["source"]) for cell in shown["cells"] if cell["cell_type"] == "code"]
+    script = tmp_path / "ten_tasks.py"
+    script.write_text("\n\n".join(cells), encoding="utf-8")
+    line = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), str(script)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout

@@ -19,7 +19,7 @@ from dbbstation.service.worked_out import counted
 from dbbstation.simulators.loading import LoadedSimulator
 from dbbstation.tasks import fleet as fleet_module
 from dbbstation.tasks.fleet_work import FleetOptions
-from dbbstation.tasks.history import history
+from dbbstation.tasks.histories import histories_in
 from dbbstation.tasks.telling import StoppedError
 from tests.simulators.test_program import PROGRAM, YAML
 
@@ -78,7 +78,7 @@ def test_a_history_reads_a_session_again_whose_files_changed(session, name, monk
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
     def read() -> int:
-        return history(session.parent, TrendOptions(coverage_factor=2.0)).worked_out
+        return histories_in(session.parent, TrendOptions(coverage_factor=2.0)).worked_out
 
     assert (read(), read()) == (1, 0)
     change(session / name)
@@ -95,7 +95,7 @@ def test_a_history_reads_a_model_again_that_changed_or_whose_causes_did(session,
     model = Path(shutil.copy("fixtures/models/small.yaml", session.parent / "model.yaml"))
 
     def read() -> int:
-        return history(session.parent, TrendOptions(coverage_factor=2.0), source_files=[own]).worked_out
+        return histories_in(session.parent, TrendOptions(coverage_factor=2.0), source_files=[own]).worked_out
 
     assert (read(), read()) == (2, 0)
     for path in (model, own):

@@ -8,7 +8,7 @@ from itertools import permutations
 import pytest
 
 from dbbstation.history.record import ModelFigures, ModelParameter, SessionFigures
-from dbbstation.tasks import history as historied
+from dbbstation.tasks import histories as historied
 
 SESSION = SessionFigures("monday", "ab" * 32, "hexapod", None, ())
 

@@ -102,14 +102,14 @@ def test_an_evaluation_of_the_same_runs_has_the_figures_of_the_fit(recorded, res
 
 
 def test_a_figure_is_drawn_and_kept_whole(result, tmp_path):
-    assert result.plot().startswith(b"<?xml")
+    assert result.plot()._repr_svg_().startswith("<?xml")
     file = tmp_path / "figure.png"
-    assert result.plot(file) is None
+    result.save_figure(file)
     assert file.read_bytes().startswith(b"\x89PNG")
     with pytest.raises(OutputError, match="exists"):
-        result.plot(file)
+        result.save_figure(file)
     with pytest.raises(OutputError, match=r"\.svg, \.png or \.pdf"):
-        result.plot(tmp_path / "figure.txt")
+        result.save_figure(tmp_path / "figure.txt")
 
 
 def test_a_notebook_shows_the_parameters(result):

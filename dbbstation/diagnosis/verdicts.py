@@ -11,6 +11,7 @@ from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
 from dbbstation.diagnosis.held import uncertainties, unseen
 from dbbstation.inference.alternatives import standing_out
 from dbbstation.inference.concealment import concealment
+from dbbstation.inference.levels import JOINED
 from dbbstation.inference.read_off import CauseJudge, Trial
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.verdict import OUT, SURE
@@ -47,7 +48,7 @@ def judge(
 
 class _CircleJudge(CauseJudge):
     def __init__(self, explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels | None) -> None:
-        self._circles, self._joint = explained.channel, explained.settled
+        self._circles, self._joint, self._found = explained.channel, explained.settled, levels
         self._named = {cause.name: cause for cause in outcome.causes if cause.named}
         # A method of this would keep it, and all columns, alive in a ring.
         super().__init__(outcome, Trial(anew), levels, partial(_form_uncertainty, explained.channel.sources))
@@ -100,12 +101,23 @@ class _CircleJudge(CauseJudge):
         self, cause: Cause, member: Member | None, probability: float, sigmas: float
     ) -> tuple[Verdict, tuple[str, ...], str]:
         verdict, others, text = super()._verdict(cause, member, probability, sigmas)
+        if verdict is Verdict.AMBIGUOUS and member is None and (group := self._group_of(cause.name)):
+            others = tuple(name for name in group if name != cause.name)
+            return verdict, others, f"These tests cannot tell it from {', '.join(self._in_words(others))}."
         if verdict is not Verdict.AMBIGUOUS or others or (probability >= SURE and sigmas >= OUT):
             return verdict, others, text
         others = self._alternatives.ambiguity(cause.name)
         if others or len(self._equal(cause.name)) > 1:
             return verdict, others, f"These tests cannot tell it from {', '.join(self._in_words(others))}."
         return Verdict.NOT_TESTABLE, (), "These tests leave it open: they neither show nor exclude it."
+
+    def _group_of(self, name: str) -> tuple[str, ...]:
+        """All causes of which one is there, where this is one of them."""
+        follows = () if self._found is None else self._found.follows
+        groups = [(*one.form.names, *one.form.not_worse) for one in follows if one.form is not None]
+        groups += [equal for equal in self._classes.values() if len(equal) > 1]
+        groups += [(own, *others) for own, others in self._alternatives.ambiguities.items()]
+        return next((tuple(n for n in group if JOINED not in n) for group in groups if name in group), ())
 
     def _instead_of(self, name: str) -> frozenset[str]:
         """None: the joint model has members alone."""

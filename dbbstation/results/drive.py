@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.diagnosis.drive.findings import DriveFindings
 from dbbstation.facts.serialise import Absent
+from dbbstation.files.provenance import Provenance, write_table
+from dbbstation.files.recordings.drive_csv import compared_csv
 from dbbstation.results.frame import Framed
 from dbbstation.results.levels_text import level_sentences
 
@@ -31,6 +34,9 @@ class DriveResult(Framed, DriveFindings):
         values = {one.name: one.parameters for one in self.sources}
         what = "Measured force and the law with mass and friction"
         return level_sentences(self.levels, "N", values, rows="samples", what=what)
+
+    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
+        write_table(path, compared_csv(self.table), provenance, force=force)
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per cause."""

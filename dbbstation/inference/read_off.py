@@ -16,7 +16,7 @@ from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.variables import Kind
-from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, Gains, Verdict, claim
+from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, Gains, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -122,8 +122,8 @@ def read_off(settled: Settled, trial: Trial | None = None, levels: Levels | None
     """Return a finding per law and pattern, present ones first, by size.
 
     Args:
-        trial: None: the client judges [`claim`]; sure ones are identified here.
-        levels: verdicts are read off these; None: each cause is judged by itself.
+        trial: evidence of parts; None: not tested.
+        levels: verdicts are read off these; None: before they are known, what is sure is identified.
     """
     judge = CauseJudge(settled, trial, levels)
     found = [judge.finding(cause) for cause in settled.causes]
@@ -276,7 +276,7 @@ class CauseJudge:
         if self._levels is not None and (member is not None or self._instead_of(cause.name)):
             return self._levels.of_member(cause.name, sigmas, self._acts(cause.name))
         if member is not None and self._alternatives.probability(self._equal(cause.name)) >= SURE:
-            return self._claimed(cause.name, probability, sigmas)
+            return self._claimed(probability, sigmas)
         if member is None and (why := self._impossible_in_place(cause)):
             return Verdict.RULED_OUT, (), why
         if member is None and (alike := self._alike(cause.name)):
@@ -302,22 +302,13 @@ class CauseJudge:
         unsure = self._alternatives.ambiguities
         return next((one for of in (self._classes, unsure) for one, names in of.items() if name in names), "")
 
-    def _claimed(self, name: str, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
-        """Verdict of what is there for sure beside the most probable noise, where a client has no levels."""
+    def _claimed(self, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
+        """Verdict of what is there for sure beside the most probable noise, before a client has levels."""
         if probability < SURE:
             return Verdict.AMBIGUOUS, (), "Noise whose neighbours resemble each other explains it as well."
         if sigmas < OUT:
             return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
-        if self._trial is None:
-            return claim(probability, sigmas, Acts.ALWAYS, None), (), ""
-        gains = self._gains(name)
-        verdict = claim(probability, sigmas, self._acts(name), gains, worse=self._trial.is_worse)
-        text = ""
-        if verdict is Verdict.DOES_NOT_PREDICT and gains is not None:
-            text = f"It was found in these rows; held-out parts gain by it in {gains.with_gain} of {len(gains.parts)}."
-            if gains.predicts:
-                text += " Everything together predicts them worse than without."
-        return verdict, (), text
+        return Verdict.IDENTIFIED, (), ""
 
     def _equal(self, name: str) -> tuple[str, ...]:
         """A cause and what nothing measured here tells from it."""

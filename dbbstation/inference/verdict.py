@@ -136,20 +136,3 @@ def is_worse(corrected: float, reference: float) -> bool:
     References: simulated values, kinematic calibration, mass and friction, or the first session.
     """
     return corrected > (1.0 + SEEN_WORSE) * reference
-
-
-def claim(probability: float, sigmas: float, acts: Acts, gains: Gains | None, *, worse: bool = False) -> Verdict:
-    """Return the verdict of a cause of the most probable hypothesis.
-
-    Args:
-        sigmas: norm over standard deviation.
-        gains: None: not tested.
-        worse: [`is_worse`]; then nothing is identified.
-    """
-    if not (probability >= SURE and sigmas >= OUT):
-        return Verdict.AMBIGUOUS
-    if acts is Acts.ONCE:
-        return Verdict.HAPPENED
-    if worse or (gains is not None and not gains.predicts):
-        return Verdict.DOES_NOT_PREDICT
-    return Verdict.IDENTIFIED

@@ -145,22 +145,6 @@ def trial(kinds, after, *, as_simulated=1.0):
     return Trial(HeldOutError(tuple(folds)))
 
 
-def test_a_name_needs_a_gain_and_a_whole_that_is_not_worse(both):
-    _, _, settled = both
-
-    def verdicts(told):
-        return {one.name: one.verdict for one in read_off(settled, told) if one.name in settled.best.names}
-
-    play, cog = "hysteresis of q", "twice per turn of angle"
-    assert set(verdicts(None).values()) == {Verdict.IDENTIFIED}
-    assert set(verdicts(Trial()).values()) == {Verdict.IDENTIFIED}
-    assert verdicts(trial([(play,), (cog,)], 0.5)) == {play: Verdict.IDENTIFIED, cog: Verdict.IDENTIFIED}
-    assert verdicts(trial([(play,)], 0.5)) == {play: Verdict.IDENTIFIED, cog: Verdict.DOES_NOT_PREDICT}
-    assert set(verdicts(trial([(play,), (cog,)], 1.1)).values()) == {Verdict.DOES_NOT_PREDICT}
-    text = next(one.text for one in read_off(settled, trial([(play,)], 0.5)) if one.name == cog)
-    assert "in 0 of 10" in text
-
-
 @pytest.mark.parametrize(("last", "persists"), [(600, True), (300, False)])
 def test_what_came_once_has_happened_and_a_step_that_gains_persists(last, persists):
     data = table(4, rows=600)
@@ -168,10 +152,11 @@ def test_what_came_once_has_happened_and_a_step_that_gains_persists(last, persis
     whole = channel(data, blocks=1)
     settled = settle(replace(whole, residual=whole.residual + 0.3 * inside))
     (name,) = settled.best.names
-    told = {one.name: one for one in read_off(settled, trial([settled.bank.kind_of(name)], 0.5))}[name]
+    levels = levels_of(settled, left_over(settled), None, None)
+    told = {one.name: one for one in read_off(settled, trial([settled.bank.kind_of(name)], 0.5), levels)}[name]
     assert told.verdict is Verdict.HAPPENED
     assert told.persists is persists
-    without = {one.name: one for one in read_off(settled, trial([], 0.5))}[name]
+    without = {one.name: one for one in read_off(settled, trial([], 0.5), levels)}[name]
     assert without.verdict is Verdict.HAPPENED
     assert not without.persists
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from math import comb
 
 import numpy as np
@@ -11,14 +10,11 @@ import pytest
 from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import (
     ABSENT,
-    OUT,
     PARTS_WITH_GAIN,
     SURE,
-    Acts,
     DensityGains,
     Gains,
     Verdict,
-    claim,
     is_worse,
 )
 
@@ -78,25 +74,6 @@ def test_an_effect_without_use_seldom_predicts(rng):
     drawn = [Gains(tuple(parts)).predicts for parts in rng.standard_normal((4000, 10))]
     enough = sum(comb(10, k) for k in range(7, 11)) / 2**10
     assert 0.5 * enough < np.mean(drawn) < enough + 3.0 * np.sqrt(enough / 4000)
-
-
-@pytest.mark.parametrize(("probability", "sigmas"), [(SURE - 1e-6, 100.0), (1.0, OUT - 1e-6), (float("nan"), 9.0)])
-def test_what_is_not_sure_is_ambiguous(probability, sigmas):
-    for acts, gains in product(Acts, (GAIN, NO_GAIN, None)):
-        assert claim(probability, sigmas, acts, gains) is Verdict.AMBIGUOUS
-
-
-def test_what_is_sure_and_acts_always_needs_a_gain():
-    assert claim(SURE, OUT, Acts.ALWAYS, GAIN) is Verdict.IDENTIFIED
-    assert claim(SURE, OUT, Acts.ALWAYS, NO_GAIN) is Verdict.DOES_NOT_PREDICT
-    assert claim(SURE, OUT, Acts.ALWAYS, None) is Verdict.IDENTIFIED
-    for gains in (GAIN, NO_GAIN, None):
-        assert claim(1.0, 50.0, Acts.ALWAYS, gains, worse=True) is Verdict.DOES_NOT_PREDICT
-
-
-def test_no_other_rows_test_what_acts_once():
-    for gains, worse in product((GAIN, NO_GAIN, None), (False, True)):
-        assert claim(SURE, OUT, Acts.ONCE, gains, worse=worse) is Verdict.HAPPENED
 
 
 def test_worse_is_what_can_be_seen():

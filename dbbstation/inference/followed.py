@@ -198,30 +198,35 @@ def interchangeable(
     """Return variables over which one immediate cause can replace members."""
     best, bank = settled.best, settled.bank
     own = frozenset[str]().union(*(follow(name) for name in members))
-    found: set[str] = set()
+    rivals = []
     for cause in settled.causes:
         over = followed_by(bank, cause.name)
         pattern = bank.patterns.get(cause.name)
         picked = pattern is not None and pattern.family in LOOKED_FOR
         if cause.name in best.names or len(over) != 1 or over & own or picked or way_of(bank, cause.name) != VALUE:
             continue
-        if share_of(settled, members, cause) >= settled.channel.interchangeable:
-            found |= over
-    return tuple(sorted(found))
+        rivals.append(cause)
+    shares = shares_of(settled, members, rivals)
+    found = (followed_by(bank, name) for name, share in shares.items() if share >= settled.channel.interchangeable)
+    return tuple(sorted(frozenset[str]().union(*found)))
 
 
-def share_of(settled: Settled, members: Collection[str], cause: Cause) -> float:
-    """Share of the squares of what members do that a cause can make, beside base and the other members: its best form."""
+def shares_of(settled: Settled, members: Collection[str], causes: Sequence[Cause]) -> dict[str, float]:
+    """Shares of the squares of what members do that each cause can make, beside base and the other members: its best form."""
+    if not causes:
+        return {}
     columns, values, _ = estimated(settled, members)
     others = [m for m in settled.best.members if m.cause.name not in members]
-    stiff = [one for one in cause.variants if len(one.columns) < FLEXIBLE] or cause.variants
-    most = max(len(one.columns) for one in stiff)
-    made = (
-        share_made(settled.comparison.beside(others, np.concatenate([columns, one.columns])), values)
-        for one in stiff
-        if len(one.columns) == most
-    )
-    return max(made)
+    found = {}
+    for cause in causes:
+        stiff = [one for one in cause.variants if len(one.columns) < FLEXIBLE] or cause.variants
+        most = max(len(one.columns) for one in stiff)
+        found[cause.name] = max(
+            share_made(settled.comparison.beside(others, np.concatenate([columns, one.columns])), values)
+            for one in stiff
+            if len(one.columns) == most
+        )
+    return found
 
 
 def estimated(

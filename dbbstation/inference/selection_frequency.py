@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.blocks import spread
+from dbbstation.inference.blocks import spread_over
 from dbbstation.inference.hypotheses import CLOSE, search
 from dbbstation.inference.projection import BesideBase, CauseColumns
 
@@ -26,6 +26,9 @@ SHARE = 0.7
 
 DRAWS = 20
 """Draws: a frequency of one half is known to a tenth."""
+
+AT_ONCE = 128
+"""Columns that are laid out at once."""
 
 
 def selection_frequency(
@@ -61,10 +64,12 @@ def selection_frequency(
     names = np.array(sorted(set(groups)))
     kept_groups = max(int(np.ceil(SHARE * len(names))), min(len(names), 2))
     group_of = np.repeat(groups, [len(block.target) for block in blocks])
-    rows = spread(blocks, columns)
-    every, target = CauseColumns(rows[:, :base].copy(), room=columns - base - 1), rows[:, -1].copy()
-    every.add(rows[:, base:-1])
-    del rows, blocks  # each fills as much memory as all causes
+    rows = spread_over(blocks, np.arange(base))
+    every, target = CauseColumns(rows[:, :-1].copy(), room=columns - base), rows[:, -1].copy()
+    for first in range(base, columns, AT_ONCE):
+        # All at once would take as much memory as the columns and the blocks once more.
+        every.add(spread_over(blocks, np.arange(first, min(first + AT_ONCE, columns)))[:, :-1])
+    del rows, blocks  # these fill as much memory as all causes
     parts = {name: every.part(group_of == name) for name in names.tolist()}
     times = dict.fromkeys((cause.name for cause in causes), 0)
     for _ in range(DRAWS):

@@ -14,7 +14,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.blocks import compress, with_random
 from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.folds import held_out_error, parts_of
-from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, followed_by, left_with, share_of
+from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, followed_by, left_with, shares_of
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
@@ -335,7 +335,7 @@ def _resembles(settled: Settled) -> dict[str, dict[str, float]]:
             over = followed_by(settled.bank, name)
             rest = [c for c in settled.causes if c.name != name and followed_by(settled.bank, c.name) == over]
             simple_first = sorted(rest, key=lambda cause: max(len(one.columns) for one in cause.variants))
-            found[name] = {c.name: share_of(settled, [name], c) for c in simple_first}
+            found[name] = shares_of(settled, [name], simple_first)
     return found
 
 

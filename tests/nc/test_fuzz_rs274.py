@@ -100,7 +100,8 @@ def difference(path: Toolpath, they: list[Event]) -> str:
         return f"{[kind for kind, _ in groups]} and {[event.kind for event in they]}"
     before: np.ndarray | None = None
     for (_, rows), event in zip(groups, they, strict=True):
-        rounding = np.array([0.51e-4 * event.unit_mm] * 3 + [0.51e-4] * 3)
+        # In inches the printed offsets are rounded as much as the pose.
+        rounding = np.array([(0.51e-4 if event.unit_mm == 1.0 else 1.6e-4) * event.unit_mm] * 3 + [0.51e-4] * 3)
         poses, line = path.poses[rows], path.line[rows[0]]
         if event.kind in {"RAPID", "FEED", "ARC"}:
             if (np.abs(poses[-1] - event.pose) > rounding).any():
@@ -119,12 +120,12 @@ def difference(path: Toolpath, they: list[Event]) -> str:
     return ""
 
 
-def moving(they: list[Event]) -> list[Event]:
+def moving(they: list[Event], before: np.ndarray | None = None) -> list[Event]:
     """Without rapids that lead nowhere, as cycles have some."""
     kept: list[Event] = []
-    before = np.full(6, np.nan)
+    before = np.full(6, np.nan) if before is None else before
     for event in they:
-        if event.kind != "RAPID" or not np.allclose(event.pose, before, rtol=0.0, atol=1e-3):
+        if event.kind != "RAPID" or not np.allclose(event.pose, before, rtol=0.0, atol=3e-3):
             kept.append(event)
         before = event.pose
     return kept
@@ -159,7 +160,7 @@ def off_arc_mm(start: np.ndarray, poses: np.ndarray, event: Event) -> float:
     first, last = start[plane] - centre, event.pose[plane] - centre
     sign = math.copysign(1.0, event.turns)
     swept = (sign * (math.atan2(last[1], last[0]) - math.atan2(first[1], first[0]))) % math.tau
-    if swept < 1e-6 or math.tau - swept < 1e-6:
+    if swept < 1e-4 or math.tau - swept < 1e-4:  # four decimals are printed
         swept = math.tau
     swept += (abs(event.turns) - 1) * math.tau
     nodes = np.vstack([start, poses])

@@ -1,0 +1,119 @@
+"""Programs in the habits of nine posts: read as they are and as LinuxCNC reads them, and written so that it runs the same.
+
+`DBBSTATION_FUZZ=5000` tries as many. `nc_files` of the installed LinuxCNC are read too.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dbbstation.errors import InputError
+from dbbstation.nc.export import Inverse, compensated_program
+from dbbstation.nc.setup import Setup
+from dbbstation.nc.toolpath import RowKind
+from dbbstation.sources.contract import Motion
+from tests.nc.interpreter import MOTION, events, needs_rs274
+from tests.nc.posts import POSTS, program
+from tests.nc.test_fuzz_rs274 import difference, moving
+from tests.nc.test_look_alikes import to_the_path_mm
+from tests.nc.test_through_rs274 import in_inches
+from tests.nc.through_rs274 import MOVES, said
+
+pytestmark = needs_rs274
+
+COUNT = int(os.environ.get("DBBSTATION_FUZZ", "45"))
+
+PLACES = {"G54": (5.0, -8.0, -1000.0, 0.0, 0.0, 0.0), "G28": (0.0, 0.0, -945.0, 0.0, 0.0, 0.0)}
+LENGTHS = {1: (0.0, 0.0, 12.5, 0.0, 0.0, 0.0), 2: (0.0, 0.0, -3.25, 0.0, 0.0, 0.0)}
+SETUP = Setup(PLACES, LENGTHS)
+STORED = {
+    number + axis: values[axis] / 25.4
+    for number, values in ((5221, PLACES["G54"]), (5161, PLACES["G28"]))
+    for axis in range(3)
+}
+TOOLS = "".join(f"T{tool} P{tool} Z{length[2] / 25.4:.9f}\n" for tool, length in LENGTHS.items())
+THREE_AXES = np.array([np.nan] * 3 + [0.0] * 3)
+
+
+def as_linuxcnc_takes_it(text: str) -> str:
+    """Without G80 beside G0, which it refuses and other controls read; with the machine at rest in all axes before."""
+    text = re.sub(r"(?m)^(N\d+ ?)?G0?0 (.*)G80(.*)$", r"\1G80\nG0 \2\3", text)
+    return re.sub(r"(?m)^(N\d+ ?)?(G0 G20 .*)$", r"\2", text)
+
+
+def along(path, done, model) -> tuple[float, list[np.ndarray]]:
+    """How far the tool leaves the nominal moves at feed [mm], and the ends of nominal moves that it does not come to, in order."""
+    moves = [event for event in done if event.kind in MOVES]
+    poses = np.array([event.pose for event in moves])
+    feeds = np.array([event.kind == "FEED" for event in moves])
+    tool = model.actual_poses(Motion(poses=poses, is_path=True))
+    halves = model.actual_poses(Motion(poses=(poses[1:] + poses[:-1]) / 2.0, is_path=True))[feeds[1:]]
+    off_mm = to_the_path_mm(np.vstack([tool[feeds], halves])[:, :3], path)
+    ends = path.poses[(path.kind == RowKind.FEED) & np.append(np.any(path.arc[1:] != path.arc[:-1], axis=1), True)]
+    place, missed = 0, []
+    for end in ends:
+        there = np.flatnonzero(np.linalg.norm(tool[place:, :3] - end[:3], axis=1) < 3e-4)
+        missed += [] if len(there) else [end]
+        place += int(there[0]) if len(there) else 0
+    return off_mm, missed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(COUNT))
+def test_a_part_of_a_post_is_read_and_written(number, linuxcnc, crooked, tmp_path):
+    post = POSTS[number % len(POSTS)]
+    text = program(post, number // len(POSTS))
+    they = events(as_linuxcnc_takes_it(text), tmp_path, STORED, TOOLS)
+    assert they is not None, f"{post.name}: LinuxCNC refuses\n{text}"
+    path = linuxcnc.toolpath(text, f"{post.name}.ngc", start=THREE_AXES, setup=SETUP)
+    assert path.is_move.sum() > 20
+    known = path.unknown[path.is_move] == 0
+    assert known.sum() > 0.8 * len(known)
+    written = compensated_program(path, linuxcnc, Inverse(crooked)).text
+    done = events(in_inches(written), tmp_path, STORED, TOOLS)
+    assert done is not None, f"{post.name}: LinuxCNC refuses what was written\n{written}"
+    assert said(moving(done, np.zeros(6))) == said(moving(they, np.zeros(6)))
+    off_mm, missed = along(path, done, crooked)
+    assert off_mm < 2e-4, f"{post.name}: {off_mm}\n{text}\n{written}"
+    assert not missed, f"{post.name}: no move ends at {missed[0]}\n{text}\n{written}"
+    # rs274 begins at zero in all axes: our own start is that, too, where both are held against each other.
+    begin = np.zeros(6)
+    same = linuxcnc.toolpath(text, f"{post.name}.ngc", start=begin, setup=SETUP)
+    differs = difference(same, they)
+    assert not differs, f"{post.name}: {differs}\n{text}"
+
+
+NC_FILES = Path("/usr/share/linuxcnc/ncfiles")
+
+REFUSED = (
+    r"G4[12](\.1)? is not read|polar coordinates|G38\.\d is not read|G33 is not read|G7[0-9.]+ is not read|G[578](\.\d)? is not read"
+    r"|M70 is not read|nobody knows where|is not in this file|runs Python|are not read|is read before|moves nothing|M\d+ is not read"
+)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not NC_FILES.is_dir(), reason="LinuxCNC's nc_files are not installed")
+def test_files_that_come_with_linuxcnc_are_read_as_it_reads_them_or_refused(linuxcnc, tmp_path):
+    lengths = dict.fromkeys(range(100), (0.0,) * 6)
+    setup = Setup({"G28": (0.0,) * 6, "G30": (0.0,) * 6}, lengths, {1: 0.0})
+    table = "".join(f"T{tool} P{tool} Z0\n" for tool in lengths)
+    equal, refused = [], []
+    for file in sorted(NC_FILES.glob("*.ngc")):
+        they = events(file.read_bytes(), tmp_path, None, table)
+        if they is None or not any(event.kind in MOTION for event in they):
+            continue
+        text = file.read_bytes().decode("cp1252", "replace")
+        try:
+            differs = difference(linuxcnc.toolpath(text, file.name, start=np.zeros(6), setup=setup), they)
+            equal.append(file.name)
+        except InputError as error:
+            differs = "" if re.search(REFUSED, str(error)) else str(error)
+            refused.append(file.name)
+        assert not differs, f"{file.name}: {differs}"
+    print(f"{len(equal)} equal: {equal}, {len(refused)} refused: {refused}")  # noqa: T201 - with -s
+    assert len(equal) >= 10

@@ -31,10 +31,11 @@ class BudgetTerm(StrEnum):
     BAR = "calibrated length of the bar"
     TEMPERATURE = "temperature of the bar"
     MOUNTING = "place of the ball"
+    FORM = "form of both balls"
 
 
 NOT_STATED: tuple[str, ...] = (
-    "form of both balls",
+    BudgetTerm.FORM.value,
     "how fast the gauge follows",
     "heat of the machine between runs",
 )
@@ -49,6 +50,7 @@ class SetUpKnowledge:
         u_temperature_um: standard uncertainty of corrected growth.
         not_absolute: why figures of bar length have no uncertainty; may be empty.
         u_ball_um: standard uncertainty in X and Y, coordinate and mounting.
+        u_form_um: standard uncertainty of a reading by the form of both balls.
     """
 
     u_bar_um: float | None = None
@@ -56,6 +58,7 @@ class SetUpKnowledge:
     not_absolute: str = ""
     u_ball_um: float | None = None
     u_ball_z_um: float | None = None
+    u_form_um: float | None = None
 
 
 @dataclass(frozen=True)
@@ -198,7 +201,21 @@ def budgets(
     one: CircleAnalysis, known: SetUpKnowledge, quantities: Iterable[BudgetQuantity] = OF_ONE
 ) -> dict[BudgetQuantity, Budget]:
     """Return budgets of figures; arguments as of `budget_of`."""
-    return {quantity: budget_of(one, quantity, known) for quantity in quantities}
+    return {quantity: _with_form(budget_of(one, quantity, known), known) for quantity in quantities}
+
+
+def _with_form(budget: Budget, known: SetUpKnowledge) -> Budget:
+    """Return a budget with the form of both balls, if stated.
+
+    A range of readings is off by as much as either ball at most; hysteresis compares the same places of both.
+    """
+    if known.u_form_um is None:
+        return budget
+    terms = dict(budget.terms_um)
+    if budget.quantity is not BudgetQuantity.H:
+        terms[BudgetTerm.FORM] = known.u_form_um
+    missing = tuple(cause for cause in budget.missing if cause != BudgetTerm.FORM)
+    return _budget(budget.quantity, terms, missing, budget.value_um, budget.as_read_um, budget.why_not)
 
 
 @with_one_thread
@@ -220,7 +237,7 @@ def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[BudgetQuanti
     }
     why = next((each.why_not for each in radius if each.why_not), "")
     found[BudgetQuantity.D] = _budget(BudgetQuantity.D, d_terms, radius[0].missing, pair.d_um, pair.d_um, why)
-    return {quantity: found[quantity] for quantity in OF_BOTH}
+    return {quantity: _with_form(found[quantity], known) for quantity in OF_BOTH}
 
 
 def _pair_range(pair: PairAnalysis, quantity: BudgetQuantity) -> Budget:

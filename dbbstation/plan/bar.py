@@ -49,6 +49,9 @@ class Bar:
     reading_mm: float | None = None
     temp_uncertainty_k: float | None = None
     calibrator_serial_number: str | None = None
+    calibrator_certificate: str | None = None
+    calibrator_certified: str | None = None
+    ball_form_um: float | None = None
 
     def reads_long_mm(self, temp_c: float | None) -> tuple[float, float]:
         """Return the expected reading less true distance, with standard uncertainty [mm].

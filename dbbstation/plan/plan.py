@@ -47,6 +47,7 @@ class Ball:
         repeatability_mm: of the holder, one standard deviation per axis.
         place_known: False under the spindle [CAL III-A], where `centre_mm` is the commanded place.
         plate: None without bore.
+        form_um: roundness deviation by its certificate; None if not stated.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Ball:
     repeatability_mm: float
     place_known: bool = True
     plate: Plate | None = None
+    form_um: float | None = None
 
 
 @dataclass(frozen=True)

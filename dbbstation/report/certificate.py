@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import UTC, date, datetime, timedelta
 from typing import TYPE_CHECKING
 
 from dbbstation.files.recordings.entries import RunState
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from dbbstation.files.recordings.session import SessionFolder
 
@@ -47,7 +48,7 @@ def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolera
         tolerances: whether there are any.
     """
     lacking = dict.fromkeys(text for session in sessions for text in _lacking(session, job))
-    if not place:
+    if not place.strip():
         lacking["place unknown"] = None
     if not tolerances:
         lacking["no tolerance"] = None
@@ -63,15 +64,41 @@ def _lacking(session: SessionFolder, job: str) -> list[str]:
         (session.ambient_temp_c is None, "temperature unknown"),
         (bar is None, "bar unknown"),
         (bar is not None and not bar.serial_number, "serial number of the bar unknown"),
+        (bar is not None and not bar.calibrator_certified, "calibrator's certificate unknown"),
         (bar is not None and bar.calibrated is None, "calibration date of the bar unknown"),
         (
             bar is not None and bar.expansion_um_m_k != 0.0 and (bar.temp_c is None or bar.expansion_um_m_k is None),
             "temperature or expansion of the bar unknown",
         ),
         (bool(session.bar_waiver), "bar not freshly calibrated"),
-        (not session.operator, "operator unknown"),
-        (not (job or session.job), "job unknown"),
+        (not session.operator.strip(), "operator unknown"),
+        (not (job or session.job).strip(), "job unknown"),
         (any(run.started is None for run in accepted), "dates unknown"),
         (session.seal is None, "not sealed"),
     )
-    return [text for lacks, text in checks if lacks]
+    return [text for lacks, text in checks if lacks] + list(_dates(session))
+
+
+def _dates(session: SessionFolder) -> Iterator[str]:
+    """Yield dates that cannot be right, or are too far apart."""
+    moments = [run.started for run in session.in_state(RunState.ACCEPTED) if run.started is not None]
+    if not moments:
+        return
+    first, last, bar = min(moments), max(moments), session.bar
+    if last > datetime.now(UTC) + timedelta(days=1):
+        yield f"a run of {last:%Y-%m-%d}, which is still to come"
+    if bar is None:
+        return
+    if bar.calibrated is not None and not timedelta(0) <= first - bar.calibrated <= LONGEST_BAR:
+        yield f"bar calibrated on {bar.calibrated:%Y-%m-%d}, runs of {first:%Y-%m-%d}"
+    if bar.calibrator_certified is not None:
+        certified_on = date.fromisoformat(bar.calibrator_certified)
+        if not timedelta(0) <= first.date() - certified_on <= LONGEST_CALIBRATOR:
+            yield f"calibrator certified on {certified_on}, runs of {first:%Y-%m-%d}"
+
+
+LONGEST_BAR = timedelta(days=366)
+"""Time from a bar's calibration to a certified run: beyond a year it is another bar by wear of its balls and knocks."""
+
+LONGEST_CALIBRATOR = timedelta(days=5 * 366)
+"""Time from a calibrator's certificate: the longest usual interval of gauge blocks and step gauges [ILAC-G24]."""

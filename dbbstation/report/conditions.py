@@ -58,7 +58,12 @@ def identity(session: SessionFolder) -> tuple[tuple[str, str], ...]:
         ("operator", session.operator or _NOT_NOTED),
         ("bar", _NOT_NOTED if bar is None else f"{bar.serial_number or 'without number'}{calibrated}{at}"),
         ("shop", _shop(session)),
-        ("seal", "none" if session.seal is None else f"anchor {(anchor_of(session.seal) or 'none')[:ANCHOR_SHOWN]}"),
+        (
+            "seal",
+            "none"
+            if session.seal is None
+            else f"anchor {(anchor_of(session.seal) or 'none')[:ANCHOR_SHOWN]}, {len(session.amendments)} amendments",
+        ),
     )
 
 
@@ -99,8 +104,12 @@ def _bar(bar: Bar | None, waiver: str) -> tuple[tuple[str, str], ...]:
     when = "" if bar.calibrated is None else f", {bar.calibrated:%Y-%m-%d %H:%M %Z}"
     at = "" if bar.temp_c is None else f", at {_degc(bar.temp_c)}"
     grows = _NOT_NOTED if bar.expansion_um_m_k is None else f"{bar.expansion_um_m_k:g} µm/(m K)"
+    of = bar.calibrator_certificate or "certificate without number"
+    certified = f"{of} of {bar.calibrator_certified}" if bar.calibrator_certified else f"certificate {_NOT_NOTED}"
+    form = "" if bar.ball_form_um is None else f", form of its ball {bar.ball_form_um:g} µm"
     return (
-        ("bar", bar.serial_number or _NOT_NOTED),
+        ("bar", (bar.serial_number or _NOT_NOTED) + form),
+        ("calibrator", f"{bar.calibrator_serial_number or _NOT_NOTED}, {certified}"),
         ("bar calibrated", calibrated + when + at),
         ("thermal expansion of the bar", grows),
         *without,

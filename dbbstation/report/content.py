@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
     from dbbstation.results.evaluation import EvaluationResult
     from dbbstation.results.ranked import Ranked
 
+
+NUMBER_DIGITS = 10
+"""Of a report's number: of a million reports two are alike once in two thousand [birthday problem, 16^10]."""
 
 REASONS_SHOWN = 3
 """Reasons of a verdict on the first page, the table of tolerances has all: U and the room for a signature have to fit the page too."""
@@ -131,6 +135,7 @@ def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance
     bad |= {one.entry.test for one in found.circles if one.problem or (one.judgement and one.judgement.wrong)}
     return ReportContent(
         machine=found.sessions[0].machine.name,
+        number=hashlib.sha256(provenance.text().encode()).hexdigest()[:NUMBER_DIGITS].upper(),
         virtual=[session.name for session in found.sessions if session.virtual],
         job=reported.job or found.sessions[0].job,
         sessions=list(_sessions(reported, bad)),
@@ -171,6 +176,7 @@ def _sessions(reported: Reported, bad: set[str]) -> Iterable[ShownSession]:
                 name=session.name,
                 measured=when_measured(one.entry for one in circles),
                 identity=identity(session),
+                serial=session.serial_number,
                 conditions=conditions(session, circles, reported.job),
                 places=plate_map({name: session.plan.tests[name] for name in tests}, bad),
                 known=all(session.plan.tests[name].ball.place_known for name in tests),

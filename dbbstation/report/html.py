@@ -40,9 +40,15 @@ def environment() -> jinja2.Environment:
         keep_trailing_newline=True,
     )
     made.filters["um"] = _um
+    made.filters["css"] = _css
     made.filters["with_u"] = with_uncertainty
     made.filters["figure"] = rounded
     return made
+
+
+def _css(text: str) -> str:
+    """Return a text for a string of a style sheet: all but letters, digits and blanks by their number."""
+    return "".join(c if c.isalnum() or c == " " else f"\\{ord(c):x} " for c in text)
 
 
 def _um(value: float | None, decimals: int = 1) -> str:

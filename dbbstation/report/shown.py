@@ -25,6 +25,7 @@ class ShownSession:
 
     name: str
     measured: str
+    serial: str
     identity: Sequence[tuple[str, str]]
     conditions: Sequence[tuple[str, str]]
     places: Sequence[MapPlace]
@@ -86,6 +87,7 @@ class ReportContent:
     """Content of the report's template.
 
     Attributes:
+        number: of the report, by program, command and inputs.
         virtual: names of virtual sessions.
         reasons_shown: on the first page.
         ranking: None without a model.
@@ -95,6 +97,7 @@ class ReportContent:
     """
 
     machine: str
+    number: str
     virtual: Sequence[str]
     job: str
     sessions: Sequence[ShownSession]

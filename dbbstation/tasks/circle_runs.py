@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.bar import Bar
+    from dbbstation.plan.plan import Ball
     from dbbstation.quality.judge import Judgement
     from dbbstation.trace.recording import Recording
 
@@ -146,7 +147,15 @@ def _known(session: SessionFolder, run: RunEntry, recording: Recording) -> SetUp
         not_absolute=_not_absolute(bar, measured_c),
         u_ball_um=float(max(ball_um[:2])) if setup.place_known else None,
         u_ball_z_um=float(ball_um[2]) if setup.place_known else None,
+        u_form_um=None if bar is None else _form_um(bar, session.plan.tests[run.test].ball),
     )
+
+
+def _form_um(bar: Bar, ball: Ball) -> float | None:
+    """Return the standard uncertainty by the form of both balls, rectangular [GUM 4.3.7]; None unless both are stated."""
+    if bar.ball_form_um is None or ball.form_um is None:
+        return None
+    return float(np.hypot(bar.ball_form_um, ball.form_um) / np.sqrt(3.0))
 
 
 def _not_absolute(bar: Bar | None, measured_c: float | None) -> str:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from dbbstation.circles.budget import NOT_STATED, Budget, BudgetTerm, SetUpKnowledge, _with_form
+from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.sources.contract import Setup
-from dbbstation.tasks import circles as circled
+from dbbstation.tasks import circle_runs as circled
 
 
 def known(*mounting_um, place_known=True):
@@ -31,3 +34,17 @@ def test_a_holder_that_is_bad_in_z_alone_does_not_count_in_the_plane():
 
 def test_a_ball_under_the_spindle_has_no_place():
     assert known(3.0, 1.0, 2.0, place_known=False).u_ball_um is None
+
+
+def test_the_form_of_both_balls_is_part_of_u_where_both_are_stated():
+    bar = SimpleNamespace(ball_form_um=0.3)
+    ball = SimpleNamespace(form_um=0.4)
+    # A rectangular distribution of half-width a has a / sqrt(3) [GUM 4.3.7]; both balls add as variances.
+    assert circled._form_um(bar, ball) == pytest.approx(0.5 / np.sqrt(3.0))
+    assert circled._form_um(bar, SimpleNamespace(form_um=None)) is None
+    before = Budget(0.4, {BudgetTerm.NOISE: 0.4}, NOT_STATED, "", 20.0, 21.0, BudgetQuantity.G)
+    after = _with_form(before, SetUpKnowledge(u_form_um=0.3))
+    assert after.u_um == pytest.approx(0.5)
+    assert BudgetTerm.FORM.value not in after.missing
+    assert _with_form(replace(before, quantity=BudgetQuantity.H), SetUpKnowledge(u_form_um=0.3)).u_um == 0.4
+    assert _with_form(before, SetUpKnowledge()) is before

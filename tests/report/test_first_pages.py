@@ -36,7 +36,7 @@ def test_all_is_well(reports):
     page = first_page(reports, "well")
     assert data["verdict"]["kind"] == "within"
     assert data["certificate"] == {"title": "Certificate of circular tests", "lacking": [], "place": PLACE}
-    assert "Certificate of circular tests ." in page
+    assert "Certificate of circular tests , report " in page
     assert "Not a certificate" not in page
     for told in (PLACE, "HX-0017", "A. Mori", "order 4711", "DBB-0042, calibrated 2026-11-20 at 20.0 °C", "anchor "):
         assert told in page, told
@@ -69,7 +69,7 @@ def test_it_is_no_certificate(reports):
     assert "operator unknown" in lacking
     assert "not sealed" in lacking
     assert "place unknown" in lacking
-    assert "Not a certificate : serial number of the machine unknown" in page
+    assert ": serial number of the machine unknown, calibrator's certificate unknown" in page
     title = path.read_text("utf-8").split("<title>")[1].split("</title>")[0]
     assert title.startswith("Not a certificate: serial number of the machine unknown")
 

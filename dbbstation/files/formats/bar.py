@@ -10,13 +10,12 @@ from pydantic import Field
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.quantities import ExpansionUmMK, Quantity, TemperatureDegc
-from dbbstation.files.formats.session import Moment
+from dbbstation.files.formats.session import Day, Moment
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
 from dbbstation.plan.bar import Bar
 
 _Uncertainty = Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)]
-_Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
 
 
 class CalibratorSchema(Schema):
@@ -28,7 +27,7 @@ class CalibratorSchema(Schema):
     """Length that its certificate states, at 20 degC [mm]."""
     uncertainty_um: _Uncertainty
     """Standard uncertainty of that length: half of a certificate's U (k = 2) [µm]."""
-    certified: _Day
+    certified: Day
     """Date of the certificate."""
     certificate: str = ""
     """Its number and who issued it."""
@@ -68,6 +67,8 @@ class BarFile(Schema):
     """Standard uncertainty of a temperature of the bar, then and while it measures [K]."""
     expansion_um_m_k: ExpansionUmMK
     """Thermal expansion of the bar [µm/(m K)]."""
+    ball_form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
+    """Largest deviation of its ball from a sphere by its certificate [µm]."""
     calibrator: CalibratorSchema
     """What it was put on."""
     readings: ReadingsSchema
@@ -108,6 +109,9 @@ class BarFile(Schema):
             reading_mm=self.readings.mean_mm,
             temp_uncertainty_k=self.temp_uncertainty_k,
             calibrator_serial_number=self.calibrator.serial_number,
+            calibrator_certificate=self.calibrator.certificate or None,
+            calibrator_certified=self.calibrator.certified,
+            ball_form_um=self.ball_form_um,
         )
 
 

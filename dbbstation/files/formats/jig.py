@@ -74,6 +74,8 @@ class BallSchema(Schema):
     """Centre: x, y, z, jig frame; under the spindle, where the machine is told to stand when it is put up [mm]."""
     uncertainty_um: Annotated[float, Quantity("µm", 0.01, 1_000, or_zero=True)] | None = None
     """Uncertainty of each coordinate, one standard deviation; only of a ball placed by CMM [µm]."""
+    form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
+    """Largest deviation from a sphere that its certificate states; part of U of figures where the bar states that of its ball [µm]."""
 
 
 class JigFile(Schema):

@@ -167,10 +167,11 @@ class InlinePlan:
         )
         if ball.holder is None or ball.uncertainty_um is None:
             # Only a ball under the spindle comes without them. How well it stands is for a micrometer to say.
-            return Ball(name, None, "", centre, 0.0, 0.0, place_known=False)
+            return Ball(name, None, "", centre, 0.0, 0.0, place_known=False, form_um=ball.form_um)
         repeatability = self.plan.holders[ball.holder].repeatability_um / 1e3
         plate = None if ball.bore is None else Plate(origin, self.jig.plate_expansion_um_m_k)
-        return Ball(name, ball.bore, ball.holder, centre, ball.uncertainty_um / 1e3, repeatability, plate=plate)
+        u_mm = ball.uncertainty_um / 1e3
+        return Ball(name, ball.bore, ball.holder, centre, u_mm, repeatability, plate=plate, form_um=ball.form_um)
 
 
 def plan_text(plan: InlinePlan) -> str:

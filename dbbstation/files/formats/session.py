@@ -1,6 +1,6 @@
 """`dbb-session/1`: what was done in a session, one entry per run."""
 
-from datetime import datetime
+from datetime import date, datetime
 from pathlib import PurePosixPath
 from typing import Annotated, Literal, Self
 
@@ -32,12 +32,21 @@ def _moment(text: str) -> str:
     return text
 
 
+def _day(text: str) -> str:
+    try:
+        date.fromisoformat(text)
+    except ValueError:
+        raise PydanticCustomError("day", "`{text}` is no day of the calendar", {"text": text}) from None
+    return text
+
+
 _NOT_READ = (None, None, None)
 
 BAR_LENGTH = Quantity("mm", 20, 2_000)
 """Lengths that ball bars have."""
 
 InsidePath = Annotated[str, AfterValidator(_inside)]
+Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$"), AfterValidator(_day)]
 Moment = Annotated[str, AfterValidator(_moment), Field(json_schema_extra={"format": "date-time"})]
 Sha256Hex = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
@@ -65,6 +74,12 @@ class BarSchema(Schema):
     """Standard uncertainty of a temperature of the bar; where it is stated, the fit knows what the bar grew by [K]."""
     calibrator_serial_number: str | None = None
     """Of the calibrator."""
+    calibrator_certificate: str | None = None
+    """Number of its certificate and who issued it."""
+    calibrator_certified: Day | None = None
+    """Date of its certificate."""
+    ball_form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
+    """Largest deviation of the bar's ball from a sphere by its certificate [µm]."""
 
 
 class InstrumentSchema(Schema):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
@@ -27,6 +28,7 @@ def control() -> None:
     \b
     Examples:
       dbbstation control kinematics --model model.yaml --out dbbkins.comp
+      dbbstation control parameters --model model.yaml --out genhexkins
     """  # noqa: D301 (click reads the escape)
 
 
@@ -97,6 +99,91 @@ def kinematics(
     _print("HAL file", result.hal)
     _print("Machine file to use from then on", [result.machine_file])
     _print("The way back", result.way_back)
+
+
+@control.command()
+@_MODEL
+@source_file_option
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
+@_MACHINE
+@click.option("--volume", metavar="X,X,Y,Y,Z,Z", help="Least and greatest X, Y and Z [mm]  [default: 200 mm, middle].")
+@click.option("--tilt-deg", type=Finite(0, 90), default=15.0, show_default=True, help="Greatest A and B [deg].")
+@click.option("--ini", type=_FILE, help="INI file in use: tables and backlash that it has are named.")
+@_FORCE
+@_JSON
+def parameters(
+    *,
+    model_file: Path,
+    source_files: tuple[Path, ...],
+    out: Path,
+    machine: Path | None,
+    volume: str | None,
+    tilt_deg: float,
+    ini: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Write values and joint tables for LinuxCNC's own genhexkins, refitted over a volume.
+
+    A weaker way than `control kinematics`: refitted values imitate what genhexkins lacks. They are numbers for a control, never
+    the machine. The table says what is left over the volume.
+
+    \b
+    Examples:
+      dbbstation control parameters --model model.yaml --out genhexkins
+      dbbstation control parameters --model model.yaml --out genhexkins --volume -80,80,-80,80,-1050,-950 --tilt-deg 10
+    """  # noqa: D301 (click reads the escape)
+    from datetime import UTC, datetime
+
+    from dbbstation.cli.output import print_result, print_table, say
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.tasks.control import parameters as written
+
+    result = written(
+        model_file,
+        out,
+        date=datetime.now(UTC).date().isoformat(),
+        known=every_source(source_files),
+        machine=machine,
+        volume_mm=None if volume is None else _six(volume),
+        tilt_deg=tilt_deg,
+        ini=ini,
+        force=force,
+    )
+    for note in result.notes:
+        say(f"note: {note}")
+    if as_json:
+        print_result(result)
+        return
+    echo(f"{result.folder}: {', '.join(result.files)}")
+    spans = ", ".join(f"{axis} {a:g} to {b:g}" for axis, a, b in zip("XYZAB", result.low, result.high, strict=False))
+    echo(f"\nleft over the volume {spans} [µm, deg]:")
+    rows = [[o.way, o.rms_um, o.largest_um, o.tilt_rms_deg, o.tilt_largest_deg] for o in result.left]
+    print_table(
+        ["control", "rms", "largest", "tilt rms", "tilt largest"],
+        [[way, f"{rms:.2f}", f"{most:.2f}", f"{tilt:.5f}", f"{tilted:.5f}"] for way, rms, most, tilt, tilted in rows],
+    )
+    echo("\neach source alone, and what parameters and tables leave of it [µm rms]:")
+    print_table(
+        ["source", "alone", "left", "held by"],
+        [[o.name, _um(o.rms_um), _um(o.left_rms_um), o.held_by] for o in result.sources],
+    )
+    _print("INI file", result.ini)
+    _print("The way back", result.way_back)
+
+
+def _um(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
+
+
+def _six(text: str) -> list[float]:
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 6:  # noqa: PLR2004 - two of each axis
+        raise click.UsageError(f"--volume {text}: give XMIN,XMAX,YMIN,YMAX,ZMIN,ZMAX, six numbers [mm]")
+    return numbers
 
 
 def _print(title: str, lines: Sequence[str]) -> None:

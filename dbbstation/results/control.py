@@ -33,3 +33,56 @@ class KinematicsResult:
     machine_file: str
     way_back: tuple[str, ...]
     notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeftOver:
+    """Errors of the tool over the volume, by how the control is set up: position and tilt, rms and largest."""
+
+    way: str
+    rms_um: float
+    largest_um: float
+    tilt_rms_deg: float
+    tilt_largest_deg: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceLeftOver:
+    """What a source does alone, and what is left of it by parameters and tables.
+
+    Attributes:
+        rms_um: None if it depends on more than the pose.
+        left_rms_um: None likewise.
+        held_by: `parameters`, `table` or `nothing`.
+    """
+
+    name: str
+    rms_um: float | None
+    left_rms_um: float | None
+    held_by: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParametersResult:
+    """What `control parameters` wrote.
+
+    Attributes:
+        low: of the volume, X, Y, Z [mm], A, B, C [deg].
+        high: likewise.
+        left: by way.
+        home_mm: added to HOME and HOME_OFFSET of each joint.
+        ini: lines for the INI file.
+        way_back: what undoes it.
+    """
+
+    folder: str
+    files: tuple[str, ...]
+    model_sha256: str
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    left: tuple[LeftOver, ...]
+    sources: tuple[SourceLeftOver, ...]
+    home_mm: tuple[float, ...]
+    ini: tuple[str, ...]
+    way_back: tuple[str, ...]
+    notes: tuple[str, ...]

@@ -9,7 +9,7 @@ from dbbstation.results.calibration import CalibrationResult
 from dbbstation.results.checked import CheckResult
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.comparison import ComparisonResult
-from dbbstation.results.control import KinematicsResult
+from dbbstation.results.control import KinematicsResult, ParametersResult
 from dbbstation.results.diagnosis import DiagnosisResult
 from dbbstation.results.drive import DriveResult
 from dbbstation.results.evaluation import EvaluationResult
@@ -55,6 +55,7 @@ RESULTS: dict[str, type] = {
     "report": ReportResult,
     "session-list": ListedSession,
     "control-kinematics": KinematicsResult,
+    "control-parameters": ParametersResult,
     "session-log": SessionEvents,
     "settings": SettingsResult,
     "simulate": SimulatedSession,

@@ -2,31 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import re
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dbbstation.control.commands import correction_of
-from dbbstation.control.kinematics import component, settings
+from dbbstation.control.kinematics import HELD_BY_BACKLASH, component, settings
+from dbbstation.control.parameters import FITTED, TRIED, drawn_poses, hal_lines, home_mm, refitted, tables
 from dbbstation.errors import ModelError, StationError
-from dbbstation.files.atomic import refuse_outputs, write_text
+from dbbstation.files.atomic import refuse_outputs, write_folder, write_text
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.inputs import in_a_book
 from dbbstation.files.shipped import package_text
 from dbbstation.machine.difference import differences, in_words
-from dbbstation.results.control import KinematicsResult
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.rotation import Rotation
+from dbbstation.machine.travel import check_travel
+from dbbstation.results.control import KinematicsResult, LeftOver, ParametersResult, SourceLeftOver
 from dbbstation.results.model_warnings import model_warnings
-from dbbstation.tasks.programs import sha256_of
+from dbbstation.tasks.programs import program_text, sha256_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection, Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.machine.geometry import ControlCorrection
+    from numpy.typing import NDArray
+
+    from dbbstation.control.parameters import SourceLeft
+    from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.model.machine_model import MachineModel
     from dbbstation.sources.contract import ErrorSource
 
 SUFFIX = ".comp"
+
+TILT_DEG = 15.0
+SIZE_MM = 200.0
+"""Volume where nobody says another: what parts on a machine of this kind take."""
 
 MACHINE_SUFFIX = ".machine.yaml"
 """End of the machine file that says what the control corrects."""
@@ -75,12 +90,8 @@ def kinematics(
     )
     ini, hal = settings(made, identified.model)
     taken_out = [f for f in identified.model.of_the_machine().sources if f.source.name in made.parts]
-    _write_machine(
-        corrected,
-        identified,
-        correction_of("kinematics", digest, date, taken_out, identified.model.machine),
-        force=force,
-    )
+    control = correction_of("kinematics", digest, date, taken_out, identified.model.machine)
+    write_text(corrected, machine_text(replace(identified.model.machine, control=control)), force=force)
     write_text(out, made.text, force=force)
     return KinematicsResult(
         file=str(out),
@@ -108,8 +119,138 @@ HOMING = (
 UNITS = "the component counts in mm and degrees: LINEAR_UNITS = mm, ANGULAR_UNITS = degree"
 
 
-def _write_machine(path: Path, identified: IdentifiedModel, control: ControlCorrection, *, force: bool) -> None:
-    write_text(path, machine_text(replace(identified.model.machine, control=control)), force=force)
+@in_a_book
+def parameters(
+    model: Path,
+    out: Path,
+    *,
+    date: str,
+    known: Mapping[str, ErrorSource],
+    machine: Path | None = None,
+    volume_mm: Sequence[float] | None = None,
+    tilt_deg: float = TILT_DEG,
+    ini: Path | None = None,
+    force: bool = False,
+) -> ParametersResult:
+    """Write values for LinuxCNC's genhexkins and tables of its joints, refitted to a model over a volume.
+
+    Args:
+        out: folder.
+        date: of today, ISO 8601.
+        known: error sources by name.
+        machine: file of the machine that it is for; None: not compared.
+        volume_mm: least and greatest X, Y and Z; None: 200 mm about the middle of the travel.
+        tilt_deg: greatest A and B.
+        ini: INI file in use, looked through for corrections of joints.
+
+    Raises:
+        InputError: faults of files.
+        ModelError: the model is of another machine, or without uncertainty.
+        OutputError: a file exists without `force`.
+        TravelError: the volume leaves the travel.
+    """
+    identified, digest = _read(model, known, machine), sha256_of(model)
+    own, nominal = identified.model, identified.model.machine
+    low, high = _volume(nominal, volume_mm, tilt_deg)
+    poses, others = (drawn_poses(low, high, count, seed) for seed, count in ((1, FITTED), (2, TRIED)))
+    for given in (poses, others):
+        check_travel(nominal, given, where="the volume")
+    found = refitted(own, poses, others)
+    play = next((f.values for f in own.sources if f.source.name == HELD_BY_BACKLASH and len(f.values) == STRUTS), None)
+    lines = tables(found.values, np.zeros(STRUTS) if play is None else 1e-3 * play)
+    in_table = {one.name for one in found.sources if one.in_table}
+    taken_out = (*found.values.sources(), *(f for f in own.of_the_machine().sources if f.source.name in in_table))
+    corrected = replace(nominal, control=correction_of("parameters", digest, date, taken_out, nominal))
+    joints = hal_lines(found.values, nominal)
+    files = {
+        "genhexkins.hal": "\n".join(joints) + "\n",
+        "parameters.csv": _table(joints),
+        "machine.yaml": machine_text(corrected),
+    }
+    files |= {f"joint-{i}.comp": text for i, text in enumerate(lines)}
+    write_folder(out, files, force=force)
+    home = home_mm(found.values, nominal)
+    settings_of = ["[KINS]", "KINEMATICS = genhexkins", f"JOINTS = {STRUTS}"]
+    for i in range(STRUTS):
+        settings_of += [f"[JOINT_{i}]", f"HOME and HOME_OFFSET: add {home[i]:.6f}"]
+        settings_of += [f"COMP_FILE = joint-{i}.comp", "COMP_FILE_TYPE = 1"] if lines else []
+    left = tuple(LeftOver(way=way, **asdict(one)) for way, one in found.left.items())
+    return ParametersResult(
+        folder=str(out),
+        files=tuple(files),
+        model_sha256=digest,
+        low=tuple(low.tolist()),
+        high=tuple(high.tolist()),
+        left=left,
+        sources=_held(own, found.sources, with_play=play is not None),
+        home_mm=tuple(home.tolist()),
+        ini=tuple(settings_of),
+        way_back=(
+            "put the former lines back into INI and HAL files, and home again",
+            "use the former machine file again",
+        ),
+        notes=(*model_warnings(identified), *_rotation_note(nominal), *([] if ini is None else _active(ini))),
+    )
+
+
+_HELD_IN_INI = re.compile(r"(COMP_FILE|BACKLASH)\s*=\s*(?P<value>[^#;\s]+)")
+
+
+def _volume(
+    machine: Machine, volume_mm: Sequence[float] | None, tilt_deg: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return least and greatest pose, shape (6,) each [mm, deg]."""
+    middle_mm, half = np.array([0.0, 0.0, sum(machine.travel.z_mm) / 2.0]), SIZE_MM / 2.0
+    pairs = np.column_stack([middle_mm - half, middle_mm + half])
+    if volume_mm is not None:
+        pairs = np.asarray(volume_mm, dtype=np.float64).reshape(3, 2)
+        if not (pairs[:, 0] < pairs[:, 1]).all():
+            raise StationError("the volume has no size", remedy="give XMIN,XMAX,YMIN,YMAX,ZMIN,ZMAX, each pair rising")
+    tilt = np.array([tilt_deg, tilt_deg, 0.0])
+    return np.concatenate([pairs[:, 0], -tilt]), np.concatenate([pairs[:, 1], tilt])
+
+
+def _table(joints: Sequence[str]) -> str:
+    """Return joints as a table for any control: what, and its value in mm."""
+    rows = [line.removeprefix("setp genhexkins.").rsplit(" ", 1) for line in joints]
+    return "joint,value_mm\n" + "".join(f"{name},{value}\n" for name, value in rows)
+
+
+def _held(model: MachineModel, found: Sequence[SourceLeft], *, with_play: bool) -> tuple[SourceLeftOver, ...]:
+    by_name = {one.name: one for one in found}
+    rows = []
+    for fitted in model.of_the_machine().sources:
+        one = by_name.get(fitted.source.name)
+        if one is None:
+            held = "table" if with_play and fitted.source.name == HELD_BY_BACKLASH else "nothing"
+            rows.append(SourceLeftOver(name=fitted.source.name, rms_um=None, left_rms_um=None, held_by=held))
+        else:
+            held = "table" if one.in_table else "parameters"
+            rows.append(SourceLeftOver(name=one.name, rms_um=one.rms_um, left_rms_um=one.left_rms_um, held_by=held))
+    return tuple(rows)
+
+
+def _rotation_note(machine: Machine) -> list[str]:
+    if machine.hexapod.rotation is Rotation.ZYX:
+        return []
+    own = machine.hexapod.rotation.value
+    agree = "both agree as long as only one of A, B and C is not zero"
+    return [f"genhexkins turns by {Rotation.ZYX.value}, this machine by {own}: post programs for the former; {agree}"]
+
+
+def _active(ini: Path) -> list[str]:
+    """Return what an INI file corrects of joints already, a note each.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    section, found = "", []
+    for line in program_text(ini).splitlines():
+        section = line.strip() if line.strip().startswith("[") else section
+        match = _HELD_IN_INI.match(line.strip())
+        if match and section.startswith("[JOINT_") and match["value"].strip("0.") != "":
+            found.append(f"{ini.name}: {section} has {match[0]}; the tables written here replace it, do not keep both")
+    return found
 
 
 def _read(path: Path, known: Mapping[str, ErrorSource], machine: Path | None) -> IdentifiedModel:

@@ -60,6 +60,7 @@ def lines_of(folder):
         "predict": ["predict", "--model", model, "--poses", poses, "--out", folder / "actual.csv"],
         "compensate": ["compensate", part, "--model", model, "--out", folder / "out.ngc"],
         "control-kinematics": ["control", "kinematics", "--model", model, "--out", folder / "dbbkins.comp"],
+        "control-parameters": ["control", "parameters", "--model", model, "--out", folder / "genhexkins"],
         "program": ["program", *plan, "--test", "low", "--model", model, "--out", folder / "programs"],
         "report": ["report", *with_model, "--before", SMALL, "--out", folder / "report.html"],
         "history": ["history", many],

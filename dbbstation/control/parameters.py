@@ -1,0 +1,331 @@
+"""Parameters of LinuxCNC's genhexkins, and tables of its joints, refitted over a volume to a model.
+
+genhexkins drives joint i to |T + R a_i - b_i|, with joints a of the platform and b of the base; a table adds to a joint's
+position. Other errors can only be imitated, by joints that are wrong: refitted values are numbers for a control, never the machine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import Struts, forward, inverse, strut_jacobian
+from dbbstation.machine.rotation import Frames
+from dbbstation.model.compensation import compensated
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.causes.base_joints import BaseJoints
+from dbbstation.sources.causes.platform_joints import PlatformJoints
+from dbbstation.sources.causes.strut_reference_length import StrutReferenceLength
+from dbbstation.sources.contract import Fitted, Motion
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+FITTED, TRIED = 400, 2000
+"""Poses that parameters are fitted to, and others that what is left is measured in."""
+
+LEVER_MM = 100.0
+"""A tilt counts by what it moves a point at this distance from the tool tip, as that of a part's far end [mm]."""
+
+POINTS = 256
+"""Most triplets that LinuxCNC takes in a `COMP_FILE` [EMCMOT_COMP_SIZE]."""
+
+PER_WAVE = 4
+"""Least points for a wave in a table of straight pieces: with four a fifth of it is left in rms, with three more than a third."""
+
+BEYOND_MM = 5.0
+"""How far tables go beyond the struts' lengths in the volume; beyond their ends LinuxCNC holds the last value [mm]."""
+
+LOST = 1e-7
+"""Directions of parameters that move the tool less than this share of the strongest one are left as typed plainly: a millimetre of
+them moves it by less than a nanometre."""
+
+JOINTS = 3 * STRUTS
+
+ROUNDS = 4
+"""Gauss-Newton: joints that are off by millimetres settle in three."""
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """What genhexkins is given.
+
+    Attributes:
+        base_mm: base joints less nominal, shape (6, 3).
+        platform_mm: platform joints less nominal, shape (6, 3).
+        longer_mm: struts longer than counted, shape (6,).
+        points_mm: positions of joints, shape (k,).
+        table_mm: added to joints there, shape (6, k); zeros for no tables.
+    """
+
+    base_mm: NDArray[np.float64]
+    platform_mm: NDArray[np.float64]
+    longer_mm: NDArray[np.float64]
+    points_mm: NDArray[np.float64]
+    table_mm: NDArray[np.float64]
+
+    def joints(self, machine: Machine, frames: Frames) -> NDArray[np.float64]:
+        """Return the driven lengths at frames, shape (n, 6) [mm]."""
+        joint = inverse(machine.hexapod.moved(self.base_mm, self.platform_mm), frames).length_mm
+        added = [np.interp(joint[:, i], self.points_mm, self.table_mm[i]) for i in range(STRUTS)]
+        return joint - self.longer_mm + np.column_stack(added)
+
+    def sources(self) -> tuple[Fitted, ...]:
+        """Return what the parameters take out, as sources; tables are left to their own."""
+        return (
+            Fitted(StrutReferenceLength(), self.longer_mm),
+            Fitted(BaseJoints(), self.base_mm.reshape(-1)),
+            Fitted(PlatformJoints(), self.platform_mm.reshape(-1)),
+        )
+
+
+@dataclass(frozen=True)
+class Left:
+    """Errors of the tool over a volume: position [µm] and tilt [deg], rms and largest."""
+
+    rms_um: float
+    largest_um: float
+    tilt_rms_deg: float
+    tilt_largest_deg: float
+
+
+@dataclass(frozen=True)
+class SourceLeft:
+    """What one source does alone, and what of it is left by refitted parameters and tables [µm rms].
+
+    Attributes:
+        in_table: whether tables hold it.
+    """
+
+    name: str
+    rms_um: float
+    left_rms_um: float
+    in_table: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Refitted:
+    """Parameters of a model over a volume.
+
+    Attributes:
+        values: of both ends' joints, with tables.
+        left: by how the control is set up, in order.
+        sources: one each that depends on the pose alone.
+    """
+
+    values: Values
+    left: dict[str, Left]
+    sources: tuple[SourceLeft, ...]
+
+
+def drawn_poses(low: NDArray[np.float64], high: NDArray[np.float64], count: int, seed: int) -> NDArray[np.float64]:
+    """Return poses evenly drawn between limits of shape (6,), shape (count, 6) [mm, deg]."""
+    return np.random.default_rng(seed).uniform(low, high, (count, 6))
+
+
+def refitted(model: MachineModel, poses: NDArray[np.float64], others: NDArray[np.float64]) -> Refitted:
+    """Refit genhexkins to a model's sources that depend on the pose alone.
+
+    Args:
+        poses: to fit, shape (n, 6) [mm, deg].
+        others: to measure what is left, shape (m, 6).
+
+    Raises:
+        KinematicsError: a pose that the machine cannot take.
+    """
+    own = model.anywhere()
+    machine = own.as_found
+    driven = exact_joints(own, poses)
+    points = np.linspace(driven.min() - BEYOND_MM, driven.max() + BEYOND_MM, POINTS)
+    in_table = tuple(f for f in own.sources if _in_table(f, machine, points))
+    rest = replace(own, sources=tuple(f for f in own.sources if f not in in_table))
+    typed = _typed(own, points)
+    few, all_joints = (
+        _with_tables(_fit(rest, typed, poses, platform=platform), in_table, machine) for platform in (False, True)
+    )
+    nominal = np.zeros((STRUTS, 3))
+    as_it_is = replace(typed, base_mm=nominal, platform_mm=nominal, longer_mm=machine.reference_length_error_mm)
+    ways = {"as it is": as_it_is, "typed": typed, "24 refitted": few, "42 refitted": all_joints}
+    at = Frames.from_poses(others, machine.hexapod.rotation)
+    left = {name: _left(tool_errors(own, way.joints(machine, at), at)) for name, way in ways.items()}
+    exact = _left(tool_errors(own, exact_joints(own, others), at))
+    return Refitted(all_joints, {**left, "program or kinematics": exact}, _by_source(own, in_table, poses, typed))
+
+
+def exact_joints(model: MachineModel, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the driven lengths that take the model to poses, shape (n, 6) [mm]."""
+    commands = compensated(model, Motion(poses))
+    return model.driven_mm(Frames.from_poses(commands, model.machine.hexapod.rotation))
+
+
+def tool_errors(model: MachineModel, joints: NDArray[np.float64], wanted: Frames) -> NDArray[np.float64]:
+    """Return the tool's errors at driven lengths: X, Y, Z [mm] and turn [rad], shape (n, 6)."""
+    machine = model.machine
+    command = forward(machine.hexapod, joints + machine.reference_length_error_mm, wanted)
+    poses = command.to_poses(machine.hexapod.rotation)
+    actual = model.actual(Motion(poses)).tool_frames()
+    turned = actual.rotation @ np.swapaxes(wanted.rotation, 1, 2)
+    turn = np.stack(
+        [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]]
+    )
+    return np.hstack([actual.position_mm - wanted.position_mm, turn.T / 2.0])
+
+
+def _left(errors: NDArray[np.float64]) -> Left:
+    off_um = 1e3 * np.linalg.norm(errors[:, :3], axis=1)
+    tilt = np.degrees(np.linalg.norm(errors[:, 3:], axis=1))
+    rms = [float(np.sqrt(np.mean(np.square(each)))) for each in (off_um, tilt)]
+    return Left(rms[0], float(off_um.max()), rms[1], float(tilt.max()))
+
+
+def _typed(own: MachineModel, points: NDArray[np.float64]) -> Values:
+    """Return the model's own joints and lengths."""
+    of = {f.source.name: f.values for f in own.sources}
+    return Values(
+        of.get(BaseJoints.name, np.zeros(JOINTS)).reshape(STRUTS, 3),
+        of.get(PlatformJoints.name, np.zeros(JOINTS)).reshape(STRUTS, 3),
+        of.get(StrutReferenceLength.name, np.zeros(STRUTS)),
+        points,
+        np.zeros((STRUTS, POINTS)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _AtLengths(Motion):
+    """Rows that are known by their strut lengths alone, shape (n, 6)."""
+
+    length_mm: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, STRUTS)))
+
+    def struts(self, machine: Machine) -> Struts:  # noqa: ARG002 - lengths are given
+        nowhere = np.full((*self.length_mm.shape, 3), np.nan)
+        return Struts(self.length_mm, nowhere, nowhere)
+
+
+def _by_length(fitted: Fitted, machine: Machine, length_mm: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return a source's strut errors at lengths, shape (n, 6) [mm]; None if it is no curve of strut length."""
+    form = fitted.source.c_form(machine, fitted.values)
+    if form is None or form.by_pose:
+        return None
+    motion = _AtLengths(np.zeros((len(length_mm), 6)), length_mm=length_mm)
+    strut = fitted.source.effect(motion, machine, fitted.values).strut_mm
+    return None if strut is None or strut.ndim == 1 else strut
+
+
+def _in_table(fitted: Fitted, machine: Machine, points: NDArray[np.float64]) -> bool:
+    """Return whether a table holds a source: one that follows strut length, in waves that are long enough."""
+    fine = fitted.source.shortest_period_mm(machine, fitted.values) < PER_WAVE * float(points[1] - points[0])
+    return not fine and _by_length(fitted, machine, np.full((2, STRUTS), points[0])) is not None
+
+
+def _with_tables(values: Values, in_table: Sequence[Fitted], machine: Machine) -> Values:
+    """Return values with tables that take sources of strut length out, right to the square of what they add."""
+    table = np.zeros((STRUTS, POINTS))
+    for _ in range(2):
+        at = (values.points_mm + (machine.reference_length_error_mm - values.longer_mm)[:, None] + table).T
+        errors = [_by_length(fitted, machine, at) for fitted in in_table]
+        table = -sum((each.T for each in errors if each is not None), np.zeros((STRUTS, POINTS)))
+    return replace(values, table_mm=table)
+
+
+def _effects(machine: Machine, values: Values, frames: Frames) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return joints' derivatives by all 42 parameters, and the tool's by the joints, shapes (n, 6, 42) and (n, 6, 6)."""
+    struts = inverse(machine.hexapod.moved(values.base_mm, values.platform_mm), frames)
+    own = np.eye(STRUTS)[:, :, None]
+    base = -struts.unit[:, :, None, :] * own
+    platform = np.einsum("nji,nkj->nki", frames.rotation, struts.unit)[:, :, None, :] * own
+    longer = np.broadcast_to(-np.eye(STRUTS), (len(frames), STRUTS, STRUTS))
+    by_values = np.concatenate([longer, *(each.reshape(len(frames), STRUTS, -1) for each in (base, platform))], axis=2)
+    return by_values, np.asarray(np.linalg.inv(strut_jacobian(struts)), dtype=np.float64)
+
+
+def _fit(model: MachineModel, start: Values, poses: NDArray[np.float64], *, platform: bool) -> Values:
+    """Return the values that leave the least of position and lever times tilt, by Gauss-Newton."""
+    machine, values = model.machine, start
+    frames = Frames.from_poses(poses, machine.hexapod.rotation)
+    wanted = exact_joints(model, poses)
+    for _ in range(ROUNDS):
+        by_values, tool = _effects(machine, values, frames)
+        tool[:, 3:] *= LEVER_MM
+        used = slice(None) if platform else slice(STRUTS + JOINTS)
+        by_parameter = (tool @ by_values[:, :, used]).reshape(6 * len(poses), -1)
+        lacking = np.einsum("nij,nj->ni", tool, wanted - values.joints(machine, frames)).reshape(-1)
+        step = np.zeros(STRUTS + 2 * JOINTS)
+        step[used] = np.linalg.lstsq(by_parameter, lacking, rcond=LOST)[0]
+        longer, base, end = np.split(step, [STRUTS, STRUTS + JOINTS])
+        values = replace(
+            values,
+            longer_mm=values.longer_mm + longer,
+            base_mm=values.base_mm + base.reshape(STRUTS, 3),
+            platform_mm=values.platform_mm + end.reshape(STRUTS, 3),
+        )
+    return values
+
+
+def _by_source(
+    own: MachineModel, in_table: Sequence[Fitted], poses: NDArray[np.float64], values: Values
+) -> tuple[SourceLeft, ...]:
+    """Return what each source does alone and what is left of it, to first order."""
+    machine = own.as_found
+    frames = Frames.from_poses(poses, machine.hexapod.rotation)
+    by_values, tool = _effects(machine, values, frames)
+    tool[:, 3:] *= LEVER_MM
+    columns = (tool @ by_values).reshape(6 * len(poses), -1)
+    whole, found = exact_joints(own, poses), []
+    for fitted in own.sources:
+        without = MachineModel(machine, tuple(f for f in own.sources if f is not fitted))
+        off = whole - exact_joints(without, poses)
+        errors = np.einsum("nij,nj->ni", tool, off).reshape(-1)
+        if fitted in in_table:
+            flat = replace(values, longer_mm=machine.reference_length_error_mm)
+            table = _with_tables(flat, (fitted,), machine)
+            left = np.einsum("nij,nj->ni", tool, off - (table.joints(machine, frames) - flat.joints(machine, frames)))
+        else:
+            left = errors - columns @ np.linalg.lstsq(columns, errors, rcond=LOST)[0]
+        found.append(SourceLeft(fitted.source.name, _rms_um(errors), _rms_um(left), fitted in in_table))
+    return tuple(found)
+
+
+def _rms_um(errors: NDArray[np.float64]) -> float:
+    """Return the rms of positions [µm] of errors in rows of six [mm]."""
+    return float(1e3 * np.sqrt(np.mean(np.sum(np.square(errors.reshape(-1, 6)[:, :3]), axis=1))))
+
+
+def hal_lines(values: Values, machine: Machine) -> tuple[str, ...]:
+    """Return `setp` lines for genhexkins: joints of base and platform [mm]."""
+    actual = machine.hexapod.moved(values.base_mm, values.platform_mm)
+    both = (("base", actual.base_joints_mm), ("platform", actual.platform_joints_mm))
+    return tuple(
+        f"setp genhexkins.{end}.{i}.{axis} {joints[i, k]:.6f}"
+        for end, joints in both
+        for i in range(STRUTS)
+        for k, axis in enumerate("xyz")
+    )
+
+
+def home_mm(values: Values, machine: Machine) -> NDArray[np.float64]:
+    """Return what is added to HOME and HOME_OFFSET of each joint, shape (6,) [mm]."""
+    return values.longer_mm - machine.reference_length_error_mm
+
+
+def tables(values: Values, play_mm: NDArray[np.float64]) -> tuple[str, ...]:
+    """Return each joint's `COMP_FILE` of `COMP_FILE_TYPE` 1: position, trim upwards and trim downwards [mm]; none if all are zero.
+
+    Args:
+        play_mm: whole width, shape (6,): half of it is added upwards and taken off downwards.
+    """
+    if not values.table_mm.any() and not play_mm.any():
+        return ()
+    return tuple(
+        "".join(
+            f"{at:.6f} {trim + play / 2.0:.6f} {trim - play / 2.0:.6f}\n"
+            for at, trim in zip(values.points_mm, table, strict=True)
+        )
+        for table, play in zip(values.table_mm, play_mm, strict=True)
+    )

@@ -86,7 +86,7 @@ def check(
       dbbstation check plan.yaml machine.yaml
       dbbstation check plan.yaml --instrument heidenhain-nd281b
       dbbstation check my-gauge.yaml
-      dbbstation check plan.yaml machine.yaml --exclude h --clearance-mm 50
+      dbbstation check plan.yaml machine.yaml --exclude high --clearance-mm 50
       dbbstation check 2026-11-20-hexapod-7
       dbbstation check 2026-11-20-hexapod-7 --anchor 3f2a9c1b2d4e5f60
       dbbstation check --schema dbb-plan/1 > dbb-plan-1.schema.json

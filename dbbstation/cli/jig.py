@@ -105,7 +105,7 @@ def sheet(
 
     \b
     Examples:
-      dbbstation jig sheet cmm.csv --jig plate.yaml --column x=Ist_X --column y=Ist_Y --column z=Ist_Z --column u=U --k 2 --out new.yaml
+      dbbstation jig sheet cmm.csv --jig plate.yaml --column x=X --column "u=U (k=2)" --k 2 --out new.yaml
       dbbstation jig sheet plate.dmo --jig plate.yaml --name SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_result, print_table

@@ -37,7 +37,7 @@ AS_WRITTEN = (
     click.option(
         "--encoding",
         type=click.Choice(["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"]),
-        help="Of the files' text  [default: utf-8; of sheets found by looking].",
+        help="Encoding of the files  [default: utf-8; sheets are looked at].",
     ),
 )
 """How tables are written."""

@@ -26,8 +26,8 @@ def session() -> None:
     \b
     Examples:
       dbbstation session list 2026-11-20-hexapod-7
-      dbbstation session reject 2026-11-20-hexapod-7 a-ccw-2 --reason "chip under the holder"
-      dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
+      dbbstation session reject 2026-11-20-hexapod-7 a-cw-2 --reason "chip under the holder"
+      dbbstation session accept 2026-11-20-hexapod-7 a-cw-2
       dbbstation session seal recorded-elsewhere
       dbbstation session log 2026-11-20-hexapod-7
     """  # noqa: D301 (click reads the escape)
@@ -92,15 +92,15 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
 @click.option("--reason", help="Why, where the run cannot be used as it is; it stands in the session file and its log.")
 @_JSON
 def accept(folder: Path, run: str, *, reason: str | None, as_json: bool) -> None:
-    """Accept a run that was rejected or not judged, such as a-ccw-2.
+    """Accept a run that was rejected or not judged, such as a-cw-2.
 
     A run that lost more samples than the plan allows, or whose recording shows no circle, is accepted with a reason only. On a
     terminal it is asked for.
 
     \b
     Examples:
-      dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
-      dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2 --reason "lost samples lie before the turn"
+      dbbstation session accept 2026-11-20-hexapod-7 a-cw-2
+      dbbstation session accept 2026-11-20-hexapod-7 a-cw-2 --reason "lost samples lie before the turn"
     """  # noqa: D301 (click reads the escape)
     _tell(run, _judged(folder, run, accepted=True, reason=(reason or "").strip()), as_json=as_json)
 
@@ -111,11 +111,11 @@ def accept(folder: Path, run: str, *, reason: str | None, as_json: bool) -> None
 @click.option("--reason", required=True, help="Why, in a few words; it stands in the session file.")
 @_JSON
 def reject(folder: Path, run: str, *, reason: str, as_json: bool) -> None:
-    """Reject a run, such as a-ccw-2, and note why. Its recording is kept; no command uses it any more.
+    """Reject a run, such as a-cw-2, and note why. Its recording is kept; no command uses it any more.
 
     \b
     Examples:
-      dbbstation session reject 2026-11-20-hexapod-7 a-ccw-2 --reason "chip under the holder"
+      dbbstation session reject 2026-11-20-hexapod-7 a-cw-2 --reason "chip under the holder"
     """  # noqa: D301 (click reads the escape)
     if not reason.strip():
         raise click.UsageError("say why with --reason: whoever reads the session later will ask")
@@ -134,7 +134,7 @@ def take_in(folder: Path, *, as_json: bool) -> None:
     \b
     Examples:
       dbbstation session take-in 2026-11-20-hexapod-7
-      dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
+      dbbstation session accept 2026-11-20-hexapod-7 a-cw-2
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
     from dbbstation.files.recordings.lock import PATIENCE_S

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.log import attended
 from dbbstation.cli.output import echo, echo_line
 
 if TYPE_CHECKING:
@@ -15,7 +16,29 @@ if TYPE_CHECKING:
     from dbbstation.results.settings import SettingsResult
 
 
-@click.command()
+class _WithShipped(click.Command):
+    """A command that takes a session, with one subcommand."""
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,  # noqa: ANN401
+    ) -> click.Context:
+        """Return the context of the subcommand if the line names it."""
+        if args[:1] == [SHIPPED]:
+            from dbbstation.cli.shipped import shipped
+
+            shipped.help = (shipped.help or "").replace(r"\b", "\b")
+            return attended(shipped).make_context(f"{info_name} {SHIPPED}", args[1:], parent, **extra)
+        return super().make_context(info_name, args, parent, **extra)
+
+
+SHIPPED = "shipped"
+
+
+@click.command(cls=_WithShipped)
 @click.argument("folder", required=False, type=click.Path(path_type=Path), metavar="[SESSION]")
 @click.option("--template", is_flag=True, help="Print a settings file with every key as a comment, and stop.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -33,6 +56,7 @@ def settings(folder: Path | None, *, template: bool, as_json: bool) -> None:
       dbbstation settings 2026-11-20-hexapod-7
       dbbstation settings --template > dbbstation-settings.yaml
       dbbstation settings 2026-11-20-hexapod-7 --json
+      dbbstation settings shipped                         (what comes along; `settings shipped --help`)
     """
     from dbbstation.cli.output import print_result
     from dbbstation.cli.shop import shop_settings

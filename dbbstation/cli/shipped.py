@@ -1,0 +1,138 @@
+"""`dbbstation settings shipped`: plans, machines, jigs, a session and examples that come with the program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from dbbstation.cli.output import echo, echo_line
+
+_FIXTURES = (
+    "bars",
+    "cmm",
+    "drives",
+    "gauges",
+    "jigs",
+    "jobs",
+    "machines",
+    "mappings",
+    "models",
+    "settings",
+    "simulators",
+    "sources",
+    "tables",
+)
+_SESSION = "sessions/small"
+
+EXAMPLES = {
+    **{
+        f"{name}/": _SESSION
+        for name in (
+            "2026-11-20-hexapod-7",
+            "session",
+            "sessions/monday",
+            "monday",
+            "tuesday",
+            "measured",
+            "check-session",
+            "recorded-elsewhere",
+        )
+    },
+    "bar.yaml": "bars/zerodur.yaml",
+    "cmm.csv": "cmm/plate.csv",
+    "plate.dmo": "cmm/plate.dmo",
+    "mountings.csv": "cmm/mountings.csv",
+    "machine.yaml": "machines/reference.yaml",
+    "measured.yaml": "machines/every-key.yaml",
+    "model.yaml": "models/small.yaml",
+    "my-gauge.yaml": "gauges/my-gauge.yaml",
+    "plan.yaml": "plans/ten-minute-check.yaml",
+    "plate.yaml": "jigs/reference-plate.yaml",
+    "scale_bow.py": "sources/scale_bow.py",
+    "strut3.csv": "drives/strut.csv",
+    "table2.yaml": "plans/table2.yaml",
+}
+"""Names that help texts use, and the files that `examples` has for them; a name that ends with a slash is a folder."""
+
+
+@click.command()
+@click.argument("name", required=False, metavar="[NAME]")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Copy NAME into this folder.")
+@click.option("--force", is_flag=True, help="Replace existing files.")
+@click.option("--json", "as_json", is_flag=True, help="Print the names as JSON.")
+def shipped(name: str | None, *, out: Path | None, force: bool, as_json: bool) -> None:
+    r"""List plans, machines, jigs, a small session and examples that come with the program, or copy some of them.
+
+    NAME is one of them, or a kind such as `plans`. `examples` has the files that help texts name.
+
+    \b
+    Examples:
+      dbbstation settings shipped
+      dbbstation settings shipped plans/table2.yaml --out .
+      dbbstation settings shipped examples --out try
+    """
+    from dbbstation.catalogue import nearest
+    from dbbstation.cli.output import print_json
+    from dbbstation.errors import StationError
+    from dbbstation.files.atomic import write_folder
+    from dbbstation.files.gateway import content_of
+
+    files = shipped_files()
+    if (name is None) != (out is None):
+        raise click.UsageError("NAME and --out belong together: what is copied, and where to")
+    if name is None or out is None:
+        names = [*(key for key in files if not key.startswith(f"{_SESSION}/")), _SESSION, "examples"]
+        if as_json:
+            print_json({"shipped": names})
+        else:
+            echo("\n".join(names))
+        return
+    wanted = name.rstrip("/")
+    chosen = (
+        _examples(files)
+        if wanted == "examples"
+        else {
+            key.removeprefix(wanted).lstrip("/") or Path(key).name: path
+            for key, path in files.items()
+            if key == wanted or key.startswith(f"{wanted}/")
+        }
+    )
+    if not chosen:
+        kinds = ["examples", *dict.fromkeys(key.partition("/")[0] for key in files)]
+        raise StationError(f"nothing that comes along is called {name!r}", remedy=nearest(name, kinds))
+    write_folder(out, {key: content_of(path) for key, path in chosen.items()}, force=force)
+    if as_json:
+        print_json({"shipped": sorted(chosen)})
+    else:
+        echo_line(f"{len(chosen)} files written to {out}")
+
+
+def shipped_files() -> dict[str, Path]:
+    """Return all files that come along, by kind and name with a slash between."""
+    from dbbstation.files.shipped import shipped_folder
+
+    fixtures, protocols = shipped_folder("fixtures"), shipped_folder("protocols")
+    folders = [(kind, fixtures / kind) for kind in (*_FIXTURES, _SESSION)]
+    folders += [(kind, protocols / kind) for kind in ("plans", "instruments")]
+    found = {
+        f"{kind}/{path.relative_to(folder).as_posix()}": path
+        for kind, folder in folders
+        for path in folder.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    return dict(sorted(found.items()))
+
+
+def _examples(files: dict[str, Path]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for name, source in EXAMPLES.items():
+        if name.endswith("/"):
+            found |= {
+                name + key.removeprefix(f"{source}/"): path
+                for key, path in files.items()
+                if key.startswith(f"{source}/")
+            }
+        else:
+            found[name] = files[source]
+    return found

@@ -1,0 +1,102 @@
+"""`settings shipped`, and the examples of help texts from an empty folder with what it copies there."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+
+import pytest
+
+from dbbstation.cli.shipped import shipped_files
+from tests.cli.conftest import call
+from tests.cli.test_help import LINES, examples, found
+
+QUICK = (
+    "check",
+    "circles",
+    "control",
+    "evaluate",
+    "export",
+    "instruments",
+    "jig",
+    "ports",
+    "program",
+    "session",
+    "settings",
+    "sources",
+)
+SLOW = ("calibrate", "compare", "history", "plot", "report", "simulate", "diagnose", "drive", "fleet")
+
+
+OF_ONES_OWN = {
+    "--anchor": "an anchor that was noted of one's own session",
+    "--leave-out": "a model with backlash",
+    "session amend": "a sealed session in which something was changed since",
+    "session rebuild": "a session whose file was lost",
+    "evaluate predicted": "what the line above wrote",
+}
+"""Parts of examples that need more than files, with what they need."""
+
+
+def runnable(commands):
+    lines = [line for name in LINES for line in examples(found(name.split())[0].help)]
+    return [
+        line
+        for line in dict.fromkeys(lines)
+        if line.split()[1] in commands and not any(one in line for one in OF_ONES_OWN)
+    ]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    done = call("settings", "shipped", "examples", "--out", tmp_path / "try")
+    assert done.code == 0
+    return tmp_path / "try"
+
+
+def said(folder, line):
+    words = shlex.split(line.partition("   (")[0].partition(" > ")[0])[1:]
+    with contextlib.chdir(folder):
+        return call(*words)
+
+
+@pytest.mark.parametrize("line", runnable(QUICK))
+def test_examples_of_quick_commands_run(folder, line):
+    done = said(folder, line)
+    assert done.code == 0, done.err
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("line", runnable(SLOW))
+def test_examples_of_long_commands_run(folder, line):
+    done = said(folder, line)
+    assert done.code == 0, done.err
+
+
+def test_names_are_listed_and_each_is_copied(tmp_path):
+    names = call("settings", "shipped", "--json").data["shipped"]
+    assert {"plans/table2.yaml", "machines/reference.yaml", "sessions/small", "examples"} <= set(names)
+    for name in ("plans", "plans/table2.yaml", "sessions/small", "simulators/"):
+        out = tmp_path / name.replace("/", "-")
+        assert call("settings", "shipped", name, "--out", out).code == 0
+        inside = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+        assert inside
+        for key, data in inside.items():
+            source = next(path for one, path in shipped_files().items() if one in {f"{name.rstrip('/')}/{key}", name})
+            assert source.read_bytes() == data
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (["plons", "--out", "x"], "did you mean plans?"),
+        (["plans"], "NAME and --out belong together"),
+        (["--out", "x"], "NAME and --out belong together"),
+    ],
+)
+def test_what_cannot_be_copied_is_said(tmp_path, words, what):
+    with contextlib.chdir(tmp_path):
+        done = call("settings", "shipped", *words)
+        assert what in done.err
+        assert done.code != 0
+        assert list(tmp_path.iterdir()) == []

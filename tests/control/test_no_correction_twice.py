@@ -116,7 +116,9 @@ def test_a_session_under_a_correcting_control_evaluates_right(
     of = replace(reference, joint_tolerance_mm=0.05)
     truth = MachineModel(of, random_kinematics(of, 3))
     under = corrected(of, truth.sources)
-    monkeypatch.setattr("dbbstation.files.recordings.new_session.write_session", lambda to, _, *rest: write_session(to, under, *rest))
+    monkeypatch.setattr(
+        "dbbstation.files.recordings.new_session.write_session", lambda to, _, *rest: write_session(to, under, *rest)
+    )
     simulate(IdentifiedModel(MachineModel(of), (), np.zeros((0, 0))), PLAN).writing(tmp_path / "perfect")
     recorded = load(tmp_path / "perfect")
     assert any(

@@ -5,11 +5,14 @@ from __future__ import annotations
 import base64
 import hashlib
 import html.parser
+import os
 import re
 import shutil
 import stat
+import subprocess
 import sys
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -332,6 +335,21 @@ def test_a_pdf_needs_a_browser_and_says_which(session, tmp_path, monkeypatch):
     assert refused.code == FAILED
     assert "install Chromium" in refused.err
     assert not (tmp_path / "r.html").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(None in map(shutil.which, ("chromium", "unshare")), reason="no Chromium, or no unshare")
+def test_a_pdf_needs_no_network(session, tmp_path):
+    words = [sys.executable, "-m", "dbbstation", "report", session, "--test", "a", "--out", "r.html", "--pdf", "r.pdf"]
+    alone = ["unshare", "--map-root-user", "--net", "--", *map(str, words)]
+    if subprocess.run([*alone[:4], "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this system gives no namespace without a network")
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    done = subprocess.run(
+        alone, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "r.pdf").read_bytes().startswith(b"%PDF-")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the browser of this test is a script")

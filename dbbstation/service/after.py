@@ -68,7 +68,9 @@ class After:
         model: Path | None = None,
         settings: Path | None = None,
         start: Callable[[SessionJob, Path], BackgroundWork] = BackgroundWork,
+        place: str = "",
     ) -> None:
+        self._place = place
         self.session = session.absolute()
         self.results = {step: Result() for step in SessionTask}
         self._model = model
@@ -199,7 +201,7 @@ class After:
                 plan, machine = self._files()
                 return job.model_copy(update={"plan": plan, "machine": machine, "model": self.model})
             case SessionTask.REPORT:
-                return job.model_copy(update={"model": self.model})
+                return job.model_copy(update={"model": self.model, "place": self._place})
             case SessionTask.ACCEPTANCE:
                 if self.former is None:
                     raise ValueError("no session was chosen to hold this one against")

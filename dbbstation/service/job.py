@@ -41,5 +41,7 @@ class SessionJob(BaseModel):
     """Machine of the programs."""
     settings: Path | None = None
     """File of the shop's settings where one was named."""
+    place: str = ""
+    """Where was measured, for a certificate."""
     force: bool = True
     """Whether what is there already is written over: the folder of results is the program's own."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
+from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import format_of, read_document, validate
 from dbbstation.instrument.library import load_instrument
@@ -25,12 +27,13 @@ from dbbstation.service.choice import Choice
 from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Line
 from dbbstation.service.session_list import list_sessions
+from dbbstation.service.shop_temperature import add_note
 from dbbstation.service.work import BackgroundWork, WorkProgress
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.facts.held import ReportVerdict
+    from dbbstation.facts.held import ComparedTolerance
     from dbbstation.service.job import SessionJob
 
 
@@ -50,12 +53,12 @@ class Operated:
         """Return the folder of its sessions."""
         return self._beside(self.job.sessions)
 
-    def choice(self) -> Choice:
-        """Return what to measure: the last session if incomplete with the same plan, else a new one."""
+    def choice(self, *, anew: bool = False) -> Choice:
+        """Return what to measure: the last session if incomplete with the same plan and not `anew`, else a new one."""
         job = self.job
         line = Line(instrument=instrument_of(self.path, job), profile=job.profile, port=job.port, baud=job.baud)
         return Choice(
-            folder=self._unfinished() or self._new_folder(),
+            folder=(None if anew else self._unfinished()) or self._new_folder(),
             machine=self._beside(job.machine),
             plan=self._beside(job.plan),
             line=line,
@@ -66,16 +69,34 @@ class Operated:
             job=job.order,
         )
 
-    def tolerances_file(self, session: Path) -> Path:
-        """Write the job's tolerances as settings beside a session and return the file.
+    def tolerances_file(self, session: Path) -> tuple[Path, bool]:
+        """Write the job's tolerances as settings beside a session.
+
+        Returns:
+            The file, and whether it had other limits before; the session's notes then have these.
 
         Raises:
             OutputError: it cannot be written.
         """
         data = {"tolerances": [one.model_dump(exclude_defaults=True) for one in self.job.tolerances]}
         path = session.absolute().parent / f"{session.name}-tolerances.yaml"
-        write_text(path, yaml_text({"format": format_of(SettingsFile), **data}), force=True, rewrites=True)
-        return path
+        text = yaml_text({"format": format_of(SettingsFile), **data})
+        before = path.read_text(encoding="utf-8") if path.is_file() else text
+        if before != text:
+            add_note(session, f"the limits of the job were changed, before: {' '.join(before.split())}")
+        write_text(path, text, force=True, rewrites=True)
+        return path, before != text
+
+    @property
+    def model(self) -> Path | None:
+        """Return the job's model, or None."""
+        return self._beside(self.job.model) if self.job.model else None
+
+    def left_long_ago(self, choice: Choice) -> bool:
+        """Return whether the session to go on with was last written before this shift."""
+        if choice.folder is None or not choice.goes_on:
+            return False
+        return time.time() - (choice.folder / SESSION_FILE).stat().st_mtime > SHIFT_S
 
     def _beside(self, name: str) -> Path:
         return (self.path.parent / name).absolute()
@@ -94,6 +115,10 @@ class Operated:
     def _new_folder(self) -> Path:
         name = f"{self.path.stem}-{datetime.now().astimezone():%Y-%m-%d}"
         return unused_path(self.sessions, name)
+
+
+SHIFT_S = 8.0 * 3600.0
+"""A shift: whoever left the session has gone since, and ball and holder may have been touched [s]."""
 
 
 @dataclass(frozen=True)
@@ -126,8 +151,10 @@ class JobAnswer:
         missing: Sequence[str],
         start: Callable[[SessionJob, Path], BackgroundWork] = BackgroundWork,
     ) -> None:
-        self._missing = tuple(missing)
-        self._after = After(session, None, operated.tolerances_file(session), start)
+        self._missing, job = tuple(missing), operated.job
+        tolerances, self._changed = operated.tolerances_file(session)
+        self._trouble = job.trouble
+        self._after = After(session, operated.model, tolerances, start, job.place)
         self._after.do(SessionTask.REPORT)
 
     def look(self) -> Answered | None:
@@ -138,23 +165,32 @@ class JobAnswer:
             return None
         if result.progress is not WorkProgress.DONE:
             return Answered(Conformity.UNDECIDED, (result.failure or "the report was ended before it was done",))
-        return answer_of(read_plain(ReportAnswer, result.answer).verdict, self._missing, result.path)
+        answered = answer_of(read_plain(ReportAnswer, result.answer), self._missing, result.path, self._trouble)
+        return replace(answered, reasons=(_CHANGED, *answered.reasons)) if self._changed else answered
 
     def close(self) -> None:
         """Cancel the work."""
         self._after.close()
 
 
-def answer_of(verdict: ReportVerdict, missing: Sequence[str], report: Path | None) -> Answered:
-    """Return the answer of a verdict, which is complete only with every planned run.
+def answer_of(answer: ReportAnswer, missing: Sequence[str], report: Path | None, trouble: str = "") -> Answered:
+    """Return the answer of a report, which is complete only with every planned run.
 
-    A limit is exceeded whatever is missing.
+    A limit is exceeded whatever is missing. Commands, which the operator cannot reach, are left to the report.
+
+    Args:
+        trouble: what the shop says if the machine is not within.
     """
+    verdict = answer.verdict
     kinds = {str(one): one for one in Conformity}
     word = kinds.get(verdict.kind, Conformity.UNDECIDED)
     # A report speaks of the shop's tolerances; here the job's hold.
     reasons = list(verdict.reasons) or [_WITHIN if word is Conformity.WITHIN else verdict.headline]
-    to_do = list(verdict.to_do)
+    to_do = [step for step in verdict.to_do if "`" not in step]
+    if word is Conformity.WITHIN:
+        reasons += [worst_of(one) for one in answer.tolerances if one.worst is not None]
+    else:
+        to_do.insert(0, trouble or _SHOW)
     if missing:
         word = word if word is Conformity.EXCEEDED else Conformity.UNDECIDED
         reasons.insert(0, f"Not measured: {', '.join(missing)}.")
@@ -162,6 +198,19 @@ def answer_of(verdict: ReportVerdict, missing: Sequence[str], report: Path | Non
     return Answered(word, tuple(reasons), tuple(to_do), report)
 
 
+def worst_of(one: ComparedTolerance) -> str:
+    """Return a tolerance's worst circle with limit, U and margin."""
+    worst = one.worst
+    if worst is None:
+        return ""
+    expanded = worst.expanded_um or 0.0
+    name, run = one.quantity.replace("-", " ").capitalize(), f"{worst.test} {worst.direction} {worst.repeat}"
+    margin = one.largest_um - worst.um - expanded
+    return f"{name}: {worst.um:.1f} µm at most ({run}), U {expanded:.1f} µm, limit {one.largest_um:g} µm, margin {margin:.1f} µm."
+
+
+_SHOW = "Show this answer and its report to whoever prepared the job."
+_CHANGED = "The limits of the job were changed during this session; its notes have the former ones."
 _WITHIN = "Every circle is within the limits of the job, with its uncertainty."
 
 

@@ -15,6 +15,8 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from dbbstation.files.recordings.session import SessionFolder
+
 _NOTED: TypeAdapter[float] = TypeAdapter(TemperatureDegc)
 
 
@@ -27,10 +29,12 @@ def shop_degc(text: str) -> float | None:
 
 
 def note_temperature(folder: Path, degc: float) -> None:
-    """Note the temperature in a session without running sequence, which takes an `AddNote`.
+    """Note the shop's temperature [degC]; raises as `add_note`."""
+    add_note(folder, degc=degc)
 
-    Args:
-        degc: temperature of the shop [degC].
+
+def add_note(folder: Path, text: str = "", degc: float | None = None) -> None:
+    """Note a text or the shop's temperature [degC] in a session without running sequence, which takes an `AddNote`.
 
     Raises:
         InputError: the session has faults.
@@ -40,4 +44,23 @@ def note_temperature(folder: Path, degc: float) -> None:
         # On a virtual machine that runs faster than real time, runs and notes bear times ahead of the present.
         runs = [run.started for run in writer.runs if run.started is not None]
         notes = [note.made for note in writer.session.notes]
-        writer.note(Note(max([datetime.now(UTC), *runs, *notes]), ambient_temp_c=degc))
+        writer.note(Note(max([datetime.now(UTC), *runs, *notes]), text, degc))
+
+
+def changed_since(session: SessionFolder, operator: str) -> tuple[str, ...]:
+    """Return what is noted of a session that is gone on with: another operator, another shift, a clock that went back.
+
+    Args:
+        operator: now; empty: not known.
+    """
+    by = [note.text.removeprefix(_OPERATOR) for note in session.notes if note.text.startswith(_OPERATOR)]
+    before = (by or [session.operator])[-1]
+    runs = [run.started for run in session.runs if run.started is not None]
+    behind_s = (max(runs) - datetime.now(UTC)).total_seconds() if runs and not session.virtual else 0.0
+    texts = [f"{_OPERATOR}{operator}"] if operator and operator != before else []
+    if behind_s > 0.0:
+        texts.append(f"the computer's clock is {behind_s:.0f} s behind the last run: it was set back")
+    return tuple(texts)
+
+
+_OPERATOR = "operator from here on: "

@@ -147,12 +147,14 @@ def _reported(job: SessionJob, settings: Settings) -> object:
 
     session = _needed(job.session, "session")
     given = [word for name in ("model", "before") if (path := getattr(job, name)) for word in (f"--{name}", path)]
+    given += ["--place", job.place] if job.place else []
     return report(
         session,
         job.out,
         settings=settings,
         before=job.before,
         model=job.model,
+        place=job.place,
         force=job.force,
         provenance=lambda: _provenance("report", session, *given),
         progress=_stage,

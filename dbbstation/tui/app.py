@@ -65,7 +65,7 @@ _TALL_ROWS = 32
 
 DARK, LIGHT = "textual-dark", "textual-light"
 
-_NOT_OPERATED = {"overview": "o", "large": "f", "results": "e", "temperature": "t", "command_palette": "ctrl+p"}
+_NOT_OPERATED = {"large": "f", "results": "e", "temperature": "t", "command_palette": "ctrl+p"}
 """What an operator of a job cannot reach, and by which key others do."""
 
 
@@ -403,7 +403,7 @@ class StationApp(App[None]):
                 yield SystemCommand(active.binding.description, sentence, act)
 
     def action_overview(self) -> None:
-        self.push_screen(OverviewScreen(self, self._show))
+        self.push_screen(OverviewScreen(self, self._show, judging=self._operated is None))
 
     def action_large(self) -> None:
         before = self.drawn

@@ -22,6 +22,7 @@ from dbbstation.tui.large_screen import LargeFigures
 from dbbstation.tui.now_line import OperatorNowLine
 from dbbstation.tui.panel import lines
 from dbbstation.tui.progress_line import ProgressLine
+from dbbstation.tui.question import YesQuestion
 from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.tui.row_screen import RowScreen
 from dbbstation.tui.set_up_panel import SetUpPanel
@@ -64,17 +65,41 @@ class JobScreen(RowScreen):
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
         if self._choice is None:
             return
-        if self.at == 0:
-            choice = self._choice
-            self.say(texts.NEW_CHECKS)
-            self._reception.do(
-                lambda: self._front.prepare(choice), lambda prepared: self._prepared(choice, prepared), self._failed
-            )
+        name = self._rows[self.at]
+        if name == _ANEW:
+            self.say(texts.START_LOOKS)
+            self._reception.do(lambda: self._operated.choice(anew=True), self._found, self._failed)
             return
-        name = self._operated.job.may_change[self.at - 1]
+        if name == _BEGIN:
+            self._begin(self._choice)
+            return
         self.app.push_screen(
             TypeQuestion(texts.JOB_ROWS[name], self._value(name)), lambda text: self._typed(name, text)
         )
+
+    @property
+    def _rows(self) -> tuple[str, ...]:
+        goes_on = self._choice is not None and self._choice.goes_on
+        return (_BEGIN, *((_ANEW,) if goes_on else ()), *self._operated.job.may_change)
+
+    def _begin(self, choice: Choice) -> None:
+        """Check and begin, if everything required is given and an old session is confirmed."""
+        lacking = [texts.JOB_ROWS[name] for name in self._operated.job.required if not self._value(name).strip()]
+        if lacking:
+            self.say(texts.JOB_REQUIRED.format(names=", ".join(lacking)), wrong=True)
+            return
+
+        def sure(yes: bool | None) -> None:  # noqa: FBT001 - answer of a question
+            if yes:
+                self.say(texts.NEW_CHECKS)
+                self._reception.do(
+                    lambda: self._front.prepare(choice), lambda prepared: self._prepared(choice, prepared), self._failed
+                )
+
+        if self._operated.left_long_ago(choice):
+            self.app.push_screen(YesQuestion(texts.JOB_OLD), sure)
+        else:
+            sure(yes=True)
 
     def _typed(self, name: str, text: str | None) -> None:
         if text is None or self._choice is None:
@@ -114,6 +139,7 @@ class JobScreen(RowScreen):
         begin = texts.JOB_GOES_ON if choice.goes_on else texts.JOB_BEGINS
         name = "" if choice.folder is None else choice.folder.name
         rows = [Content.styled(begin.format(session=name), "bold")]
+        rows += [Content(texts.JOB_ANEW)] if choice.goes_on else []
         rows += [
             Content.assemble(f"{texts.JOB_ROWS[one]:{_NAME}} ", (self._value(one) or texts.UNNAMED, "bold"))
             for one in job.may_change
@@ -136,7 +162,8 @@ class JobScreen(RowScreen):
             for one in job.tolerances
         ]
         by = texts.START_BY.format(instrument=job.instrument, port=job.port)
-        return [f"{job.plan}, {job.machine}", by, *limits, "", texts.JOB_BEFORE, *texts.CONFIRMED.values()]
+        trouble = [texts.JOB_TROUBLE.format(text=job.trouble)] if job.trouble else []
+        return [f"{job.plan}, {job.machine}", by, *limits, *trouble, "", texts.JOB_BEFORE, *texts.CONFIRMED.values()]
 
     def _prepared(self, choice: Choice, prepared: Prepared) -> None:
         if self.is_current:
@@ -147,6 +174,7 @@ class JobScreen(RowScreen):
         self.say(str(error), wrong=True)
 
 
+_BEGIN, _ANEW = "begin", "anew"
 _FIELDS = {"operator": "operator", "order": "job"}
 """Field of a choice that a row changes."""
 

@@ -31,7 +31,11 @@ _VERDICT_BEFORE = {"take_back": RunDecision.ACCEPTED, "accept_again": RunDecisio
 
 
 class OverviewScreen(BoardScreen):
-    """Shown over the present screen."""
+    """Shown over the present screen.
+
+    Args:
+        judging: whether verdicts may be changed; an operator's may not.
+    """
 
     help_name = "overview"
 
@@ -48,8 +52,9 @@ class OverviewScreen(BoardScreen):
         ("o,escape", "back", "Back"),
     ]
 
-    def __init__(self, desk: Desk, shown: Shown) -> None:
+    def __init__(self, desk: Desk, shown: Shown, *, judging: bool = True) -> None:
         super().__init__(desk)
+        self._judging = judging
         self._show = shown
         announced = desk.board.announced
         names = list(shown.tests)
@@ -79,6 +84,8 @@ class OverviewScreen(BoardScreen):
             return GoTo in board.allowed and bool(self.choice.tests)
         if action == "earlier":
             return len(self._runs()) > 1
+        if action in _VERDICT_BEFORE and not self._judging:
+            return False
         if action in _VERDICT_BEFORE:
             run = self._run()
             return (

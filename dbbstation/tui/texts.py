@@ -65,6 +65,13 @@ RUN_FIGURES = "{run}: centre X {x:+.1f} Y {y:+.1f}, mean {mean:+.1f}, circularit
 NO_CIRCLE = "{run}: no circle; {problem}"
 JOB_SAYS = "{job}: Enter begins; a row that may be changed is changed by Enter too."
 JOB_BEGINS = "Begin: session {session}"
+JOB_ANEW = "Begin anew: leave that session as it is"
+JOB_REQUIRED = "Still required: {names}. Choose the row, Enter changes it."
+JOB_OLD = (
+    "The session was left before this shift. Ball and holder must stand untouched since.\n\n"
+    "Y  they do, go on      N or Esc  back: begin anew"
+)
+JOB_TROUBLE = "In trouble: {text}"
 JOB_GOES_ON = "Go on with session {session}"
 JOB_ROWS: Mapping[str, str] = {
     "operator": "operator",

@@ -3,36 +3,52 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import shutil
+import time
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import pytest
 from textual.widgets import Static
 
 from dbbstation.errors import InputError
-from dbbstation.facts.held import ReportVerdict
+from dbbstation.facts.held import ReportVerdict, WorstCircle
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.settings import read_settings
+from dbbstation.files.recordings.entries import Note
+from dbbstation.files.recordings.session import read_session
+from dbbstation.files.recordings.session_details import SessionDetails
+from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
+from dbbstation.service.answers import ReportAnswer
 from dbbstation.service.front import Front
 from dbbstation.service.job import SessionJob
 from dbbstation.service.memory import Memory
-from dbbstation.service.operated import Answered, JobAnswer, answer_of, read_operated
+from dbbstation.service.operated import SHIFT_S, Answered, JobAnswer, answer_of, read_operated
+from dbbstation.service.shop_temperature import changed_since
 from dbbstation.service.work import WorkProgress
 from dbbstation.station.commands import Accept, Quit, Repeat
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
+from dbbstation.tui.overview_screen import OverviewScreen
+from dbbstation.tui.question import YesQuestion
 from tests.cli.conftest import call
 from tests.tui.happenings import Happening
 from tests.tui.test_app import Waits
 from tests.tui.test_session_flow import below, now, rows
 
 if TYPE_CHECKING:
-    pass
+    from collections.abc import Callable
+
+    from textual.pilot import Pilot
 
 FIXTURES = shipped_folder("fixtures")
 PLANS = shipped_folder("protocols") / "plans"
@@ -60,7 +76,7 @@ class Reported:
 
     def answer(self) -> dict[str, object]:
         told = {"kind": self.kind, "headline": "Every circle is within.", "reasons": [], "to_do": ["Measure again."]}
-        return {"verdict": told}
+        return {"verdict": told, "tolerances": []}
 
     def close(self) -> None:
         pass
@@ -93,7 +109,9 @@ def test_a_job_is_checked_with_all_that_it_names(job_file: Path) -> None:
 def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path) -> None:
     session = shutil.copytree(FIXTURES / "sessions" / "virtual", job_file.parent / "monday-2026-11-20")
     operated = read_operated(job_file)
-    tolerances = read_settings([operated.tolerances_file(session)]).tolerances
+    path, changed = operated.tolerances_file(session)
+    tolerances = read_settings([path]).tolerances
+    assert not changed
     assert tolerances == (Tolerance(CircleFigure.CIRCULAR_DEVIATION, 400.0),)
     answer = JobAnswer(operated, session, (), Reported).look()
     assert answer == Answered(
@@ -102,6 +120,8 @@ def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path
         ("Measure again.",),
         job_file.parent / "monday-2026-11-20-results" / "report.html",
     )
+    worst = WorstCircle("low", "ccw", 1, um=12.0, expanded_um=0.5, why_not=None)
+    tolerance = SimpleNamespace(worst=worst, quantity="circular-deviation", largest_um=20.0)
     for kind, missing, word in (
         ("within", (), Conformity.WITHIN),
         ("within", ("high cw",), Conformity.UNDECIDED),
@@ -109,8 +129,14 @@ def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path
         ("cannot tell", (), Conformity.UNDECIDED),
         ("none", (), Conformity.UNDECIDED),
     ):
-        told = answer_of(ReportVerdict(kind, "All within.", (), ()), missing, None)
+        verdict = ReportVerdict(kind, "All within.", (), ("`dbbstation calibrate` it.", "Look after the ball."))
+        told = answer_of(ReportAnswer(verdict, (tolerance,)), missing, None, "Do not cut, call 4711.")
         assert told.word is word
+        # No command that the operator cannot reach; the shop's own words where the machine is not within.
+        assert not any("dbbstation" in step for step in told.to_do)
+        assert ("Do not cut, call 4711." in told.to_do) is (kind != "within")
+        worst = "Circular deviation: 12.0 µm at most (low ccw 1), U 0.5 µm, limit 20 µm, margin 7.5 µm."
+        assert (worst in told.reasons) is (kind == "within")
         assert ("Not measured: high cw." in told.reasons) is bool(missing)
     # Another plan than the session has: a new session is begun.
     assert operated.choice().folder != session
@@ -143,13 +169,17 @@ def test_four_screens_and_nothing_that_is_wrong_is_accepted(job_file: Path) -> N
             await pilot.pause()
             app.look()
             await pilot.pause()
-            await pilot.press("a", "x", "s", "o", "f", "e", "t")
+            await pilot.press("a", "x", "s", "f", "e", "t")
             assert isinstance(app.screen, OperateScreen)
+            await pilot.press("o", "x", "a")
+            assert isinstance(app.screen, OverviewScreen)
+            await pilot.press("escape")
             assert runner.sent == []
             await pilot.press("f1")
             helped = " ".join(str(part.render()) for part in app.screen.query(Static))
             assert "All messages with all their words." in helped
-            assert "All tests of the plan on a map" not in helped
+            assert "All tests of the plan on a map" in helped
+            assert "Large figures for two metres" not in helped
             await pilot.press("escape")
             await pilot.press("enter")
             assert runner.sent == [Repeat()]
@@ -204,3 +234,67 @@ def test_a_circle_that_cannot_be_told_has_a_key_of_its_own() -> None:
     (sent,) = runner.sent
     assert isinstance(sent, Accept)
     assert sent.reason.startswith("not to be seen: whether something moved during the circle, whether it is the circle")
+
+
+def test_a_job_begins_anew_asks_for_what_is_required_and_after_a_shift(job_file: Path) -> None:
+    text = job_file.read_text(encoding="utf-8").replace(
+        "may_change: [operator]", "may_change: [operator]\nrequired: [operator]"
+    )
+    job_file.write_text(text.replace("operator: ", "# "), encoding="utf-8")
+    front = Front(job_file.parent, Memory(job_file.parent / "state.json"))
+    operated = read_operated(job_file)
+    folder = operated.choice().folder
+    assert folder is not None
+    SessionWriter.create(
+        folder,
+        read_machine(FIXTURES / "machines" / "reference.yaml"),
+        read_inline_plan(PLANS / "ten-minute-check.yaml"),
+        SessionDetails(),
+    ).close()
+    long_ago = time.time() - 1.5 * SHIFT_S
+    os.utime(folder / "session.yaml", (long_ago, long_ago))
+
+    async def run() -> None:
+        app = StationApp(None, None, front=front, operated=operated)
+        async with app.run_test(size=(80, 24)) as pilot:
+            await looked(app, pilot, lambda: "Enter begins" in now(app))
+            assert "Go on with session" in rows(app)[0]
+            await pilot.press("enter")
+            assert "Still required: operator" in now(app)
+            await pilot.press("down", "down", "enter", *"ann", "enter", "up", "up", "enter")
+            assert isinstance(app.screen, YesQuestion)
+            await pilot.press("n", "down", "enter")
+            await looked(app, pilot, lambda: rows(app)[0].replace("▸", "").strip().startswith("Begin:"))
+            assert folder.name not in rows(app)[0].split()
+
+    asyncio.run(run())
+
+
+async def looked(app: StationApp, pilot: Pilot[None], there: Callable[[], bool]) -> None:
+    for _ in range(300):
+        app.look()
+        if there():
+            return
+        await pilot.pause(0.02)
+    raise AssertionError(now(app), rows(app))
+
+
+def test_another_operator_and_a_clock_set_back_are_noted() -> None:
+    later = datetime.now(UTC) + timedelta(hours=2)
+    session = SimpleNamespace(operator="bob", notes=(), virtual=False, runs=(SimpleNamespace(started=later),))
+    operator, clock = changed_since(session, "ann")
+    assert operator == "operator from here on: ann"
+    assert "it was set back" in clock
+    told = SimpleNamespace(**{**vars(session), "notes": (Note(later, operator),), "runs": ()})
+    assert changed_since(told, "ann") == ()
+    assert changed_since(told, "bob") == ("operator from here on: bob",)
+
+
+def test_a_limit_changed_within_a_session_is_said_and_noted(job_file: Path) -> None:
+    session = shutil.copytree(FIXTURES / "sessions" / "virtual", job_file.parent / "monday-2026-11-20")
+    JobAnswer(read_operated(job_file), session, (), Reported).look()
+    job_file.write_text(job_file.read_text(encoding="utf-8").replace("largest: 400", "largest: 500"), encoding="utf-8")
+    answered = JobAnswer(read_operated(job_file), session, (), Reported).look()
+    assert answered is not None
+    assert answered.reasons[0].startswith("The limits of the job were changed during this session")
+    assert "largest: 400" in read_session(session).notes[-1].text

@@ -51,6 +51,14 @@ class JobFile(Schema):
     """Who measures, where that is always the same."""
     order: str = ""
     """Order number, where that is always the same."""
+    place: str = ""
+    """Where is measured, for a certificate."""
+    model: str = ""
+    """Model of the machine, a path from this file's folder; the report holds the circles beside it."""
+    trouble: str = ""
+    """What the operator reads where a limit is exceeded or the station cannot go on, such as whom to call."""
+    required: tuple[Literal["operator", "order", "temperature"], ...] = ()
+    """What has to be given before a session begins."""
     tolerances: Annotated[tuple[ToleranceSettings, ...], Field(min_length=1)]
     """What the circles may have."""
     may_change: tuple[MayChange, ...] = ()
@@ -80,6 +88,8 @@ def parse_job(path: Path, faults: list[Problem]) -> JobFile | None:
     parse_machine(path.parent / job.machine, faults)
     if job.bar:
         parse_bar(path.parent / job.bar, faults)
+    if job.model and not (path.parent / job.model).is_file():
+        faults.append(document.problem(("model",), f"there is no file {job.model}", "check the path"))
     if job.bar and job.bar_waiver:
         faults.append(document.problem(("bar_waiver",), "a bar and why there is none", "leave one of both out"))
     if misspelt(job.port):

@@ -344,7 +344,7 @@ def test_a_pdf_needs_no_network(session, tmp_path):
     alone = ["unshare", "--map-root-user", "--net", "--", *map(str, words)]
     if subprocess.run([*alone[:4], "true"], capture_output=True, check=False).returncode:
         pytest.skip("this system gives no namespace without a network")
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2]), "XDG_CONFIG_HOME": str(tmp_path)}
     done = subprocess.run(
         alone, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=300
     )

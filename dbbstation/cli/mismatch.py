@@ -140,15 +140,6 @@ def _print_whether(result: MismatchResult) -> None:
     if noise.grows_with:
         alike += f", its variance grows with {noise.grows_with}"
     echo(f"noise of one row: {noise.sigma:.3g} {unit}{alike}{fitted}")
-    if result.led_by:
-        led = ", ".join(
-            f"{s.variable} {100 * s.share:.0f} % ({100 * s.lost:.0f} %)" for s in result.led_by[:MOST_LEADING]
-        )
-        echo(f"led by (of all that is explained, what follows it alone; in brackets what is lost without it): {led}")
-
-
-MOST_LEADING = 4
-"""Variables that are said to lead a mismatch, at the most."""
 
 
 def _print_findings(there: Sequence[EffectResult], unit: str) -> None:
@@ -209,6 +200,3 @@ TOO_FAR_STATED = (
 
 def _print_left(result: MismatchResult) -> None:
     echo(residual_text(result.left, result.unit))
-    if not result.second_start_agrees:
-        odds = result.second_start_log_odds
-        echo(f"A search that begins with nothing ends at another set of effects, of log odds {odds:+.0f} to this one.")

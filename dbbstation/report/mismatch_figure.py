@@ -28,7 +28,7 @@ FEWEST_IN_BIN = 3
 
 def mismatch_figure(found: Mismatch, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
     """Draw the difference over variables and rows, and each part's held-out error."""
-    names = [share.variable for share in found.shares[:MOST_VARIABLES]]
+    names = [one.variables[0][0] for one in found.levels.follows][:MOST_VARIABLES]
     variables = [v for name in names for v in found.settled.channel.variables if v.name == name]
     wide = max(len(variables), 2)
     before, after = _residuals(found)

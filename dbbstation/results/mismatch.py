@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from dbbstation.diagnosis.table.mismatch import RefittedParameter, VariableShare
+from dbbstation.diagnosis.table.mismatch import RefittedParameter
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.files.provenance import Provenance, write_table
@@ -124,7 +124,6 @@ class EffectResult:
         rows: first and last of a single event.
         blocks: size in each run, by name.
         equivalent: effects indistinguishable by these rows.
-        resembles: R² on named forms.
     """
 
     name: str
@@ -147,7 +146,6 @@ class EffectResult:
     blocks: Mapping[str, float]
     equivalent: tuple[str, ...]
     ambiguous_with: tuple[str, ...]
-    resembles: Mapping[str, float]
     text: str
 
 
@@ -174,7 +172,6 @@ class MismatchResult(Framed):
         cancelling: None without such effects.
         parameters: refitted.
         left: whether anything exceeds noise.
-        second_start_agrees: whether a search from nothing agrees.
         not_asked: own physics not tested, with reasons by name.
         stopped: why the search ended early; may be empty.
         out: absent if none was written.
@@ -194,12 +191,9 @@ class MismatchResult(Framed):
     held_out: str
     held_out_rms: HeldOutRms | None
     cancelling: Cancelling | None
-    led_by: tuple[VariableShare, ...]
     findings: tuple[EffectResult, ...]
     parameters: tuple[RefittedParameter, ...]
     left: LeftOver
-    second_start_agrees: bool
-    second_start_log_odds: float
     next: tuple[NextMeasurement, ...]
     not_asked: Mapping[str, str]
     stopped: str

@@ -14,12 +14,11 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.blocks import compress, with_random
 from dbbstation.inference.cancelling import cancelling, effects_by_name
 from dbbstation.inference.folds import held_out_error, parts_of
-from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, followed_by, left_with, shares_of
+from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_with
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.noise import noise_of
-from dbbstation.inference.patterns import Family
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
@@ -89,45 +88,22 @@ def refitted(
     return RefittedParameter(name, before, after, after.value - before.value, confounded, known, stated, far)
 
 
-@dataclass(frozen=True)
-class VariableShare:
-    """Part of the mismatch that follows one variable.
-
-    Attributes:
-        rms: of all its effects, in the table's unit.
-        share: of the explained part, by these alone.
-        lost: without them.
-        terms: number of effects.
-    """
-
-    variable: str
-    rms: float
-    share: float
-    lost: float
-    terms: int
-
-
 @dataclass(frozen=True, eq=False)
 class Mismatch:
     """What is said of a table.
 
     Attributes:
-        shares: largest first.
-        resembles: share of a smooth curve that other causes over its variable make, by finding.
         levels: existence, variables and law of a difference.
         is_worse_here: than simulated, on the rows.
         held_out: None if not tested.
         lacking: physics not tested, with reasons.
         texts: of own physics.
-        second_start: log odds of a search from nothing; zero if equal.
         cancelling: or None.
     """
 
     table: Table
     settled: Settled
     findings: tuple[CauseFinding, ...]
-    shares: tuple[VariableShare, ...]
-    resembles: dict[str, dict[str, float]]
     fitted: tuple[RefittedParameter, ...]
     left: LeftOver
     levels: Levels
@@ -135,7 +111,6 @@ class Mismatch:
     held_out: HeldOutError | None
     lacking: dict[str, str]
     texts: dict[str, Texts]
-    second_start: float = 0.0
     cancelling: Cancelling | None = None
 
     @property
@@ -260,8 +235,6 @@ def _found(
         table=table,
         settled=settled,
         findings=findings,
-        shares=_shares(settled),
-        resembles=_resembles(settled),
         fitted=_fitted(settled, table, refits),
         left=left,
         is_worse_here=is_worse_here,
@@ -269,7 +242,6 @@ def _found(
         held_out=held_out,
         lacking=lacking,
         texts={source.name: source.texts for source in sources},
-        second_start=_second_start(settled),
         cancelling=_cancelling(settled, table.unit),
     )
 
@@ -299,44 +271,6 @@ def choose_without(
     """Repeat the selection without rows, shape (n,), less widely, which can only raise the error."""
     kept = channel.without(rows).thinned(FOLD_ROWS)
     return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,), most_work=MOST_WORK_WITHOUT)
-
-
-def _second_start(settled: Settled) -> float:
-    """Log odds of what a search that begins beside nothing ends at, over what was found; zero where it is the same."""
-    other = next((one for one in settled.others if one.beginning is Beginning.NOTHING), settled)
-    return 0.0 if other.best.names == settled.best.names else other.log_probability - settled.log_probability
-
-
-def _shares(settled: Settled) -> tuple[VariableShare, ...]:
-    """Return variables by their own explanation."""
-    comparison, best, patterns = settled.comparison, settled.best, settled.bank.patterns
-    whole = comparison.explained(best.members) if best.members else 0.0
-    found = []
-    for variable in settled.channel.variables:
-        own = [
-            m.cause.name
-            for m in best.members
-            if m.cause.name in patterns and any(v.name == variable.name for v in patterns[m.cause.name].variables)
-        ]
-        if own:
-            alone = [m for m in best.members if m.cause.name in own]
-            rest = best.without(*own)
-            share = comparison.explained(alone) / whole
-            lost = max(1.0 - (comparison.explained(rest) if rest else 0.0) / whole, 0.0)
-            found.append(VariableShare(variable.name, _rms_about_mean(settled.effect(own)), share, lost, len(own)))
-    return tuple(sorted(found, key=lambda share: -share.share))
-
-
-def _resembles(settled: Settled) -> dict[str, dict[str, float]]:
-    """Shares of the squares of curves that other causes over the same variable make, beside base and other members."""
-    patterns, found = settled.bank.patterns, {}
-    for name in settled.best.names:
-        if name in patterns and patterns[name].family is Family.CURVE:
-            over = followed_by(settled.bank, name)
-            rest = [c for c in settled.causes if c.name != name and followed_by(settled.bank, c.name) == over]
-            simple_first = sorted(rest, key=lambda cause: max(len(one.columns) for one in cause.variants))
-            found[name] = shares_of(settled, [name], simple_first)
-    return found
 
 
 def _cancelling(settled: Settled, unit: str) -> Cancelling | None:
@@ -389,7 +323,3 @@ def _noise_alone(channel: Channel) -> float:
 
 def _rms(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _rms_about_mean(values: NDArray[np.float64]) -> float:
-    return _rms(values - values.mean())

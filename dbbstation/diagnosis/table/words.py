@@ -50,14 +50,6 @@ def sentence_of(found: Mismatch, finding: CauseFinding) -> str:
     if finding.name in found.texts:
         texts = found.texts[finding.name]
         parts += [texts.what, texts.confirm]
-    forms = found.resembles.get(finding.name, {})
-    if forms:
-        name, share = max(forms.items(), key=lambda form: form[1])
-        simple = next((one for one in forms.items() if one[1] > share - AS_GOOD), (name, share))
-        if share > HALF:
-            parts.append(f"{100 * simple[1]:.0f} % of it is {simple[0]}.")
-        else:
-            parts.append(f"No named form follows half of it; nearest, with {100 * share:.0f} %, is {name}.")
     if finding.confounded > CONFOUNDED:
         parts.append(f"The fitted parameters conceal {100 * finding.confounded:.0f} % of it.")
     if finding.equivalent:
@@ -69,12 +61,6 @@ def sentence_of(found: Mismatch, finding: CauseFinding) -> str:
 HAPPENED = "It is something that happened in these rows: no other rows can test it."
 PERSISTS = "It is something that happened in these rows, and stayed: parts that were held back tell of it, too."
 RECURS = "It is something that happens again in these rows: found without each part, it predicts that part, too."
-
-HALF = 0.5
-"""Share of a curve that a named form must follow to be said to be most of it."""
-
-AS_GOOD = 0.05
-"""Share by which a form with more amplitudes must follow a curve better than one with fewer."""
 
 CONFOUNDED = 0.1
 """Share of an effect that parameters conceal from which on this is said."""

@@ -222,7 +222,7 @@ def test_a_robot_measured_by_a_laser_tracker(recordings, tmp_path, rate_hz):
     assert found.held_out.as_simulated == pytest.approx(predicted_rms(found, known[:1]), rel=1e-9)
     assert found.held_out.after < predicted_rms(found, known) < 0.6 * found.held_out.as_simulated
     assert not found.is_worse
-    assert found.shares[0].variable == "q1"
+    assert max(found.levels.follows, key=lambda one: one.rms).variables[0][0] == "q1"
     assert any("q1" in finding.variables for finding in found.identified)
     follows = [one for one in found.levels.follows if one.answer is FollowsAnswer.FOLLOWS]
     assert all(one.gain > np.log(19.0) and one.after < one.before for one in follows)

@@ -25,6 +25,7 @@ from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
 from dbbstation.files.formats.virtual_port import FASTEST, SLOWEST, virtual_port
 from dbbstation.system.hang_up import ended_when_hung_up
 from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered
+from dbbstation.system.virtual_ports import is_virtual
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -157,7 +158,10 @@ def station(
             range_mm=protocol.length.range_mm,
             model=judging_model(model_file, source_files),
             instrument=ReadBy(
-                protocol.name, profile or "", virtual_port(time_scale) if virtual else str(port), virtual
+                protocol.name,
+                profile or "",
+                virtual_port(time_scale) if virtual else str(port),
+                virtual or is_virtual(str(port)),
             ),
         )
         job.check(str(plan_file))

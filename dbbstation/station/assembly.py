@@ -11,6 +11,7 @@ from dbbstation.files.recordings.bar_reach import unlike_bar
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.machine.difference import check_model_is_of
+from dbbstation.plan.duration import circles_s
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
 from dbbstation.station.judging import RunJudge
@@ -20,6 +21,7 @@ from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.storage import Storage, time_of_day
 from dbbstation.station.unjudged import unjudged
+from dbbstation.system.mounts import free_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Plan
     from dbbstation.station.engine import ReadingSource
     from dbbstation.station.programs import RunProgram
 
@@ -81,9 +84,30 @@ class Job:
         fault = None if bar is None else unlike_bar(bar.calibrated_length_mm, bar.stroke_mm, plan)
         if fault is not None:
             raise InputError([Problem(plan_file, 0, 0, *fault)])
+        self._check_room(plan)
         check_plan(plan, self.machine, file=plan_file)
         if self.range_mm is not None:
             check_range(plan, self.range_mm, file=plan_file)
+
+    def _check_room(self, plan: Plan) -> None:
+        """Refuse a disk on which the circles have no room.
+
+        Raises:
+            InputError: too little is free.
+        """
+        circles = [test.run(direction) for test in plan.tests.values() for direction in test.directions]
+        needed = LEAST_FREE + BYTES_PER_READING * (self.rate_hz or 0.0) * circles_s(circles)
+        free = free_bytes(self.folder)
+        if free is not None and free < needed:
+            what = f"the disk has {free / 1e6:.0f} MB free, the session needs {needed / 1e6:.0f} MB"
+            raise InputError([Problem(str(self.folder), 0, 0, what, "free some, or choose another folder")])
+
+
+BYTES_PER_READING = 100
+"""A row of a run file, and the same again for its journal and copies."""
+
+LEAST_FREE = 50e6
+"""Room for everything beside the readings: session file, log, report [bytes]."""
 
 
 @dataclass(frozen=True, eq=False)

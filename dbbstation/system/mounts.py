@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
+from contextlib import suppress
 from pathlib import Path
 
 _MOUNTS = Path("/proc/self/mounts")
+
+
+def free_bytes(path: Path) -> int | None:
+    """Return the free room where a file or folder is or would be made; None if the system does not say."""
+    for folder in (path, *path.absolute().parents):
+        with suppress(OSError):
+            return shutil.disk_usage(folder).free
+    return None
 
 
 def file_system(path: Path) -> str:

@@ -18,11 +18,13 @@ from dbbstation.service.board import Board
 from dbbstation.service.last_session import last_traces
 from dbbstation.service.messages import Message, Weight
 from dbbstation.service.operated import JobAnswer
-from dbbstation.service.shop_temperature import note_temperature, shop_degc
+from dbbstation.service.shop_temperature import add_note, shop_degc
 from dbbstation.service.verdicts import give_verdict
 from dbbstation.station.commands import AddNote, Command, Judge, Quit
 from dbbstation.station.events import Noted
 from dbbstation.station.states import FINAL, RECORDING, VERDICT, State
+from dbbstation.tui import texts
+from dbbstation.tui.asking import TypeQuestion
 from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
 from dbbstation.tui.controls import show_controls
 from dbbstation.tui.explained import ExplainedScreen
@@ -33,6 +35,7 @@ from dbbstation.tui.measure_screen import MeasureScreen
 from dbbstation.tui.messages_screen import MessagesScreen
 from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
 from dbbstation.tui.overview_screen import OverviewScreen
+from dbbstation.tui.plain_terminal import plain_driver
 from dbbstation.tui.question import GiveUpQuestion
 from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.row_screen import RowScreen
@@ -44,6 +47,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
     from textual.binding import BindingType
+    from textual.driver import Driver
     from textual.events import Event as ScreenEvent
     from textual.screen import Screen
 
@@ -119,6 +123,7 @@ class StationApp(App[None]):
         # The sentence at the end of the plan names it; until then the footer has no room.
         Binding("e", "results", "Results", show=False),
         Binding("t", "temperature", "Temperature", show=False),
+        Binding("plus", "note", "Note", show=False),
         Binding("d", "brightness", "Dark/light", show=False),
         ("f1,question_mark", "explain", "Help"),
         ("q", "leave", "Quit"),
@@ -148,6 +153,9 @@ class StationApp(App[None]):
         self._works: list[tuple[Background[Any], Callable[[Any], None], Callable[[Exception], None]]] = []
         self._after: dict[Path, After] = {}
         self._looked_up: tuple[Path, str] | None = None
+
+    def get_driver_class(self) -> type[Driver]:
+        return plain_driver(super().get_driver_class())
 
     def get_default_screen(self) -> MeasureScreen | StartScreen | JobScreen:
         if self._operated is not None and self._front is not None:
@@ -219,7 +227,7 @@ class StationApp(App[None]):
             self.do(lambda: JobAnswer(operated, folder, missing), show, failed)
 
         if self.board.temperature_due and "temperature" in operated.job.may_change:
-            self._ask_temperature(work_out)
+            self._ask_temperature(work_out, back=work_out)
         else:
             work_out()
 
@@ -379,7 +387,7 @@ class StationApp(App[None]):
             return self.board.fault is not None and self._measuring
         if action == "messages":
             return self._measuring and not isinstance(self.screen_stack[-1], ModalScreen)
-        if action == "temperature":
+        if action in {"temperature", "note"}:
             return self._measuring and bool(self.board.session)
         if action == "results":
             return self._measuring and bool(self.board.session) and self.board.state not in RECORDING
@@ -435,6 +443,13 @@ class StationApp(App[None]):
         else:
             self.show_results(folder)
 
+    def action_note(self) -> None:
+        def answered(text: str | None) -> None:
+            if text:
+                self._note(text, None, lambda: None)
+
+        self.push_screen(TypeQuestion(texts.NOTE_TITLE), answered)
+
     def action_brightness(self) -> None:
         self.theme = LIGHT if self.theme == DARK else DARK
 
@@ -448,34 +463,40 @@ class StationApp(App[None]):
         else:
             self.leave(sure=True)
 
-    def _ask_temperature(self, then: Callable[[], None]) -> None:
-        """Ask for the shop's temperature, note it, then go on; one question at a time."""
+    def _ask_temperature(self, then: Callable[[], None], back: Callable[[], None] = lambda: None) -> None:
+        """Ask for the shop's temperature, note it, then go on; one question at a time.
+
+        Args:
+            back: called in place of `then` where the question is left.
+        """
         if isinstance(self.screen, TemperatureQuestion):
             return
 
         def answered(text: str | None) -> None:
-            degc = None if text is None else shop_degc(text)
-            if degc is None:
+            degc = shop_degc(text or "")
+            if text is None:
+                back()
+            elif degc is None:
                 then()
             else:
-                self._note_temperature(degc, then)
+                self._note("", degc, then)
 
         self.push_screen(TemperatureQuestion(), answered)
 
-    def _note_temperature(self, degc: float, then: Callable[[], None]) -> None:
-        """Note a temperature [degC] by the sequence, or in the file after its end."""
+    def _note(self, text: str, degc: float | None, then: Callable[[], None]) -> None:
+        """Note a text or a temperature [degC] by the sequence, or in the file after its end."""
         runner, folder = self._runner, Path(self.board.session)
         if runner is None or AddNote in self.board.allowed:
-            self.send(AddNote(ambient_temp_c=degc))
+            self.send(AddNote(text, degc))
             then()
             return
 
         def write() -> None:
             runner.wait()
-            note_temperature(folder, degc)
+            add_note(folder, text, degc)
 
         def written(_: None) -> None:
-            self.board.take(Noted("", degc))
+            self.board.take(Noted(text, degc))
             then()
 
         def failed(error: Exception) -> None:

@@ -82,7 +82,7 @@ class RunScreen(BoardScreen):
         ("enter", "next", "Next"),
         ("m", "tell('touched')", "Mounting"),
         ("u", "undecided", "Undecided"),
-        ("l", "alone", "In its place"),
+        ("z", "alone", "In its place"),
         ("a", "accept", "Accept"),
         ("r", "tell('repeat')", "Repeat"),
         ("x", "tell('reject')", "Reject"),

@@ -30,7 +30,7 @@ _RUN_KEYS = {
     ),
     "m": "The same, and the holder was touched although nobody asked for it: a new mounting begins.",
     "u": "CANNOT TELL: the run counts although a fault that is named would not show.",
-    "l": "The run counts in place of an earlier one of the same test and direction; else both count.",
+    "z": "The run counts in place of an earlier one of the same test and direction; else both count.",
     "a": "The complete run counts; the next one is announced. Where something is wrong with it the station asks why.",
     "r": "The run does not count and is measured again. While the circle runs, the station asks first.",
     "x": "The run does not count and the next one is announced. While the circle runs, the station asks first.",
@@ -276,6 +276,7 @@ HELP = {
             "c": "After a fault: open instrument and session again.",
             "e": "Results of the session: calibrate, diagnose, programs, report.",
             "t": "Note the temperature of the shop. After circles it is asked for before the session is left.",
+            "plus": "A note for the session.",
             "d": "Dark or light.",
             "f1": "This help.",
             "question_mark": "This help.",
@@ -297,6 +298,7 @@ KEY_NAMES = {
     "f1": "F1",
     "ctrl+p": "Ctrl-P",
     "delete": "Delete",
+    "plus": "+",
 }
 """How keys are called that are no letter."""
 

@@ -10,10 +10,10 @@ from textual.widgets import Input, Static
 
 from dbbstation.tui.texts import (
     ALL_THE_SAME,
+    REASON_ANOTHER,
     REASON_KEYS,
     REASON_TITLE,
     REASON_TITLE_COUNTS,
-    REASON_TYPE,
     REASON_TYPED,
     REASONS,
 )
@@ -31,8 +31,7 @@ class ReasonQuestion(ModalScreen[str | None]):
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        *((key, f"because('{key}')", reason) for key, reason in REASONS.items()),
-        (REASON_TYPE, "type", "Type"),
+        *((str(number), f"because({number})", f"Reason {number}") for number in range(1, len(REASONS) + 2)),
         ("escape,ctrl+c", "dismiss", "Back"),
     ]
 
@@ -43,16 +42,19 @@ class ReasonQuestion(ModalScreen[str | None]):
         self._title = REASON_TITLE_COUNTS if counts else REASON_TITLE
 
     def compose(self) -> ComposeResult:
-        reasons = "\n".join(f"{key}  {reason}" for key, reason in self._reasons.items())
+        told = [*self._reasons, REASON_ANOTHER]
+        reasons = "\n".join(f"{number}  {reason}" for number, reason in enumerate(told, start=1))
         with Vertical():
             yield Static(f"{self._title.format(run=self._run_label)}\n\n{reasons}\n\n{REASON_KEYS}", markup=False)
             yield Input(placeholder=REASON_TYPED, disabled=True)
 
-    def action_because(self, key: str) -> None:
-        if key in self._reasons:
-            self.dismiss(self._reasons[key])
+    def action_because(self, number: int) -> None:
+        if number <= len(self._reasons):
+            self.dismiss(self._reasons[number - 1])
+        elif number == len(self._reasons) + 1:
+            self._type()
 
-    def action_type(self) -> None:
+    def _type(self) -> None:
         field = self.query_one(Input)
         field.disabled = False
         field.add_class("-typing")

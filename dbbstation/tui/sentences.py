@@ -78,7 +78,7 @@ def _verdict(board: Board) -> str:
     if board.doubted:
         return f"{_looked_back(board)} A accepts this one and leaves them."
     beside = board.completed.counts_beside
-    both = f"{beside.label} counts too: L accepts this one in its place. " if beside is not None else ""
+    both = f"{beside.label} counts too: Z accepts this one in its place. " if beside is not None else ""
     if found.word is Advice.REPEAT:
         more = f" ({len(found.causes) - 1} more)" if len(found.causes) > 1 else ""
         return f"{found.word}  {name}: {_ended(found.causes[0])}{more} Enter or R measures it again; A asks why it counts all the same."

@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
 
 class TemperatureQuestion(TypeQuestion):
-    """Returns a valid temperature as text, or None."""
+    """Returns a valid temperature as text, empty to go on without, or None to go back."""
 
     def __init__(self) -> None:
         super().__init__(texts.TEMPERATURE_NOW)
 
     def on_input_submitted(self, submitted: Input.Submitted) -> None:
-        """Close with a temperature or nothing; refuse other texts."""
+        """Close with a temperature or without; refuse other texts."""
         submitted.prevent_default()
         text = submitted.value.strip()
         if not text or shop_degc(text) is not None:
-            self.dismiss(text or None)
+            self.dismiss(text)
         else:
             self.query_one(Static).update(f"{texts.NO_NUMBER.format(text=text)} {texts.TEMPERATURE_NOW}")

@@ -33,25 +33,26 @@ LARGE_WORDS: Mapping[State | None, tuple[str, str]] = {
 LARGE_BACK = "go back"
 """An earlier circle is wrong."""
 
-REASONS = {
-    "1": "the holder or the ball was touched",
-    "2": "the bar slipped or was knocked",
-    "3": "wrong ball, bore, bar or program",
-    "4": "the machine was disturbed or not warm",
-}
-"""Why a run does not count after all, by key."""
+REASONS = (
+    "the holder or the ball was touched",
+    "the bar slipped or was knocked",
+    "wrong ball, bore, bar or program",
+    "the machine was disturbed or not warm",
+)
+"""Why a run does not count after all."""
 
 REASON_TITLE = "Why does {run} not count?"
-ALL_THE_SAME = {
-    "1": "the cause is known and does not touch what is wanted",
-    "2": "it cannot be measured again",
-    "3": "the machine is to be seen as it is",
-}
-"""Why a run counts although something is wrong with it, by key."""
+ALL_THE_SAME = (
+    "the cause is known and does not touch what is wanted",
+    "it cannot be measured again",
+    "the machine is to be seen as it is",
+)
+"""Why a run counts although something is wrong with it."""
 
 REASON_TITLE_COUNTS = "Something is wrong with {run}. Why does it count all the same?"
-REASON_TYPE = "5"
-REASON_KEYS = "5  type another reason\n\nEsc  leaves it as it is"
+REASON_ANOTHER = "type another reason"
+REASON_KEYS = "Esc  leaves it as it is"
+NOTE_TITLE = "A note for the session:"
 REASON_TYPED = "type the reason, then Enter"
 
 TIME_LEFT = (
@@ -172,7 +173,7 @@ TYPE_ANOTHER = "type another …"
 TYPE_REASON = "without a calibration: type why …"
 MEASURE_BAR = "measure it now, on its calibrator …"
 CHOOSE_TITLE = "Choose {part}: arrow keys, Enter; Esc goes back."
-TEMPERATURE_NOW = "Temperature of the shop now [°C]? Enter notes it, Esc goes on without."
+TEMPERATURE_NOW = "Temperature of the shop now [°C]? Enter notes it, or goes on without; Esc goes back."
 NO_NUMBER = "{text} is no temperature between -30 and 80 °C."
 NO_PROFILE = "usual"
 

@@ -411,7 +411,8 @@ def test_the_temperature_after_circles_is_asked_for_before_the_session_is_left()
     async def without(pilot: Pilot[None], app: StationApp) -> None:
         await pilot.press("q")
         assert isinstance(app.screen, TemperatureQuestion)
-        await pilot.press("escape")
+        await pilot.press("escape")  # left without consequence
+        await pilot.press("q", "enter")
 
     async def not_asked(pilot: Pilot[None], _app: StationApp) -> None:
         await pilot.press("q")
@@ -477,7 +478,7 @@ def test_a_session_that_another_process_writes_into_says_so_and_can_be_left(tmp_
             await pilot.pause(0.02)
             app.look()
         await pilot.press("q")
-        await pilot.press("escape")
+        await pilot.press("enter")
 
     with SessionWriter.open(folder):
         assert played(happening, play).sent == [Quit()]

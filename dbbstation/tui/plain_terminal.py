@@ -1,0 +1,61 @@
+"""Characters for terminals that do not have all: no UTF-8, or a Linux console without braille."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import unicodedata
+from typing import TYPE_CHECKING
+
+from dbbstation.tui.braille import BLANK
+
+if TYPE_CHECKING:
+    from textual.driver import Driver
+
+_BRAILLE = re.compile(f"[{chr(BLANK)}-{chr(BLANK + 0xFF)}]")
+_FOREIGN = re.compile(r"[^\x00-\x7f]")
+
+_DOTS = " .:*"
+"""By raised dots of a cell: none, one or two, up to four, more."""
+
+_ALIKE = dict(zip("µ°±…·→›▸▶–×●○✓√⇧│┃║▊▎▌▐▏▕─━═▔▁▂┄┈", "uo~..>>>>-x@ovv^|||||||||--------", strict=True))
+
+
+def plain_driver(usual: type[Driver]) -> type[Driver]:
+    """Return a driver whose characters this terminal has; each stands for one, so that the layout stays."""
+    encoding = getattr(sys.__stderr__, "encoding", None) or ""  # where Textual draws
+    every = "utf" not in encoding.lower()
+    if not every and os.environ.get("TERM") != "linux":
+        return usual
+
+    class PlainDriver(usual):  # type: ignore[valid-type, misc]  # the system's own driver
+        """Draws with the characters that there are."""
+
+        def write(self, data: str) -> None:
+            """Write a text, in other characters where it has to be."""
+            super().write(plain(data) if every else without_braille(data))
+
+    return PlainDriver
+
+
+def without_braille(text: str) -> str:
+    """Return a text with cells of dots as one character of ASCII each."""
+    return _BRAILLE.sub(lambda cell: _DOTS[min(((ord(cell[0]) - BLANK).bit_count() + 1) // 2, 3)], text)
+
+
+def plain(text: str) -> str:
+    """Return a text in ASCII, a character for each."""
+    return _FOREIGN.sub(_alike, without_braille(text))
+
+
+def _alike(found: re.Match[str]) -> str:
+    character = found[0]
+    if character in _ALIKE:
+        return _ALIKE[character]
+    if "\u2500" <= character <= "\u257f":
+        return "+"
+    if "\u2580" <= character <= "\u259f":
+        return "#"
+    first = unicodedata.normalize("NFKD", character)[0]
+    return first if first.isascii() else "?"

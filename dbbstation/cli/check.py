@@ -66,7 +66,7 @@ def check(
     as_json: bool,
     schema: str | None,
 ) -> None:
-    r"""Validate machines, plans, jigs, models, settings, runs (.csv, .csv.part), recordings of drives and session folders.
+    r"""Validate machines, instruments, plans, jigs, models, settings, runs (.csv, .csv.part), recordings of drives and session folders.
 
     Every fault of every file is listed with line and column. A session is checked with its machine, its plan and all
     its runs: hashes, checksums, units, and whether the machine can travel the plan's circles. Its runs are judged as

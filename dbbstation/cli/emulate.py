@@ -116,6 +116,8 @@ def emulate(
     sent_hz, usual_hz = protocol.fastest_hz(baud) * time_scale, usual.fastest_hz(baud)
     if not wait and sent_hz > usual_hz:
         say(f"note: sends {sent_hz:g} readings a second, {instrument} has {usual_hz:g}")
+    if protocol.voice("fault") is None:
+        say(f"note: {instrument} has no frame for a missing bar: it is silent until `mount` or `start` puts a ball up")
     machine, plan = read_machine(machine_file), read_plan(plan_file)
     model = _truth(machine, truth, source_files, seed)
     virtual = VirtualMachine(model, plan, seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.reporting.evaluation import EvaluatedRun
 
-G_WITH_NOISE = "G: greatest less least deviation from the least-squares circle [ISO 230-4], the bar's noise included"
+G_WITH_NOISE = "G: greatest minus least deviation from the least-squares circle [ISO 230-4], the bar's noise included"
 G_LOW_PASSED = (
-    "G: greatest less least deviation from the least-squares circle [ISO 230-4], readings low-passed at 30 undulations "
+    "G: greatest minus least deviation from the least-squares circle [ISO 230-4], readings low-passed at 30 undulations "
     "per revolution"
 )
 """What a table means by circular deviation G. Of a good circle the first is mostly noise, about six times its standard

@@ -51,6 +51,8 @@ class NotRepresentable(ValueError):  # noqa: N818 (the device meets this too, an
 def _as_bytes(value: object) -> object:
     if not isinstance(value, str):
         return value
+    if escape := re.search(r"\\(?:[rntx0]|u)", value):
+        raise ValueError(f"`{escape[0]}` is two characters here: escapes need double quotes, such as \"M1\\r\"")
     try:
         return value.encode("latin-1")
     except UnicodeEncodeError:

@@ -16,7 +16,7 @@ class CircleFigure(StrEnum):
     """Figures of a circle that may have a tolerance."""
 
     CIRCULAR_DEVIATION = "circular-deviation"
-    """G: greatest less least deviation from the least-squares circle [ISO 230-4 3.2]."""
+    """G: greatest minus least deviation from the least-squares circle [ISO 230-4 3.2]."""
     CENTRE_DEVIATION = "centre-deviation"
     """Distance between the least-squares centre and the commanded one [CAL Table III]."""
     MEAN_RADIAL_ERROR = "mean-radial-error"
@@ -24,7 +24,7 @@ class CircleFigure(StrEnum):
     RADIAL_DEVIATION = "radial-deviation"
     """F: the greater of Fmax and Fmin about the least-squares centre, by its size [ISO 230-4]."""
     BIDIRECTIONAL_CIRCULAR_DEVIATION = "bidirectional-circular-deviation"
-    """G(b): greatest less least deviation of both directions together from their least-squares circle [ISO 230-4]."""
+    """G(b): greatest minus least deviation of both directions together from their least-squares circle [ISO 230-4]."""
     MEAN_BIDIRECTIONAL_RADIAL_DEVIATION = "mean-bidirectional-radial-deviation"
     """D: radius of the least-squares circle of both directions less the nominal one, by its size [ISO 230-4]."""
     CIRCULAR_HYSTERESIS = "circular-hysteresis"

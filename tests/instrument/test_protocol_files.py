@@ -74,6 +74,8 @@ def test_a_name_that_is_not_known_brings_the_nearest() -> None:
         ('value: "\\r"', 'value: "\u20ac"', "characters on a wire are bytes"),
         ("width: 8, ", "", "every frame ends in the same literal"),
         ("kind: decimal, width: 8, decimals: 3", "kind: skip, written: x", "a frame without a length is a message"),
+        ('"?"', "'V\\r'", r"`\r` is two characters here: escapes need double quotes"),
+        ("kind: decimal", "kind: decimals", "kind `decimals` is not known; did you mean `decimal`?"),
         ("format: dbb-instrument/1", "format: dbb-plan/1", "gauge.yaml:1:9: format: "),
     ],
 )
@@ -83,6 +85,10 @@ def test_a_wrong_file_is_refused_with_the_place(tmp_path: Path, old: str, new: s
     if old.startswith("width"):
         text = text.replace('      - {kind: literal, value: "\\r"}\n', "")
     assert fault in faults_of(tmp_path, text)
+
+
+def test_a_list_is_not_short_for_a_fault_of_its_item(tmp_path: Path) -> None:
+    assert "values were expected" not in faults_of(tmp_path, GOOD.replace("kind: decimal", "kind: decimals"))
 
 
 def test_every_fault_is_told_at_once(tmp_path: Path) -> None:

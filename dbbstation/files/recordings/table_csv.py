@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
@@ -24,6 +25,9 @@ SEPARATORS = ",;\t"
 MOST_FAULTS = 20
 NO_NUMBER = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
 """Cells that say that there is no number, in small letters."""
+
+_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+"""A number with a decimal comma."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,10 @@ class TableFile:
         found: list[Problem] = []
         if np.isfinite(self.values[name]).all():
             return found
+        comma = next((cell for cell in self.cells[name] if _COMMA.fullmatch(cell)), None)
+        if comma is not None and all(_COMMA.fullmatch(cell) or not cell for cell in self.cells[name]):
+            what = f"{name} has decimal commas, such as `{shortened(comma)}`"
+            return [Problem(self.file, self.header, 0, what, "state the decimal sign: `--decimal ,`")]
         for line, cell, value in zip(self.lines.tolist(), self.cells[name], self.values[name], strict=True):
             if not np.isfinite(value) and cell.lower() not in NO_NUMBER:
                 what = f"{name} is `{shortened(cell)}`, not a finite number"

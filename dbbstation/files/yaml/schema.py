@@ -64,9 +64,19 @@ def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> 
         return schema.model_validate(document.data)
     except ValidationError as error:
         # Naming what a key may have been meant for takes a millisecond: for the first few only.
-        details = sorted(error.errors(include_url=False), key=lambda detail: _place(document, detail))
+        details = [one for one in error.errors(include_url=False) if not _follows(one, error)]
+        details.sort(key=lambda detail: _place(document, detail))
         faults += few([_problem(document, schema, detail) for detail in details[: MOST_FAULTS + 1]], len(details))
         return None
+
+
+def _follows(detail: ErrorDetails, error: ValidationError) -> bool:
+    """Return whether a list is too short only because its items have faults."""
+    place = detail["loc"]
+    return detail["type"] == "too_short" and any(
+        len(other["loc"]) > len(place) and other["loc"][: len(place)] == place
+        for other in error.errors(include_url=False, include_context=False, include_input=False)
+    )
 
 
 def format_of(schema: type[Schema]) -> str:
@@ -130,6 +140,11 @@ def _in_words(kind: str, given: object, context: dict[str, Any], message: str) -
     if kind in {"too_long", "too_short"}:
         limit = context.get("max_length", context.get("min_length"))
         return f"{limit} values were expected, not {context['actual_length']}", "check the list"
+    if kind == "union_tag_invalid":
+        known = context["expected_tags"].replace("'", "").split(", ")
+        near = difflib.get_close_matches(context["tag"], known, n=1, cutoff=0.6)
+        remedy = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(known)}"
+        return f"{context['discriminator'].strip(chr(39))} `{shortened(context['tag'])}` is not known", remedy
     if kind == "implausible":
         return message, "check the unit"
     return message[:1].lower() + message[1:], ""

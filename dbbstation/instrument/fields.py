@@ -52,7 +52,7 @@ def _as_bytes(value: object) -> object:
     if not isinstance(value, str):
         return value
     if escape := re.search(r"\\(?:[rntx0]|u)", value):
-        raise ValueError(f"`{escape[0]}` is two characters here: escapes need double quotes, such as \"M1\\r\"")
+        raise ValueError(f'`{escape[0]}` is two characters here: escapes need double quotes, such as "M1\\r"')
     try:
         return value.encode("latin-1")
     except UnicodeEncodeError:

@@ -32,7 +32,9 @@ def test_empty_cells_say_that_there_is_no_number_and_words_do_not():
 
 def test_a_column_of_decimal_commas_is_told_once():
     faults = parse_table("x;y\n1,5;2\n2,5;3\n", "x.csv").faults_of("x")
-    assert list(map(str, faults)) == ["x.csv:1: x has decimal commas, such as `1,5`; state the decimal sign: `--decimal ,`"]
+    assert list(map(str, faults)) == [
+        "x.csv:1: x has decimal commas, such as `1,5`; state the decimal sign: `--decimal ,`"
+    ]
 
 
 @pytest.mark.parametrize(

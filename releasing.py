@@ -202,16 +202,11 @@ def tried(interpreter: str, what: Path, folder: Path, *, lowest: bool, house: Pa
     run(interpreter, "-m", "venv", "--without-pip", place / "env")
     scripts = place / "env" / ("Scripts" if os.name == "nt" else "bin")
     more = ["--no-index", "--find-links", house] if house else []
+    installer = [sys.executable, "-m", "pip", "--python", scripts / "python", "install", "-q"]
     if lowest:
-        floor = place / "lowest.txt"
-        floor.write_text(
-            "".join(
-                f"{text.replace('>=', '~=' if text.count('.') > 1 else '==')}\n" for text in PROJECT["dependencies"]
-            )
-        )
-        more += ["-c", floor]
+        installer = ["uv", "pip", "install", "-q", "--python", scripts / "python", "--resolution", "lowest-direct"]
     began_s = time.monotonic()
-    run(sys.executable, "-m", "pip", "--python", scripts / "python", "install", "-q", *more, what)
+    run(*installer, *more, what)
     install_s = time.monotonic() - began_s
     size_mb = sum(path.stat().st_size for path in (place / "env").rglob("*") if path.is_file()) / 1e6
     used = place / "used"

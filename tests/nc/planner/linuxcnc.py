@@ -60,7 +60,7 @@ class Ran:
 
     Attributes:
         time_s: of each sample, from the first servo cycle that moves to the last, shape (n,) [s].
-        poses: commanded, shape (n, 6) [mm, deg].
+        poses: commanded, shape (n, 6) [mm, deg]; with a kinematics driven lengths of the joints [mm].
         line: of the program, shape (n,).
     """
 
@@ -79,7 +79,28 @@ class Ran:
         return float(np.diff(self.time_s)[np.any(np.diff(self.poses, axis=0) != 0.0, axis=1)].sum())
 
 
-def run(text: str, *, mm_s2: float = 1000.0, faster: int = 1, patience_s: float = 600.0) -> Ran:
+@dataclass(frozen=True, eq=False)
+class Kins:
+    """A kinematics in place of none: what is recorded are joints then.
+
+    Attributes:
+        name: of the module.
+        home_mm: joints at which the machine is switched on, shape (6,).
+        offset_mm: added to HOME and HOME_OFFSET, shape (6,).
+        hal: lines behind the module's loading.
+        tables: text of each joint's `COMP_FILE`; empty for none.
+    """
+
+    name: str
+    home_mm: np.ndarray
+    offset_mm: np.ndarray
+    hal: tuple[str, ...] = ()
+    tables: tuple[str, ...] = ()
+
+
+def run(
+    text: str, *, mm_s2: float = 1000.0, faster: int = 1, patience_s: float = 600.0, kins: Kins | None = None
+) -> Ran:
     """Run a program on the planner, from its first point on.
 
     Args:
@@ -93,18 +114,18 @@ def run(text: str, *, mm_s2: float = 1000.0, faster: int = 1, patience_s: float 
     """
     while True:
         try:
-            return run_once(text, mm_s2, faster, patience_s)
+            return run_once(text, mm_s2, faster, patience_s, kins)
         except BehindError:
             if faster == 1:
                 raise
             faster = max(faster // 2, 1)
 
 
-def run_once(text: str, mm_s2: float, faster: int, patience_s: float = 600.0) -> Ran:
+def run_once(text: str, mm_s2: float, faster: int, patience_s: float = 600.0, kins: Kins | None = None) -> Ran:
     """Run a program with this clock, or raise; arguments as for `run`."""
     with tempfile.TemporaryDirectory(prefix="dbbstation-planner-") as made, _Alone():
         folder = Path(made)
-        _configure(folder, mm_s2, faster)
+        _configure(folder, mm_s2, faster, kins)
         (folder / "program.ngc").write_text(_quickened(text, faster))
         (folder / "start.txt").write_text(_first_point(text))
         printed = _started(folder, patience_s)
@@ -113,10 +134,12 @@ def run_once(text: str, mm_s2: float, faster: int, patience_s: float = 600.0) ->
             raise BehindError(BEHIND)
         if not ended.exists() or ended.read_text() != "ended":
             raise RuntimeError(ended.read_text() if ended.exists() else f"LinuxCNC did not start:\n{printed}")
-        return _read(folder / "samples.txt", PERIOD_NS / 1e9)
+        ran = _read(folder / "samples.txt", PERIOD_NS / 1e9)
+        # `motor-pos-cmd` is the joint less its HOME_OFFSET.
+        return ran if kins is None else Ran(ran.time_s, ran.poses + kins.home_mm, ran.line)
 
 
-def _configure(folder: Path, mm_s2: float, faster: int) -> None:
+def _configure(folder: Path, mm_s2: float, faster: int, kins: Kins | None = None) -> None:
     limits = {
         "period_ns": PERIOD_NS // faster,
         "mm_s": GREATEST_MM_S * faster,
@@ -126,6 +149,8 @@ def _configure(folder: Path, mm_s2: float, faster: int) -> None:
         "ramp_hz": RAMP_HZ * faster,
     }
     ini = [(HERE / "planner.ini").read_text().format(**limits)]
+    if kins is not None:
+        ini[0] = ini[0].replace("trivkins coordinates=XYZABC", kins.name)
     for joint, axis in enumerate("XYZABC"):
         kind, unit = ("LINEAR", "mm") if axis in "XYZ" else ("ANGULAR", "deg")
         both = (
@@ -135,12 +160,22 @@ def _configure(folder: Path, mm_s2: float, faster: int) -> None:
         homed = (
             "HOME = 0\nHOME_SEARCH_VEL = 0\nHOME_LATCH_VEL = 0\nHOME_SEQUENCE = 0\nFERROR = 9999\nMIN_FERROR = 9999\n"
         )
+        if kins is not None:
+            homed = homed.replace("HOME = 0\n", f"HOME = {kins.home_mm[joint] + kins.offset_mm[joint]:.9f}\n")
+            homed += f"HOME_OFFSET = {kins.home_mm[joint] + kins.offset_mm[joint]:.9f}\n"
+            kind = "LINEAR"
+            if kins.tables:
+                (folder / f"joint-{joint}.comp").write_text(kins.tables[joint])
+                homed += f"COMP_FILE = joint-{joint}.comp\nCOMP_FILE_TYPE = 1\n"
         ini.append(f"[AXIS_{axis}]\n{both}[JOINT_{joint}]\nTYPE = {kind}\n{both}{homed}")
     (folder / "planner.ini").write_text("".join(ini))
     (folder / "planner.tbl").write_text("T1 P1 D0.1 Z0\n")
     (folder / "planner.var").write_text("")
     for name in ("planner.hal", "drive.py"):
         shutil.copy(HERE / name, folder / name)
+    if kins is not None and kins.hal:
+        hal = (folder / "planner.hal").read_text()
+        (folder / "planner.hal").write_text("\n".join([hal, *kins.hal, ""]))
     (folder / "drive.py").chmod(0o755)
 
 

@@ -12,6 +12,7 @@ import tempfile
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,11 +29,17 @@ from tests.control.in_linuxcnc import circle_of, circle_program, genhexkins, ins
 from tests.control.test_parameters import HIGH, LOW, truth_of
 from tests.nc.planner.linuxcnc import Kins, Ran, run
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 STORED = Path(__file__).parents[2] / "docs" / "validation" / "control-ways.json"
 
 FASTER, RADIUS_MM, FEED = 4, 75.0, 1500.0
 CIRCLES = {"upright": (0.0, 0.0), "A10 B10": (10.0, 10.0), "A-12 B5": (-12.0, 5.0)}
 Z_MM = -1008.0
+
+EVERY = 20
+"""Servo cycles between places of the part that are looked at."""
 
 PART = """G21 G90 G94
 G64 P0.001
@@ -61,17 +68,17 @@ def part_um(model: MachineModel, ran: Ran, plain: Ran) -> float:
     tips = middle.position_mm + tool_errors(model, ran.poses, middle)[:, :3]
     path = at.position_mm
     worst = 0.0
-    for tip in tips[::20]:
-        k = int(np.argmin(np.sum((path - tip) ** 2, axis=1)))
-        for a, b in ((k - 1, k), (k, k + 1)):
-            if a >= 0 and b < len(path):
-                way = path[b] - path[a]
-                share = np.clip((tip - path[a]) @ way / max(way @ way, 1e-30), 0.0, 1.0)
-                near = min(np.linalg.norm(tip - path[k]), np.linalg.norm(tip - path[a] - share * way))
-                k_um = 1e3 * float(near)
-                best = k_um if (a, b) == (k - 1, k) or k == 0 else min(best, k_um)
-        worst = max(worst, best)
-    return worst
+    for tip in tips[::EVERY]:
+        k = min(max(int(np.argmin(np.sum((path - tip) ** 2, axis=1))), 1), len(path) - 2)
+        worst = max(worst, min(_beside(tip, path[k - 1], path[k]), _beside(tip, path[k], path[k + 1])))
+    return 1e3 * worst
+
+
+def _beside(tip: NDArray[np.float64], one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Return a point's distance from a piece of a path."""
+    way = other - one
+    share = np.clip((tip - one) @ way / max(float(way @ way), 1e-30), 0.0, 1.0)
+    return float(np.linalg.norm(tip - one - share * way))
 
 
 def compensated_text(model: MachineModel, text: str, folder: Path) -> str:
@@ -119,14 +126,14 @@ def main() -> None:
             module.unlink()
     kept = {
         "question": "How well do four ways correct one machine under LinuxCNC?",
-        "data": "Circles of 75 mm at F1500, and a part of four lines with tilts; joints driven by LinuxCNC, tool by the hidden model, "
-        "which is the one that corrects. Circles: centre / roundness [µm] / largest tilt [deg].",
+        "data": "Circles of 75 mm at F1500, and a part of four lines with tilts; LinuxCNC drives the joints of a virtual machine with "
+        "hidden errors, and the model that corrects is the machine's own. Circles: centre / roundness [µm] / largest tilt [deg].",
         "command": "python -m tests.control.four_ways --store",
         "date": datetime.now(UTC).date().isoformat(),
         "seed": 6,
         "columns": [*CIRCLES, "part / µm", "time over LinuxCNC without kinematics"],
         "figures": figures,
-        "limits": "No bar, no noise: what a bar's noise adds is the same in all ways. Play and friction are not in this machine.",
+        "limits": "No bar, no noise: a bar's noise is the same in all ways. Play and friction are not in this machine.",
     }
     text = json.dumps(kept, indent=2, ensure_ascii=False) + "\n"
     if "--store" in sys.argv:

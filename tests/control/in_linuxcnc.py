@@ -41,10 +41,18 @@ def installed(model: MachineModel, folder: Path, digest: str = "0" * 64) -> Path
     made = component(model, package_text("control/kernel.c"), NAME, digest)
     (folder / f"{NAME}.comp").write_text(made.text)
     done = subprocess.run(
-        ["halcompile", "--install", f"{NAME}.comp"], cwd=folder, capture_output=True, text=True, check=True
+        ["halcompile", "--install", f"{NAME}.comp"],  # noqa: S607 - as LinuxCNC has it
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert "warning" not in done.stderr
     return Path(f"/usr/lib/linuxcnc/modules/{NAME}.so")
+
+
+def middle_mm(machine: Machine) -> float:
+    return sum(machine.travel.z_mm) / 2.0
 
 
 def home_of(machine: Machine) -> NDArray[np.float64]:
@@ -55,7 +63,9 @@ def home_of(machine: Machine) -> NDArray[np.float64]:
 
 
 def our_kins(machine: Machine) -> Kins:
-    return Kins(NAME, home_of(machine), np.zeros(6), (f"net on motion.motion-enabled => {NAME}.enabled",))
+    return Kins(
+        NAME, home_of(machine), np.zeros(6), middle_mm(machine), (f"net on motion.motion-enabled => {NAME}.enabled",)
+    )
 
 
 def genhexkins(machine: Machine, values: Values | None) -> Kins:
@@ -68,6 +78,7 @@ def genhexkins(machine: Machine, values: Values | None) -> Kins:
         "genhexkins",
         home_of(machine),
         machine.reference_length_error_mm + home_mm(of, machine),
+        middle_mm(machine),
         hal_lines(of, machine),
         tables(of, np.zeros(6)),
     )

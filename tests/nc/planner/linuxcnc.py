@@ -87,6 +87,7 @@ class Kins:
         name: of the module.
         home_mm: joints at which the machine is switched on, shape (6,).
         offset_mm: added to HOME and HOME_OFFSET, shape (6,).
+        home_z_mm: height at which it is switched on, upright over the middle: where LinuxCNC begins to look for its pose.
         hal: lines behind the module's loading.
         tables: text of each joint's `COMP_FILE`; empty for none.
     """
@@ -94,6 +95,7 @@ class Kins:
     name: str
     home_mm: np.ndarray
     offset_mm: np.ndarray
+    home_z_mm: float
     hal: tuple[str, ...] = ()
     tables: tuple[str, ...] = ()
 
@@ -151,6 +153,7 @@ def _configure(folder: Path, mm_s2: float, faster: int, kins: Kins | None = None
     ini = [(HERE / "planner.ini").read_text().format(**limits)]
     if kins is not None:
         ini[0] = ini[0].replace("trivkins coordinates=XYZABC", kins.name)
+        ini[0] = ini[0].replace("[TRAJ]\n", f"[TRAJ]\nHOME = 0 0 {kins.home_z_mm} 0 0 0\n")
     for joint, axis in enumerate("XYZABC"):
         kind, unit = ("LINEAR", "mm") if axis in "XYZ" else ("ANGULAR", "deg")
         both = (

@@ -59,7 +59,7 @@ WAYS_DEG = tuple(30.0 * k for k in range(12))
 """Where the place may be that pulls. Its height, its distance and where on the platform it pulls are not searched: the nearest
 form leaves 14 to 40 % of what joints do not conceal of a hose (rms, seven hoses of 0.7 to 2 m; docs/decisions.md, 20)."""
 
-STICKING_MM = (0.01, 0.02, 0.04)
+STICKING_MM = (0.005, 0.01, 0.02, 0.04)
 """Travel over which friction that turns round sticks, in one jerk or several: presliding and stick-slip take micrometres to tens of
 them [Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, sec. 2.2] [mm]."""
 

@@ -1,4 +1,4 @@
-"""Choose the places of a curve to join by straight pieces: a path through a graph with places as nodes and pieces as edges."""
+"""Choose the places of a curve to join by straight pieces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def longest(
     may_end: NDArray[np.bool_],
     tolerance_mm: float,
 ) -> NDArray[np.int64]:
-    """Return where pieces end: the shortest, which decides the feed, as long as the tolerance allows, then as few as possible.
+    """Return where pieces end, each as far along as the tolerance allows: the fewest if parts of a good piece are good.
 
     A piece to the next allowed end is always possible, even across a step.
 
@@ -33,15 +33,7 @@ def longest(
     """
     ends = may_end.copy()
     ends[-1] = True
-    way, curve = np.ascontiguousarray(way), np.ascontiguousarray(curve)
-    return _traced(_fewest(way, curve, ends, tolerance_mm, _longest(way, curve, ends, tolerance_mm)))
-
-
-def _traced(before: NDArray[np.int64]) -> NDArray[np.int64]:
-    found = [len(before) - 1]
-    while before[found[-1]] > 0:
-        found.append(int(before[found[-1]]))
-    return np.array(found[::-1], dtype=np.int64)
+    return _farthest(np.ascontiguousarray(way), np.ascontiguousarray(curve), ends, tolerance_mm)
 
 
 @compiled
@@ -63,53 +55,24 @@ def _distance_mm(way: NDArray[np.float64], curve: NDArray[np.float64], start: in
 
 
 @compiled
-def _longest(
+def _farthest(
     way: NDArray[np.float64],
     curve: NDArray[np.float64],
     may_end: NDArray[np.bool_],
     tolerance_mm: float,
-) -> float:
-    count = len(way)
-    best = np.full(count, -1.0)
-    best[0] = np.inf
-    for start in range(count - 1):
-        if best[start] < 0.0:
-            continue
-        first = True
-        for end in range(start + 1, count):
-            if not may_end[end]:
-                continue
-            if not first and _distance_mm(way, curve, start, end) > tolerance_mm:
-                break
-            first = False
-            best[end] = max(best[end], min(best[start], way[end] - way[start]))
-    return float(best[-1])
-
-
-@compiled
-def _fewest(
-    way: NDArray[np.float64],
-    curve: NDArray[np.float64],
-    may_end: NDArray[np.bool_],
-    tolerance_mm: float,
-    least: float,
 ) -> NDArray[np.int64]:
-    """Return the place before each on the way with the fewest pieces, none shorter than `least`."""
     count = len(way)
-    pieces = np.full(count, count + 1)
-    before = np.zeros(count, np.int64)
-    pieces[0] = 0
-    for start in range(count - 1):
-        if pieces[start] > count:
-            continue
-        first = True
+    ended = np.zeros(count, np.int64)
+    start = pieces = 0
+    while start < count - 1:
+        found = 0
         for end in range(start + 1, count):
             if not may_end[end]:
                 continue
-            if not first and _distance_mm(way, curve, start, end) > tolerance_mm:
+            if found > 0 and _distance_mm(way, curve, start, end) > tolerance_mm:
                 break
-            first = False
-            if way[end] - way[start] >= least and pieces[start] + 1 < pieces[end]:
-                pieces[end] = pieces[start] + 1
-                before[end] = start
-    return before
+            found = end
+        ended[pieces] = found
+        pieces += 1
+        start = found
+    return ended[:pieces]

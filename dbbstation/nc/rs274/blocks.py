@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dbbstation.nc.rs274 import codes
+from dbbstation.nc.rs274.codes import ModalGroup
 from dbbstation.nc.rs274.tokens import Comment, Place, Setting, Word, tokens, unknown_value
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.nc.rs274.codes import ModalGroup
 
 BLANKS = " \t\r"
 
@@ -86,7 +86,7 @@ def _checked(line: str, place: Place) -> str:
     if line_bytes > LONGEST_BYTES:
         what = f"the line has {line_bytes} characters"
         raise place.fault(LONGEST_BYTES + 1, what, f"LinuxCNC reads {LONGEST_BYTES}: write it as two lines")
-    line = line.removesuffix("\r")
+    line = line.rstrip("\r")
     control = None if line.isprintable() else _CONTROL.search(line)
     if control is not None:
         what = f"the control character U+{ord(control[0]):04X}, which ends a line for some programs and not for others"
@@ -123,6 +123,8 @@ def _take_code(block: ProgramBlock, word: Word) -> None:
     known = codes.G_CODES if word.letter == "G" else codes.M_CODES
     value = round(word.value, 1)
     group = known.get(value) if abs(value - word.value) < WITHIN else None
+    if group is ModalGroup.NOTHING:
+        return
     name = codes.name(word.letter, word.value)
     if group is None:
         raise block.place.fault(word.column, f"{name} is not read", codes.remedy(word.letter, word.value))

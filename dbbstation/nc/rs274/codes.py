@@ -23,7 +23,7 @@ class ModalGroup(StrEnum):
     OFFSET = "work offset"
     PATH = "path control"
     SPEED = "spindle speed"
-    TURNED = "rotation"
+    NOTHING = "ends what is not read"
     CYCLE_END = "end of a cycle"
     STOP = "stop"
     TOOL = "tool change"
@@ -44,7 +44,7 @@ G_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((43, 43.4, 49), ModalGroup.TOOL_LENGTH),
     **{float(name[1:]): ModalGroup.OFFSET for name in SYSTEMS},
     **dict.fromkeys((61, 61.1, 64), ModalGroup.PATH),
-    69: ModalGroup.TURNED,
+    **dict.fromkeys((15, 69), ModalGroup.NOTHING),
     80: ModalGroup.CYCLE_END,
     **dict.fromkeys((90, 91), ModalGroup.DISTANCE),
     **dict.fromkeys((90.1, 91.1), ModalGroup.ARC_DISTANCE),

@@ -146,6 +146,8 @@ class _Interpreter:
             BadLine: the first one that makes no sense.
         """
         for line, place in self.flow.lines():
+            if self._is_plain(line, place.line):
+                continue
             block = block_of(line, place, self.flow.value_of)
             for setting in block.settings:
                 self._set(block, setting.parameter, setting.value, setting.column)
@@ -156,6 +158,44 @@ class _Interpreter:
         unknown = [letter for letter, value in zip(AXES, self._state.pose, strict=True) if math.isnan(value)]
         if unknown and self._moved:
             raise self._nobody_knows(block, unknown, "in this program")
+
+    def _is_plain(self, line: str, number: int) -> bool:
+        """Run a line of axes alone, with G0, G1, F and N at most; return False for any other, which a block is made of."""
+        plain = _PLAIN.fullmatch(line)
+        if (
+            plain is None
+            or not self._moved
+            or self._per_move
+            or self._upright
+            or self.path.unknown
+            or len(line) > MOST_PLAIN
+        ):
+            return False
+        code, words = plain["code"], _AXIS_WORD.findall(plain["axes"])
+        motion = self._motion if code is None else float(code)
+        speed = (
+            self._speed
+            if plain["feed"] is None
+            else Feed(float(plain["feed"]) * self._state.unit_mm, float(plain["feed"]))
+        )
+        if motion not in {RAPID, LINEAR} or (motion == LINEAR and speed.mm_min <= 0.0) or len(dict(words)) < len(words):
+            return False
+        target, unit_mm, offset = self._state.pose.tolist(), self._state.unit_mm, self._state.offset
+        for letter, text in words:
+            axis = AXES.index(letter)
+            value = float(text) * (unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
+            target[axis] = value + (offset[axis] if self._absolute else target[axis])
+        if not max(map(abs, target)) < FARTHEST_DEG:
+            return False
+        if plain["number"] is not None:
+            self.path.numbers = (*self.path.numbers[:1], int(plain["number"]))
+        self._begin_motion(motion or 0.0)
+        self._speed, self._state.pose = speed, np.array(target)
+        if motion == RAPID:
+            self.path.rapid(self._state.pose, line=number)
+        else:
+            self.path.feed(self._state.pose[None], *speed, line=number)
+        return len(self.path) <= MOST_ROWS
 
     def run(self, block: ProgramBlock) -> None:
         """Execute one block in the order of [RS274/NGC 3.8]."""
@@ -671,6 +711,14 @@ class _Interpreter:
 
 LAST_OWN = 5000
 """Parameters behind this are the control's own."""
+
+_PLAIN = re.compile(
+    r"(?:N(?P<number>[0-9]{1,8})[ ]*)?(?:G0?(?P<code>[01])(?![0-9.])[ ]*)?(?P<axes>(?:[XYZABC][+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[ ]*)+)"
+    r"(?:F(?P<feed>[0-9]{1,8}(?:\.[0-9]*)?)[ ]*)?\r?"
+)
+_AXIS_WORD = re.compile(r"([XYZABC])([-+.0-9]+)")
+MOST_PLAIN = 200
+"""Characters of a line that is read at once; LinuxCNC refuses lines of 253."""
 
 PECKS, MOST_PECKS = frozenset({73.0, 83.0}), 10_000
 

@@ -14,7 +14,7 @@ from dbbstation.inference.concealment import concealment
 from dbbstation.inference.levels import JOINED
 from dbbstation.inference.read_off import CauseJudge, Trial
 from dbbstation.inference.square_root import free_directions
-from dbbstation.inference.verdict import OUT, SURE
+from dbbstation.inference.verdict import ABSENT, OUT, SURE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -110,6 +110,11 @@ class _CircleJudge(CauseJudge):
         if others or len(self._equal(cause.name)) > 1:
             return verdict, others, f"These tests cannot tell it from {', '.join(self._in_words(others))}."
         return Verdict.NOT_TESTABLE, (), "These tests leave it open: they neither show nor exclude it."
+
+    def _alike(self, name: str) -> str:
+        """As of any channel; of causes that all sets together hold for absent, only what nothing tells from a member."""
+        equal = any(name in names for names in self._classes.values())
+        return super()._alike(name) if equal or self._alternatives.probability((name,)) > ABSENT else ""
 
     def _group_of(self, name: str) -> tuple[str, ...]:
         """All causes of which one is there, where this is one of them."""

@@ -156,7 +156,7 @@ class CauseJudge:
             self._best,
             form_uncertainty
             or (lambda member: laws[member.cause.name].form_uncertainty if member.cause.name in laws else 0.0),
-            self._best.members,
+            [m for m in self._best.members if m.cause.name not in settled.bank.nameless],
         )
         self._classes = self._alternatives.classes
         estimates = settled.comparison.estimates(self._best.members) if self._members else None

@@ -29,7 +29,7 @@ class RunAssessment:
     Attributes:
         causes: of REPEAT, the most explanatory first: finding and remedy, a sentence each.
         unseen: of CANNOT TELL, possible faults that no measurement of the plan shows.
-        settled_by: of CANNOT TELL, what would show them, a sentence each.
+        settled_by: of CANNOT TELL, what would show them.
         later: possible faults that later circles show; they lead back to this one.
     """
 
@@ -136,13 +136,13 @@ DOUBTED = {
 }
 """Faults of all runs that other faults explain too: they are asked about only where the readings favour them."""
 
-BY_PLAN = "more readings a turn and an overlap in the plan show it"
+BY_PLAN = "an overlap in the plan"
 
 SHOWN_LATER = {
-    "whether it is the circle of another test": "two other tests show it, or a model of the machine, or a session before",
-    "whether it ran the wrong way round": "the other direction and another test show it",
-    "whether the ball stands where it stood": "the other direction or a repeat on the same mounting shows it",
-    _PROGRAMS: "further tests in both directions show it, or a model of the machine",
+    "whether it is the circle of another test": "two other tests, a model or a session before",
+    "whether it ran the wrong way round": "the other direction and another test",
+    "whether the ball stands where it stood": "the other direction or a repeat",
+    _PROGRAMS: "further tests in both directions, or a model",
 }
 """Faults that later circles of the plan show, judged back on this one, and what shows them where the plan has no circle left."""
 

@@ -81,7 +81,7 @@ class RunScreen(BoardScreen):
         ("enter", "tell('start')", "Start"),
         ("enter", "next", "Next"),
         ("m", "tell('touched')", "Mounting"),
-        ("u", "undecided", "Undecided"),
+        ("u", "undecided", "Keep"),
         ("z", "alone", "In its place"),
         ("a", "accept", "Accept"),
         ("r", "tell('repeat')", "Repeat"),

@@ -88,8 +88,8 @@ def _verdict(board: Board) -> str:
 
 
 def _unseen(found: RunAssessment) -> str:
-    settled = f"; {'; '.join(found.settled_by)}" if found.settled_by else ""
-    return f"{', '.join(found.unseen)}{settled}."
+    settled = f" It takes {'; '.join(found.settled_by)}." if found.settled_by else ""
+    return f"{', '.join(found.unseen)}.{settled}"
 
 
 def _later(found: RunAssessment) -> str:

@@ -227,7 +227,7 @@ def test_a_circle_that_cannot_be_told_has_a_key_of_its_own() -> None:
             app.look()
             await pilot.pause()
             said = " ".join(str(app.screen.query_one("#now").visual).split())
-            assert "two other tests show it, or a model of the machine, or a session before" in said
+            assert "It takes an overlap in the plan; two other tests, a model or a session before" in said
             await pilot.press("enter", "u")
 
     asyncio.run(run())

@@ -2,7 +2,7 @@
 
     python -m tests.station.sabotages --kept FILE [--sound 200] [--seeds 5] [--out docs/validation/operator.json]
 
-Each session is that of the ten-minute check on a virtual machine of its own, read by the driver through the line of
+`--direct` hands the readings to the station without the line, which takes a tenth of the time. Each session is that of the ten-minute check on a virtual machine of its own, read by the driver through the line of
 `emulate`. The operator accepts what is not REPEAT, and repeats the rest once. FILE keeps each session; a run that was
 interrupted goes on there.
 """
@@ -28,6 +28,7 @@ from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import at_rate, load_instrument
+from dbbstation.instrument.reading import Reading
 from dbbstation.instrument.stamps import MachineTime
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.bar import Bar
@@ -56,6 +57,8 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
     from dbbstation.quality.finding import Finding
     from dbbstation.station.assembly import Workplace
+    from dbbstation.station.engine import ReadingSource
+    from dbbstation.virtual.path import CommandedPath
 
 PLAN_FILE = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"
 FEEDS_MM_MIN = (1000.0, 6000.0)
@@ -214,30 +217,23 @@ class Shop:
 
     def measure(self, folder: Path) -> dict[str, Any]:
         """Measure the session; return the words on its circles, and what was found of the sabotage."""
-        period_s = 1.0 / self.protocol.fastest_hz(None)
-        clock = MachineTime(period_s, self.clock())
-        bar = Bar("bar-1", 150.0, 0.0005, None, None, None)
-        details = SessionDetails(bar=bar)
-        job = Job(
-            self.machine,
-            self.inline,
-            folder,
-            details,
-            clock=clock,
-            time_scale=100.0,
-            rate_hz=1.0 / period_s,
-            instrument=ReadBy("streaming-encoder", "", "a line", virtual=True),
-        )
+        clock = MachineTime(1.0 / RATE_HZ, self.clock())
         with (
             VirtualInstrument(self.protocol, self._length_mm_at, clock=self.clock) as self.wire,
             Instrument(self.protocol, self.wire.port, clock=clock, **driver_patience(100.0, waits=True)) as source,
         ):
-            self._workplace = assemble(job, source)
-            self._workplace.station.subscribe(self)
-            try:
-                self._workplace.station.run()
-            finally:
-                self._workplace.close()
+            return self._measured(folder, source, clock)
+
+    def _measured(self, folder: Path, source: ReadingSource, clock: Callable[[], float]) -> dict[str, Any]:
+        details = SessionDetails(bar=Bar("bar-1", 150.0, 0.0005, None, None, None))
+        read_by = ReadBy("streaming-encoder", "", "a line", virtual=True)
+        timed = {"clock": clock, "time_scale": 100.0, "rate_hz": RATE_HZ}
+        self._workplace = assemble(Job(self.machine, self.inline, folder, details, instrument=read_by, **timed), source)
+        self._workplace.station.subscribe(self)
+        try:
+            self._workplace.station.run()
+        finally:
+            self._workplace.close()
         return {"words": self.words, "seen": self.seen}
 
     def _length_mm_at(self, t_s: float) -> float | None:
@@ -322,6 +318,64 @@ class Shop:
             send(Repeat() if word == Advice.REPEAT and self._announced.run.repeat < 3 else Accept("all the same"))
 
 
+class _DirectCell:
+    """The virtual cell without line and clock: a run becomes readings at once."""
+
+    def __init__(self, shop: DirectShop) -> None:
+        self._shop = shop
+
+    def mount(self, test: str) -> None:
+        self._shop.virtual.mount(self._shop.plan.tests[test].ball)
+
+    def start(self, test: str, direction: Direction, path: CommandedPath | None = None) -> None:
+        shop = self._shop
+        made = shop.virtual.run(test, direction, path=path, begin_s=shop.now_s)
+        lost = 0
+        for t_s in np.arange(-BEFORE_S, made.path.duration_s + BEFORE_S, 1.0 / RATE_HZ).tolist():
+            cut_s = shop.cut_at_s
+            if cut_s is not None and cut_s < t_s < cut_s + LOST_S:
+                lost += 1
+                continue
+            length_mm = made.length_mm_at(t_s) + shop.virtual.noise_mm()
+            shop.readings.append(Reading(shop.now_s + BEFORE_S + t_s, length_mm, lost=lost))
+            lost = 0
+        shop.cut_at_s = None
+        shop.now_s += made.path.duration_s + 5.0 * BEFORE_S
+
+
+class DirectShop(Shop):
+    """The same without a line."""
+
+    def __init__(self, case: Case) -> None:
+        super().__init__(case)
+        self.readings: list[Reading] = []
+        self.now_s = 0.0
+        self.cell = _DirectCell(self)
+        self.clock = _Clock(self)
+
+    def drain(self) -> list[Reading]:
+        readings, self.readings = self.readings, []
+        return readings
+
+    def measure(self, folder: Path) -> dict[str, Any]:
+        return self._measured(folder, self, self.clock)
+
+
+@dataclass(frozen=True)
+class _Clock:
+    shop: DirectShop
+
+    def __call__(self) -> float:
+        return self.shop.now_s
+
+    def settle(self) -> None:
+        """Do nothing: a run becomes readings at once."""
+
+
+BEFORE_S = 3.0
+"""Time that the bar stands before and after a run [s]."""
+
+
 def _truth(machine: Any, seed: int) -> MachineModel:
     """Return a machine with errors of its own: kinematics, and in every second also gravity, backlash, lag."""
     rng = np.random.default_rng([seed, 57])
@@ -335,9 +389,10 @@ def _truth(machine: Any, seed: int) -> MachineModel:
     return MachineModel(machine, (*random_kinematics(machine, seed), *more))
 
 
-def measured(case: Case) -> dict[str, Any]:
+def measured(case: Case, *, direct: bool) -> dict[str, Any]:
+    shop = DirectShop(case) if direct else Shop(case)
     with tempfile.TemporaryDirectory() as folder:
-        return {**vars(case), **Shop(case).measure(Path(folder) / "session")}
+        return {**vars(case), **shop.measure(Path(folder) / "session")}
 
 
 def cases(sound: int, seeds: int) -> tuple[Case, ...]:
@@ -390,11 +445,12 @@ def main() -> None:
     parser.add_argument("--sound", type=int, default=200)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--direct", action="store_true", help="hand readings to the station without the line")
     given = parser.parse_args()
     every = cases(given.sound, given.seeds)
     done = []
     for number in range(len(every)):  # one at a time: the line is in this process
-        (one,) = drawn(lambda k: measured(every[k]), [number], given.kept, "operator")
+        (one,) = drawn(lambda k: measured(every[k], direct=given.direct), [number], given.kept, "operator")
         done.append(one)
         told = {label: words for label, words in one["words"].items() if any(w[0] != "GOOD" for w in words)}
         sys.stderr.write(
@@ -407,7 +463,7 @@ def main() -> None:
         kept = {
             "question": "What does an operator see of sound and of sabotaged circles?",
             "data": "Ten-minute check on virtual machines through a serial line, at 1000 and 6000 mm/min; one circle spoilt: the first, the second direction, or the last.",
-            "command": "python -m tests.station.sabotages",
+            "command": f"python -m tests.station.sabotages{' --direct' if given.direct else ''} --sound {given.sound} --seeds {given.seeds}",
             "date": f"{datetime.now().astimezone():%Y-%m-%d}",
             "seed": 1,
             "columns": ["found", "first cause right", "other circles blamed"],

@@ -29,7 +29,7 @@ LINES: dict[str, tuple[str, ...]] = {
     "circles": ("circles", "{}", "--json"),
     "calibrate": ("calibrate", "{}", "--json"),
     "diagnose": ("diagnose", "{}", "--json"),
-    "drive": ("drive", "{}", "--json"),
+    "drive": ("identify", "{}", "--json"),
     "history": ("history", "{}", "--json"),
 }
 """Command lines of tasks that need nothing but a path."""
@@ -48,7 +48,7 @@ def cases(root: Path, recordings: Path | None) -> dict[str, tuple[str, ...]]:
     """Command lines by name."""
     found: dict[str, tuple[str, ...]] = {
         "sources": ("sources", "--json"),
-        "instruments": ("instruments", "--json"),
+        "instruments": ("instrument", "list", "--json"),
         "evaluate small": ("evaluate", "fixtures/sessions/small", "--model", "fixtures/models/small.yaml", "--json"),
         "compare small": ("compare", "fixtures/sessions/small", "fixtures/sessions/virtual", "--json"),
         "mismatch pendulum": (

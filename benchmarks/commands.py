@@ -33,52 +33,63 @@ PENDULUM = "f/simulators/pendulum.csv --simulator f/simulators/pendulum.yaml --m
 LINES = f"""
 calibrate {SMALL}
 calibrate {SMALL} --out m.yaml --figure c.svg --json
-calibrate {SMALL} --sources gravity,strut-reference-length --test a,b --exclude b
+calibrate {SMALL} --sources gravity,strut-reference-length --tests a,b --exclude b
 calibrate {SMALL} --method nothing
 calibrate {SMALL} --out f/models/small.yaml
 calibrate f/sessions/under-spindle --method conv-a --json
 calibrate f/nowhere
-calibrate {SMALL} --source-file f/sources/scale_bow.py
+calibrate {SMALL} --source-files f/sources/scale_bow.py
 circles {SMALL}
-circles {SMALL} --filter 50 --csv c.csv --budget
+circles {SMALL} --filter 50 --table c.csv --budget
 circles {SMALL} --findings --model {MODEL} --json
 circles {SMALL} --model {MODEL}
 circles {SMALL} --filter 77
-circles {SMALL} --test nothing
-circles {SMALL} --test a --quick-look
+circles {SMALL} --tests nothing
+circles {SMALL} --tests a --quick-look
 program --plan {PLAN} --machine {MACHINE} --out p
-program --plan {PLAN} --machine {MACHINE} --model {MODEL} --out p --test a --json
+program --plan {PLAN} --machine {MACHINE} --model {MODEL} --out p --tests a --json
 program --plan {PLAN} --machine {MACHINE} --out p --step-deg 7
 program --machine {MACHINE} --out p
-mismatch {TABLE} --no-held-out --out t.csv --figure t.svg
+mismatch {TABLE} --no-held-out --table t.csv --figure t.svg
 mismatch {TABLE} --no-held-out --variables load_n,oil_temp_c --json
 mismatch {TABLE} --known mass=-1
 mismatch {TABLE} --most-runs 5
 mismatch f/tables/axis.csv
-mismatch {PENDULUM} --out missing.py --corrected rows.csv --figure s.svg
+mismatch {PENDULUM} --out missing.py --table rows.csv --figure s.svg
 mismatch {PENDULUM} --measured x
 diagnose {SMALL} --no-held-out
 diagnose {SMALL} --no-held-out --out d.yaml --figure d.svg --json
 diagnose {SMALL} --sources nothing
 compare {SMALL} f/sessions/virtual
 compare {SMALL} {SMALL} --no-held-out --json
-drive f/drives/strut.csv
-drive f/drives/strut.csv --out d.csv --json
+identify f/drives/strut.csv
+identify f/drives/strut.csv --table d.csv --json
 evaluate {SMALL} --model {MODEL}
 evaluate {SMALL} --model {MODEL} --json
-report {SMALL} --out r.html
-report {SMALL} --model {MODEL} --out r.html --json
-predict --model {MODEL} --poses f/nowhere.csv
-simulate --model {MODEL} --plan {PLAN} --out s --test a
+report {SMALL} --page r.html
+report {SMALL} --model {MODEL} --page r.html --json
+predict --model {MODEL} f/nowhere.csv
+simulate --model {MODEL} {PLAN} --out s --tests a
 export {SMALL} --out e.csv
-history f/sessions --csv h.csv --json
-plot {SMALL} --test a --out p.svg
+history f/sessions --table h.csv --json
+plot {SMALL} --tests a --out p.svg
 check {SMALL} {MODEL} {PLAN}
 sources gravity
 sources --json
-fleet {SMALL} --do circles --json
+fleet {SMALL} --task circles --json
 """.strip().splitlines()
-HELD = ("calibrate", "circles", "program", "mismatch", "diagnose", "compare", "drive", "evaluate", "report", "predict")
+HELD = (
+    "calibrate",
+    "circles",
+    "program",
+    "mismatch",
+    "diagnose",
+    "compare",
+    "identify",
+    "evaluate",
+    "report",
+    "predict",
+)
 LINES += [f"{name} --help" for name in (*HELD, "simulate", "compensate", "export", "history", "fleet", "plot")]
 OLD_WORDS: dict[str, str] = {}
 """Words of a line that the other checkout spells otherwise."""

@@ -3,7 +3,7 @@
     python benchmarks/fleet.py [--sessions 8] [--json]
 
 A scheduler and its workers are started on loopback, each a process of its own with one thread. The simulated machine of the tests records
-sessions of thirty runs at 10 Hz (fifteen circles of [CAL Table II] in both directions, gravity at work); `fleet --do calibrate` works on them
+sessions of thirty runs at 10 Hz (fifteen circles of [CAL Table II] in both directions, gravity at work); `fleet --task calibrate` works on them
 with one worker, then with two. Before each, the workers have loaded what they need. The time of a task beside its work is that of three
 hundred tasks that do next to nothing less that of one, best of three, with one worker and with one process of this computer.
 """

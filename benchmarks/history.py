@@ -91,14 +91,14 @@ def main() -> None:
         opened = timed(partial(call, environment, "history", str(sessions)), 5)
         started = timed(partial(call, environment, "--version"), 5)
         page = base / "history.html"
-        drawn = timed(partial(call, environment, "history", str(sessions), "--html", str(page), "--force"), 3)
+        drawn = timed(partial(call, environment, "history", str(sessions), "--page", str(page), "--force"), 3)
         index = next((base / "cache").rglob("*.sqlite"))
         shown = [
             Row("working it out once", made, "s", f"{count} sessions of 30 runs"),
             Row("  per session", made / count, "s"),
             Row("opening it from the index", opened.best_s, "s", f"wanted: below {WANTED_S:g}"),
             Row("  over the program's start", opened.best_s / started.best_s, "times"),
-            Row("the same with --html", drawn.best_s, "s", f"page of {page.stat().st_size / 1e6:.1f} MB"),
+            Row("the same with --page", drawn.best_s, "s", f"page of {page.stat().st_size / 1e6:.1f} MB"),
             Row("size of the index", index.stat().st_size / 1e6, "MB"),
         ]
     show("history of weekly sessions" + (", quick form" if quick else ""), shown, "best of five; worked out once")

@@ -31,15 +31,15 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "calibrate": ("calibrate", "{session}", "--out", "{out}/model.yaml"),
     "evaluate": ("evaluate", "{session}", "--model", "{model}"),
     "circles": ("circles", "{session}", "--findings"),
-    "report": ("report", "{session}", "--model", "{model}", "--out", "{out}/report.html"),
+    "report": ("report", "{session}", "--model", "{model}", "--page", "{out}/report.html"),
     "program": ("program", "--plan", "{plan}", "--machine", "{machine}", "--out", "{out}/programs"),
     "program --model": (
         *("program", "--plan", "{plan}", "--machine", "{machine}", "--model", "{model}"),
         *("--out", "{out}/compensated"),
     ),
-    "simulate": ("simulate", "--model", "{model}", "--plan", "{plan}", "--out", "{out}/simulated"),
+    "simulate": ("simulate", "--model", "{model}", "{plan}", "--out", "{out}/simulated"),
     "compensate": ("compensate", "{part}", "--model", "{model}", "--out", "{out}/part.ngc"),
-    "predict": ("predict", "--model", "{model}", "--poses", "{poses}", "--out", "{out}/actual.csv"),
+    "predict": ("predict", "--model", "{model}", "{poses}", "--table", "{out}/actual.csv"),
     "diagnose": ("diagnose", "{session}", "--out", "{out}/joint.yaml"),
 }
 """What is run, by its name; `start` is no command."""

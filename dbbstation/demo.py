@@ -109,7 +109,9 @@ def run_demo(
         read_json(DemoEvaluation, job.answer(["evaluate", session, "--model", "joint.yaml"]))
         for session in ("measured", "verified")
     )
-    report = job.answer(["report", "verified", "--before", "measured", "--model", "joint.yaml", "--out", "report.html"])
+    report = job.answer(
+        ["report", "verified", "--before", "measured", "--model", "joint.yaml", "--page", "report.html"]
+    )
     return DemoResult(
         folder,
         _side_by_side(before, after),
@@ -193,13 +195,24 @@ class _Job:
         Raises:
             StationError: it does not start.
         """
-        command = [*_PROGRAM, "emulate", "--instrument", INSTRUMENT, *self.what, *arguments, *RATE, "--wait", "--json"]
+        command = [
+            *_PROGRAM,
+            "instrument",
+            "emulate",
+            "--instrument",
+            INSTRUMENT,
+            *self.what,
+            *arguments,
+            *RATE,
+            "--wait",
+            "--json",
+        ]
         process = subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         try:
             first = process.stdout.readline() if process.stdout else ""
             if not first:
                 _, said = process.communicate(timeout=PATIENCE_S)
-                raise StationError(said.strip() or "it ended at once", where="dbbstation emulate")
+                raise StationError(said.strip() or "it ended at once", where="dbbstation instrument emulate")
             yield read_json(_Place, first)
         finally:
             process.terminate()

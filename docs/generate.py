@@ -34,7 +34,7 @@ NOT_PUBLIC = {"cli", "tui", "demo", "prepare", "__main__"}
 _UNWRAPPED = "\b"
 
 _DRIVE_SOURCES_HEAD = """\
-Every cause of force that `dbbstation drive` looks for, from its own texts in `dbbstation/diagnosis/drive/sources/`. The
+Every cause of force that `dbbstation identify` looks for, from its own texts in `dbbstation/diagnosis/drive/sources/`. The
 names are what `drive --sources` takes."""
 
 _SOURCES_HEAD = """\

@@ -16,7 +16,7 @@ POSES = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1000,0,0,0\n"
 SOURCES = "strut-reference-length,base-joints,backlash,reversal-spike,servo-lag,platform-joints"
 COMMANDS = [
     ["calibrate", SESSION, "--sources", SOURCES],
-    ["predict", "--model", MODEL, "--poses", "poses.csv", "--out", "out.csv"],
+    ["predict", "--model", MODEL, "poses.csv", "--table", "out.csv"],
     ["diagnose", SESSION],
 ]
 

@@ -14,6 +14,7 @@ from dbbstation import __version__
 from dbbstation.cli.lazy import LazyGroup
 from dbbstation.cli.output import echo, say
 from dbbstation.cli.progress import Compiling
+from dbbstation.cli.renamed import RENAMED, RENAMED_FLAGS
 from dbbstation.cli.streams import drop_output, drop_unwritable, flush_output, open_missing
 from dbbstation.computing.compiling import tell_of_compiling
 from dbbstation.errors import StationError
@@ -39,23 +40,19 @@ COMMANDS = {
     "compensate": "Compensate any NC program with a calibrated model.",
     "diagnose": "Find the physics that a calibration leaves out.",
     "demo": "The whole job on a simulated machine, start to end.",
-    "drive": "Identify one strut drive: mass, friction, further causes.",
-    "emulate": "A virtual machine with a ball bar, on a line of its own.",
     "evaluate": "Circle by circle: what a model leaves of recordings.",
     "export": "Sessions as one tidy table, CSV or Parquet.",
     "fleet": "One task on many sessions; which machines are unlike.",
     "history": "A folder of sessions as trends, and what changed.",
+    "identify": "One strut drive: mass, friction, further causes.",
     "import": "Take recordings that another program made into a session.",
-    "instruments": "List the known instruments.",
+    "instrument": "Instruments: list, ports, monitor, replay, emulate.",
     "jig": "A jig file from a CMM sheet; how well holders repeat.",
     "measure": "Measure a plan, test by test, into a session folder.",
     "mismatch": "Where any simulation and any recording differ, and how.",
-    "monitor": "Live reading of an instrument.",
     "plot": "One figure of measured circles, with a title block.",
-    "ports": "List the serial ports of this computer.",
     "predict": "Actual poses for commanded ones, under a model.",
     "program": "NC programs of a plan's circles, nominal or compensated.",
-    "replay": "Send a byte log through an instrument's driver.",
     "report": "A session as one HTML file: verdict, figures with U.",
     "settings": "What the shop has set, and where each value comes from.",
     "session": "Runs of a session afterwards: list, accept, reject, seal.",
@@ -71,6 +68,7 @@ COMMANDS = {
     cls=LazyGroup,
     table=COMMANDS,
     package="dbbstation.cli",
+    renamed=RENAMED,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 @click.version_option(__version__, prog_name="dbbstation")
@@ -125,7 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         code = left.exit_code
     except click.ClickException as problem:
         told = io.StringIO()
-        problem.show(told)
+        _with_new_name(problem).show(told)
         echo(told.getvalue(), err=True, nl=False)
         sys.exit(problem.exit_code)
     except (click.Abort, KeyboardInterrupt):
@@ -149,6 +147,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
         sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _with_new_name(problem: click.ClickException) -> click.ClickException:
+    """Let an unknown flag be answered with what it is called now."""
+    if not isinstance(problem, click.NoSuchOption) or problem.ctx is None:
+        return problem
+    now = RENAMED_FLAGS.get(f"{problem.ctx.info_name} {problem.option_name}")
+    return click.UsageError(f"No such option {problem.option_name!r}; it is now {now}", problem.ctx) if now else problem
 
 
 def _invoked(context: click.Context) -> object:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @click.command()
 @instrument_options(required=True)
 @click.option("--serial-number", required=True, help="Serial number of the bar.")
-@click.option("--calibrator", "calibrator_serial", required=True, help="Serial number of the calibrator.")
+@click.option("--calibrator-serial", "calibrator_serial", required=True, help="Serial number of the calibrator.")
 @click.option(
     "--calibrator-mm", type=Finite(20, 2000), required=True, help="Its length on the certificate, at 20 degC."
 )
@@ -85,7 +85,7 @@ def bar(
 
     \b
     Examples:
-      dbbstation bar --instrument heidenhain-nd281b --port /dev/ttyUSB0 --serial-number DBB-0042 --calibrator ZB-17 \\
+      dbbstation bar --instrument heidenhain-nd281b --port /dev/ttyUSB0 --serial-number DBB-0042 --calibrator-serial ZB-17 \\
         --calibrator-mm 150.0003 --calibrator-u-um 0.25 --certified 2026-03-01 --temp-c 20.3 --out bar.yaml
       dbbstation check bar.yaml
     """  # noqa: D301 (click reads the escape)

@@ -116,7 +116,7 @@ def check(
     ]
     if (tests or exclude) and not runs:
         raise click.UsageError(
-            "--test and --exclude choose tests of a dry run: give plans and one machine, without faults"
+            "--tests and --exclude choose tests of a dry run: give plans and one machine, without faults"
         )
     if profile is not None and instrument is None:
         raise click.UsageError("--profile is one of an instrument: give --instrument too")

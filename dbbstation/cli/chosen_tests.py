@@ -1,4 +1,4 @@
-"""`--test` and `--exclude`: the tests of a command."""
+"""`--tests` and `--exclude`: the tests of a command."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def chosen_tests_options(function: _Function) -> _Function:
     """Give a command both options as `tests` and `exclude`, tuples of names."""
     options = (
         click.option(
-            "--test",
+            "--tests",
             "tests",
             multiple=True,
             metavar="TEST,...",

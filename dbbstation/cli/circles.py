@@ -34,7 +34,7 @@ def show(
         _print_quick_looks(result.quick_look)
 
 
-circles = command(task, show, CommandOutput("csv", "Write the table here, as CSV.", table=True))
+circles = command(task, show, CommandOutput("table", "Write the table here, as CSV.", table=True, field="csv"))
 
 
 def _print(result: CirclesResult, *, several: bool) -> None:

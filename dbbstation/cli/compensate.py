@@ -28,7 +28,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
     show_default=True,
     help="Language to write: a name, or FILE.py.",
 )
-@click.option("--from", "source", metavar="D", help="Language of PROGRAM, likewise [default: by its extension].")
+@click.option("--written-in", "source", metavar="D", help="Language of PROGRAM, likewise [default: by its extension].")
 @click.option("--out", type=_FILE, required=True, help="File to write.")
 @control_options
 @shop_option(
@@ -88,7 +88,7 @@ def compensate(
     Examples:
       dbbstation compensate part.ngc --model model.yaml --out part-compensated.ngc
       dbbstation compensate part.ngc --model model.yaml --out true.ngc --angles 0,0,0 --offset G54=20,-35,-1000 --tool-length 1=52.1
-      dbbstation compensate part.nc --from linuxcnc --model model.yaml --out true.ngc --parameters linuxcnc.var --tools tool.tbl
+      dbbstation compensate part.nc --written-in linuxcnc --model model.yaml --out true.ngc --parameters linuxcnc.var --tools tool.tbl
       dbbstation compensate part.ngc --model model.yaml --out true.ngc --strict
     """
     from dbbstation.cli.output import say

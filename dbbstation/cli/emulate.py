@@ -1,4 +1,4 @@
-"""`dbbstation emulate`: a virtual machine with a bar, on a line of its own."""
+"""`dbbstation instrument emulate`: a virtual machine with a bar, on a line of its own."""
 
 from __future__ import annotations
 
@@ -99,8 +99,8 @@ def emulate(
 
     \b
     Examples:
-      dbbstation emulate --instrument streaming-encoder --plan table2.yaml --machine machine.yaml
-      dbbstation emulate --instrument heidenhain-nd281b --plan p.yaml --machine m.yaml --seed 7 --time-scale 50
+      dbbstation instrument emulate --instrument streaming-encoder --plan table2.yaml --machine machine.yaml
+      dbbstation instrument emulate --instrument heidenhain-nd281b --plan p.yaml --machine m.yaml --seed 7 --time-scale 50
     """
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan

@@ -22,7 +22,7 @@ STATES = ("accepted", "complete", "rejected", "recording")
 )
 @chosen_tests_options
 @click.option(
-    "--state", "states", multiple=True, type=click.Choice(STATES), help="Runs in this state only  [default: all]."
+    "--states", "states", multiple=True, type=click.Choice(STATES), help="Runs in this state only  [default: all]."
 )
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -45,7 +45,7 @@ def export(
     \b
     Examples:
       dbbstation export session --out session.csv
-      dbbstation export monday tuesday --state accepted --out week.parquet
+      dbbstation export monday tuesday --states accepted --out week.parquet
     """
     from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import count_bar

@@ -31,7 +31,7 @@ ONLY_OF = {
 
 @click.command()
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
-@click.option("--do", "task", required=True, type=click.Choice(TASKS), help="What to do of every session.")
+@click.option("--task", "task", required=True, type=click.Choice(TASKS), help="What to do of every session.")
 @click.option("--sources", metavar="A,B,...", help="Error sources, as `calibrate` and `diagnose` take them.")
 @source_file_option
 @click.option("--law-over-time", is_flag=True, help="As `calibrate` takes it.")
@@ -102,10 +102,10 @@ def fleet(
 
     \b
     Examples:
-      dbbstation fleet sessions --do calibrate
-      dbbstation fleet hall-1 hall-2 --do diagnose --out diagnosed --json
-      dbbstation fleet sessions --do circles --table circles.parquet
-      dbbstation fleet /srv/ballbar --do calibrate --scheduler tcp://server:8786
+      dbbstation fleet sessions --task calibrate
+      dbbstation fleet hall-1 hall-2 --task diagnose --out diagnosed --json
+      dbbstation fleet sessions --task circles --table circles.parquet
+      dbbstation fleet /srv/ballbar --task calibrate --scheduler tcp://server:8786
     """
     from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import count_bar

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.results.history import HistoryResult, MachineHistoryResult, QuantityHistory
 
 MOST_NOTES = 12
-"""Notes that the terminal shows; `--json` and `--html` have all."""
+"""Notes that the terminal shows; `--json` and `--page` have all."""
 
 
 def show(found: HistoryResult) -> None:
@@ -38,7 +38,7 @@ def _remarks(found: HistoryResult) -> Iterator[str]:
     yield from (f"left out: {one.name}: {one.problem}" for one in found.left_out)
     yield from (f"note: {note}" for note in found.remarks[:MOST_NOTES])
     if len(found.remarks) > MOST_NOTES:
-        yield f"and {len(found.remarks) - MOST_NOTES} more notes, in --json and --html"
+        yield f"and {len(found.remarks) - MOST_NOTES} more notes, in --json and --page"
 
 
 def _print(machine: MachineHistoryResult, found: HistoryResult) -> None:
@@ -88,8 +88,8 @@ def _pair(value: float | None, u: float | None, k: float) -> tuple[str, str]:
 history = command(
     task,
     show,
-    CommandOutput("html", "Write a page with all trends here.", _write_page, said="page written to {path}"),
-    CommandOutput("csv", "Write every value here, as CSV.", table=True, said="table written to {path}"),
+    CommandOutput("page", "Write a page with all trends here.", _write_page, said="page written to {path}"),
+    CommandOutput("table", "Write every value here, as CSV.", table=True, said="table written to {path}"),
     remarks=_remarks,
     more=lambda: {"tolerances": shop_settings().tolerances, "coverage_factor": COVERAGE_FACTOR, "say": silent},
 )

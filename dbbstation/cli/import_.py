@@ -94,7 +94,7 @@ def import_(
     Examples:
       dbbstation import old/*.csv --out session --plan plan.yaml --machine machine.yaml --mapping old-program.yaml
       dbbstation import a.csv --out session --plan plan.yaml --machine machine.yaml --run a.csv=a-ccw \
-        --column Winkel=angle:deg --column Abw=deviation:µm --zero-mm 150.0003 --angle-grows ccw --angle-zero-deg 0 \
+        --columns Winkel=angle:deg --columns Abw=deviation:µm --zero-mm 150.0003 --angle-grows ccw --angle-zero-deg 0 \
         --ambient-temp-c 20.4 --operator Mori --not-known job --not-known bar --dry-run
     """
     from dbbstation.cli.asking import Asker

@@ -28,14 +28,14 @@ def protocol_options(*, required: bool) -> Callable[[_Function], _Function]:
             setting="instrument",
             required=required,
             metavar="NAME",
-            help="Name of an instrument (`dbbstation instruments`), or a protocol file.",
+            help="Name of an instrument (`dbbstation instrument list`), or a protocol file.",
         ),
         shop_option(
             "--profile",
             setting="profile",
             goes_with="instrument",
             metavar="NAME",
-            help="Variant of the instrument, such as its firmware or resolution (`dbbstation instruments NAME`).",
+            help="Variant of the instrument, such as its firmware or resolution (`dbbstation instrument list NAME`).",
         ),
         click.option(
             "--zero-mm",
@@ -70,7 +70,7 @@ def spy_option(function: _Function) -> _Function:
     option = click.option(
         "--spy",
         type=click.Path(dir_okay=False, path_type=Path),
-        help="Write every byte of the line with its time into this new file, for `replay`.",
+        help="Write every byte of the line with its time into this new file, for `instrument replay`.",
     )
     return option(function)
 

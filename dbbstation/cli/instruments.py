@@ -1,4 +1,4 @@
-"""`dbbstation instruments`: known instruments and their line settings."""
+"""`dbbstation instrument list`: known instruments and their line settings."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None
 
     \b
     Examples:
-      dbbstation instruments
-      dbbstation instruments heidenhain-nd281b
-      dbbstation instruments keyence-dl-rs1a --profile gt-70a
-      dbbstation instruments ./my-gauge.yaml
+      dbbstation instrument list
+      dbbstation instrument list heidenhain-nd281b
+      dbbstation instrument list keyence-dl-rs1a --profile gt-70a
+      dbbstation instrument list ./my-gauge.yaml
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_result
     from dbbstation.instrument.library import known_instruments, load_instrument, load_variants

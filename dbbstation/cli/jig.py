@@ -28,7 +28,7 @@ _U_UNIT = click.option(
     help="Of its uncertainties, such as µm beside mm  [default: as the sheet says, else that of coordinates].",
 )
 _COLUMN = click.option(
-    "--column",
+    "--columns",
     "columns",
     multiple=True,
     metavar="WHAT=NAME",
@@ -53,25 +53,25 @@ def jig() -> None:
 
     \b
     Examples:
-      dbbstation jig sheet cmm.csv --jig plate.yaml --u-um 0.8 --out plate-2026.yaml
-      dbbstation jig holders mountings.csv --jig plate.yaml --out plate-2026.yaml
+      dbbstation jig sheet cmm.csv --before plate.yaml --u-um 0.8 --out plate-2026.yaml
+      dbbstation jig holders mountings.csv --before plate.yaml --out plate-2026.yaml
     """  # noqa: D301 (click reads the escape)
 
 
 @jig.command()
 @_SHEET
 @click.option(
-    "--jig", "before", required=True, type=click.Path(path_type=Path), help="Jig file whose plate and holders stay."
+    "--before", "before", required=True, type=click.Path(path_type=Path), help="Jig file whose plate and holders stay."
 )
 @_COLUMN
 @_as_written
 @_UNIT
 @_U_UNIT
 @click.option(
-    "--name", "names", multiple=True, metavar="LABEL=BALL", help="Ball of the jig that the sheet calls otherwise."
+    "--names", "names", multiple=True, metavar="LABEL=BALL", help="Ball of the jig that the sheet calls otherwise."
 )
 @click.option(
-    "--k", "coverage", type=Finite(0.5, 5), help="Coverage factor of the sheet's uncertainties, 2 for U (k = 2)."
+    "--coverage", "coverage", type=Finite(0.5, 5), help="Coverage factor of the sheet's uncertainties, 2 for U (k = 2)."
 )
 @click.option(
     "--u-um", type=Finite(0.01, 1000), help="Standard uncertainty of a coordinate where the sheet states none [µm]."
@@ -100,13 +100,13 @@ def sheet(
 ) -> None:
     """Write a jig file with the balls that a CMM sheet has: a table, or measured features in DMIS (.dmo, .dmi, .dmis, .out).
 
-    Coordinates are in the jig's frame. Plate and holders are those of --jig. Uncertainties of three axes become one, their root mean
+    Coordinates are in the jig's frame. Plate and holders are those of --before. Uncertainties of three axes become one, their root mean
     square: a jig file has one per ball. Each ball is shown with its change against the jig before.
 
     \b
     Examples:
-      dbbstation jig sheet cmm.csv --jig plate.yaml --column x=X --column "u=U (k=2)" --k 2 --out new.yaml
-      dbbstation jig sheet plate.dmo --jig plate.yaml --name SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
+      dbbstation jig sheet cmm.csv --before plate.yaml --columns x=X --columns "u=U (k=2)" --k 2 --out new.yaml
+      dbbstation jig sheet plate.dmo --before plate.yaml --names SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_result, print_table
     from dbbstation.cli.provenance import provenance
@@ -119,7 +119,7 @@ def sheet(
     refuse_existing_table(out, force=force)
     old = read_jig(before)
     numbers = number_language(decimal, separator)
-    named = _pairs(columns, "--column", _WHAT)
+    named = _pairs(columns, "--columns", _WHAT)
     measured = read_sheet(
         sheet, named, _micro(unit), coverage, u_unit=_micro(u_unit), numbers=numbers, encoding=encoding
     )
@@ -127,7 +127,7 @@ def sheet(
         old,
         measured,
         str(sheet),
-        names=_pairs(names, "--name"),
+        names=_pairs(names, "--names"),
         uncertainty_um=u_um,
         cmm_temp_c=cmm_temp_c,
     )
@@ -171,7 +171,7 @@ def sheet(
     help="Standard deviation of what the CMM reads of a ball that stays; its variance is taken off  [default: 0].",
 )
 @click.option(
-    "--jig", "before", type=click.Path(path_type=Path), help="Jig file whose holders get the result; with --out."
+    "--before", "before", type=click.Path(path_type=Path), help="Jig file whose holders get the result; with --out."
 )
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Jig file to write.")
 @_FORCE
@@ -199,7 +199,7 @@ def holders(
     \b
     Examples:
       dbbstation jig holders mountings.csv
-      dbbstation jig holders mountings.csv --cmm-repeatability-um 0.3 --jig plate.yaml --out plate-2026.yaml
+      dbbstation jig holders mountings.csv --cmm-repeatability-um 0.3 --before plate.yaml --out plate-2026.yaml
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_result
     from dbbstation.errors import InputError, Problem
@@ -211,12 +211,12 @@ def holders(
 
     if (before is None) != (out is None):
         raise click.UsageError(
-            "--jig and --out belong together: the holders of one get the result, the other is written"
+            "--before and --out belong together: the holders of one get the result, the other is written"
         )
     if out is not None:
         refuse_existing_table(out, force=force)
     numbers = number_language(decimal, separator)
-    named = _pairs(columns, "--column", _WHAT)
+    named = _pairs(columns, "--columns", _WHAT)
     rows = read_sheet(sheet, named, _micro(unit), 1.0, of_one_holder=True, numbers=numbers, encoding=encoding)
     found: dict[str, HolderResult] = {}
     try:
@@ -327,7 +327,7 @@ def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str
         if not name:
             what = "nothing says which holder this row is of"
             raise InputError(
-                [Problem(str(sheet), row.line, 0, what, "say it with --column holder=NAME, or --holder for all")]
+                [Problem(str(sheet), row.line, 0, what, "say it with --columns holder=NAME, or --holder for all")]
             )
         centre = tuple(1e3 * value for value in row.centre_mm if np.isfinite(value))
         groups.setdefault((name, row.name or row.bore), []).append(centre)

@@ -18,7 +18,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
 def judging_model_options(function: _Function) -> _Function:
-    """Give a command `--model` and `--source-file` for `judging_model`."""
+    """Give a command `--model` and `--source-files` for `judging_model`."""
     option = click.option(
         "--model",
         "model_file",

@@ -22,11 +22,22 @@ class LazyGroup(click.Group):
     Args:
         table: name and one line of help of every command.
         package: modules named as commands, underscores for hyphens and behind Python keywords.
+        modules: other names of modules, by command.
+        renamed: former commands and what they are now.
         more: for `click.Group`.
     """
 
-    def __init__(self, *, table: Mapping[str, str], package: str, **more: Any) -> None:  # noqa: ANN401
+    def __init__(
+        self,
+        *,
+        table: Mapping[str, str],
+        package: str,
+        modules: Mapping[str, str] | None = None,
+        renamed: Mapping[str, str] | None = None,
+        **more: Any,  # noqa: ANN401 - as click has it
+    ) -> None:
         super().__init__(**more)
+        self._modules, self._renamed = modules or {}, renamed or {}
         self._table = table
         self._package = package
 
@@ -38,7 +49,7 @@ class LazyGroup(click.Group):
         """Import the command's module."""
         if cmd_name not in self._table:
             return None
-        name = cmd_name.replace("-", "_")
+        name = self._modules.get(cmd_name, cmd_name).replace("-", "_")
         name += "_" if keyword.iskeyword(name) else ""
         module = importlib.import_module(f"{self._package}.{name}")
         command: click.Command = getattr(module, name)
@@ -51,6 +62,8 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command, or suggest similar ones."""
         name = args[0]
+        if name in self._renamed:
+            ctx.fail(f"No such command {name!r}; it is now `{self._renamed[name]}`")
         near = difflib.get_close_matches(name, self._table, n=3)
         if name not in self._table and not name.startswith("-") and near:
             ctx.fail(f"No such command {name!r}; did you mean {' or '.join(near)}?")

@@ -50,7 +50,7 @@ _OPTIONS = (
         help="What the columns mean: read where the file exists, written there for the next time where it does not.",
     ),
     click.option(
-        "--column",
+        "--columns",
         "columns",
         multiple=True,
         metavar="NAME=MEANING:UNIT",
@@ -189,14 +189,14 @@ def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, aske
         if not one.complete:
             units = list(UNITS[one.means])
             unit = asker.text(
-                f"unit of the column {name}, taken for {one.means}", f"--column '{name}={one.means}:UNIT'", units
+                f"unit of the column {name}, taken for {one.means}", f"--columns '{name}={one.means}:UNIT'", units
             )
             columns[name] = Proposed(one.means, unit)
     means = {one.means for one in columns.values()}
     if not means & {LENGTH, DEVIATION}:
         unknown = ", ".join(name for name, one in columns.items() if one.means == IGNORED)
         asker.give(
-            "--column 'NAME=deviation:µm' or 'NAME=length:mm'",
+            "--columns 'NAME=deviation:µm' or 'NAME=length:mm'",
             f"which column has the readings of the bar; these are not understood: {unknown}",
         )
     own = set(table.table.names) >= EXPORTED
@@ -205,7 +205,7 @@ def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, aske
         unknown = ", ".join(name for name, one in columns.items() if one.means == IGNORED)
         question = (
             "no column was taken for an angle: are the files the whole run with feed-in and feed-out, or the turn alone"
-            + f"; not understood: {unknown}, say --column 'NAME=angle:deg' where one is the angle" * bool(unknown)
+            + f"; not understood: {unknown}, say --columns 'NAME=angle:deg' where one is the angle" * bool(unknown)
         )
         trace = asker.text(question, "--trace", ["whole", "turn"])
     angle = _angle(options, asker, own=own) if ANGLE in means else None
@@ -236,10 +236,10 @@ def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
 
             known = ", ".join(MEANINGS)
             raise click.UsageError(
-                f"--column {text}: write NAME=MEANING or NAME=MEANING:UNIT, a meaning is one of {known}"
+                f"--columns {text}: write NAME=MEANING or NAME=MEANING:UNIT, a meaning is one of {known}"
             )
         if found[0] not in table.table.names:
-            raise click.UsageError(f"--column {text}: the columns are {', '.join(table.table.names)}")
+            raise click.UsageError(f"--columns {text}: the columns are {', '.join(table.table.names)}")
         told[found[0]] = found[1]
     guessed = proposed([name for name in table.table.names if name not in told], table.units)
     taken = {one.means for one in told.values()}

@@ -44,13 +44,15 @@ _AUTO_PATIENCE_S = 60.0
 @click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
 @instrument_options(required=True)
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Session folder.")
-@click.option("--auto", metavar="URL", help="Start each circle at this control address of `emulate`, accept every run.")
+@click.option(
+    "--auto", metavar="URL", help="Start each circle at this control address of `instrument emulate`, accept every run."
+)
 @click.option(
     "--time-scale",
     type=Finite(0.01, 200.0),
     default=1.0,
     show_default=True,
-    help="The same factor as of `emulate`.",
+    help="The same factor as of `instrument emulate`.",
 )
 @click.option(
     "--rate-hz",
@@ -76,7 +78,7 @@ def measure(**given: Any) -> None:  # noqa: ANN401 - the options, each with a ty
       dbbstation measure --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
         --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
       dbbstation measure ... --order drift --gate first   (heights in turn, the first test again at the end)
-      dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `emulate`)
+      dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `instrument emulate`)
     """
     noted = taken_from(given, SessionOptions)
     _measured(MeasureOptions(**given, session=noted))
@@ -93,7 +95,7 @@ class MeasureOptions:
         baud: None: the usual one [1/s].
         spy: log of all bytes; None: none.
         out: session folder.
-        auto: control address of `emulate`; None: a person starts circles.
+        auto: control address of `instrument emulate`; None: a person starts circles.
         programs: folder; None: none.
         rate_hz: None: the usual one.
         largest_loss_percent: of a run's samples; None: the plan's.
@@ -165,7 +167,7 @@ def _measured(asked: MeasureOptions) -> None:
         rate_hz=protocol.fastest_hz(asked.baud),
         range_mm=protocol.length.range_mm,
         model=judging_model(asked.model_file, asked.source_files),
-        # A real machine neither has a control address of `emulate` nor runs faster than it does.
+        # A real machine neither has a control address of `instrument emulate` nor runs faster than it does.
         instrument=ReadBy(
             chosen.name,
             asked.profile or "",
@@ -246,7 +248,7 @@ def _interruptible(station: Station) -> Iterator[threading.Event]:
 
 
 class VirtualHands:
-    """Moves the virtual machine of `emulate`.
+    """Moves the virtual machine of `instrument emulate`.
 
     Raises:
         MachineError: no such address.

@@ -38,15 +38,23 @@ def show(result: MismatchResult | SimulatorResult) -> None:
         _print(result)
 
 
-def _write_rows(result: SimulatorResult, path: Path, *, force: bool) -> None:
+def _write_table(result: MismatchResult | SimulatorResult, path: Path, *, force: bool) -> None:
     from dbbstation.cli.provenance import provenance
     from dbbstation.files.provenance import write_table
+    from dbbstation.results.simulator import SimulatorResult
 
-    write_table(path, result.rows_csv, provenance(), force=force)
+    if isinstance(result, SimulatorResult):
+        write_table(path, result.rows_csv, provenance(), force=force)
+    else:
+        result.save(path, force=force, provenance=provenance)
 
 
 def _refused(result: MismatchResult | SimulatorResult, path: Path) -> OutputError | None:
     return not_written(path, result.levels) if result.levels.correction is False else None
+
+
+def _refused_table(result: MismatchResult | SimulatorResult, path: Path) -> OutputError | None:
+    return None if hasattr(result, "rows_csv") else _refused(result, path)
 
 
 def _allowed() -> dict[str, object]:
@@ -54,13 +62,13 @@ def _allowed() -> dict[str, object]:
     return {"allowed": setting.value if setting else ()}
 
 
-OUT = "Write the table here, with the corrected simulation as a further column; with --simulator, the missing terms as Python code."
-ROWS = "With --simulator: write measured, simulated, refitted and corrected values here."
+OUT = "With --simulator: write the missing terms here, as Python code."
+ROWS = "Write the table here, with the corrected simulation; with --simulator, measured, simulated, refitted and corrected values."
 mismatch = command(
     task,
     show,
-    CommandOutput("out", OUT, table=True, refused=_refused),
-    CommandOutput("corrected", ROWS, _write_rows, table=True, only_with="simulator"),
+    CommandOutput("out", OUT, refused=_refused, only_with="simulator"),
+    CommandOutput("table", ROWS, _write_table, table=True, refused=_refused_table, field="corrected"),
     figure("Draw what differs here"),
     more=_allowed,
 )

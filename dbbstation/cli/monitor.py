@@ -1,4 +1,4 @@
-"""`dbbstation monitor`: live reading of an instrument."""
+"""`dbbstation instrument monitor`: live reading of an instrument."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ def monitor(
 
     \b
     Examples:
-      dbbstation monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0
-      dbbstation monitor --instrument streaming-encoder --port COM3 --count 100 --json
-      dbbstation monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0 --spy bytes.txt
-      dbbstation monitor --instrument tesa-tt80 --profile tt80 --zero-mm 150.0003 --port /dev/ttyUSB1
+      dbbstation instrument monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0
+      dbbstation instrument monitor --instrument streaming-encoder --port COM3 --count 100 --json
+      dbbstation instrument monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0 --spy bytes.txt
+      dbbstation instrument monitor --instrument tesa-tt80 --profile tt80 --zero-mm 150.0003 --port /dev/ttyUSB1
     """  # noqa: D301 (click reads the escape)
     from dbbstation.instrument.driver import Instrument
 

@@ -48,9 +48,9 @@ def plot(
 
     \b
     Examples:
-      dbbstation plot session --test a --out a.svg
-      dbbstation plot session --test a,b --kind deviation --out ab.pdf
-      dbbstation plot before after --test a --kind compare --out a.png
+      dbbstation plot session --tests a --out a.svg
+      dbbstation plot session --tests a,b --kind deviation --out ab.pdf
+      dbbstation plot before after --tests a --kind compare --out a.png
     """
     from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import count_bar

@@ -1,4 +1,4 @@
-"""`dbbstation ports`: what is connected."""
+"""`dbbstation instrument ports`: what is connected."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def ports(*, as_json: bool) -> None:
 
     \b
     Example:
-      dbbstation ports
+      dbbstation instrument ports
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
     from dbbstation.instrument.link import connected_ports

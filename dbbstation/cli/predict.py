@@ -11,18 +11,20 @@ from dbbstation.cli.source_files import source_file_option
 
 
 @click.command()
+@click.argument("poses", type=click.Path(path_type=Path), metavar="POSES.csv")
 @click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
 @source_file_option
-@click.option("--poses", required=True, type=click.Path(path_type=Path), help="CSV of commanded poses.")
 @number_options
-@click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="CSV of actual poses.")
+@click.option(
+    "--table", "out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="CSV of actual poses."
+)
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON.")
 def predict(
+    poses: Path,
     *,
     model: Path,
     source_files: tuple[Path, ...],
-    poses: Path,
     decimal: str | None,
     separator: str | None,
     out: Path,
@@ -38,8 +40,8 @@ def predict(
 
     \b
     Examples:
-      dbbstation predict --model model.yaml --poses commanded.csv --out actual.csv
-      dbbstation predict --model model.yaml --poses excel.csv --decimal , --out actual.csv
+      dbbstation predict --model model.yaml commanded.csv --table actual.csv
+      dbbstation predict --model model.yaml excel.csv --decimal , --table actual.csv
     """
     from dbbstation.cli.model_warnings import say_model_warnings
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_result, say

@@ -22,9 +22,7 @@ PROGRAM = f"dbbstation {__version__}"
 _NO_CONTENT = frozenset(
     {
         "out",
-        "csv",
-        "html",
-        "corrected",
+        "table",
         "allow",
         "page",
         "pdf",

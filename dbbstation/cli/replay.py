@@ -1,4 +1,4 @@
-"""`dbbstation replay`: a byte log through the decoder."""
+"""`dbbstation instrument replay`: a byte log through the decoder."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: 
 
     \b
     Examples:
-      dbbstation replay bytes.txt
-      dbbstation replay bytes.txt --instrument streaming-encoder --json
+      dbbstation instrument replay bytes.txt
+      dbbstation instrument replay bytes.txt --instrument streaming-encoder --json
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
     from dbbstation.instrument.bytelog import logged_instrument, read_byte_log

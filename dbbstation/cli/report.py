@@ -31,7 +31,11 @@ from dbbstation.cli.source_files import source_file_option
 @source_file_option
 @chosen_tests_options
 @click.option(
-    "--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="Write the report here, as HTML."
+    "--page",
+    "out",
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the report here, as HTML.",
 )
 @click.option(
     "--pdf", type=click.Path(path_type=Path, dir_okay=False), help="Print it here too, by an installed Chromium."
@@ -63,8 +67,8 @@ def report(
 
     \b
     Examples:
-      dbbstation report session --out report.html
-      dbbstation report verified --before measured --model joint.yaml --out report.html
+      dbbstation report session --page report.html
+      dbbstation report verified --before measured --model joint.yaml --page report.html
       dbbstation report session --certificate --place "hall 3" --out report.html --pdf report.pdf
       dbbstation report session --job "spindle exchanged" --out report.html --pdf report.pdf
     """

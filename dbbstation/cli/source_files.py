@@ -1,4 +1,4 @@
-"""`--source-file`, for commands that fit or read a model."""
+"""`--source-files`, for commands that fit or read a model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 def source_file_option(function: _Function) -> _Function:
     """Give a command `source_files`, a tuple of paths."""
     return click.option(
-        "--source-file",
+        "--source-files",
         "source_files",
         multiple=True,
         type=click.Path(path_type=Path),

@@ -38,7 +38,7 @@ def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[
       dbbstation sources
       dbbstation sources backlash
       dbbstation sources gravity --machine machine.yaml
-      dbbstation sources scale-bow --source-file scale_bow.py --json
+      dbbstation sources scale-bow --source-files scale_bow.py --json
     """
     from dbbstation.cli.output import print_result, print_table
     from dbbstation.errors import ModelError

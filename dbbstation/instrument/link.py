@@ -224,7 +224,9 @@ def _not_opened(port: str, baud: int, error: Exception) -> InstrumentError:
     if number == errno.ENOENT or "filenotfound" in words:
         names = ", ".join(name for name, _, _ in connected_ports())
         remedy = f"connected are {names}" if names else "no serial port is connected: plug the adapter in"
-        return InstrumentError("there is no such port", where=port, remedy=f"{remedy}; see `dbbstation ports`")
+        return InstrumentError(
+            "there is no such port", where=port, remedy=f"{remedy}; see `dbbstation instrument ports`"
+        )
     if number in _BUSY or "access is denied" in words:
         who = ", ".join(holders(port))
         remedy = "close the other program, for example a second monitor or a terminal program"
@@ -237,7 +239,9 @@ def _not_opened(port: str, baud: int, error: Exception) -> InstrumentError:
         remedy = "set the instrument to a usual rate such as 9600, 19200 or 115200 and give it with --baud"
         return InstrumentError(f"the port does not take the baud rate {baud}", where=port, remedy=remedy)
     return InstrumentError(
-        f"this is no serial port that can be used: {_first_words(error)}", where=port, remedy="see `dbbstation ports`"
+        f"this is no serial port that can be used: {_first_words(error)}",
+        where=port,
+        remedy="see `dbbstation instrument ports`",
     )
 
 

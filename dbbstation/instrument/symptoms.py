@@ -112,9 +112,7 @@ def _cause(protocol: Protocol, raw: bytes, baud: int, *, marked: bool) -> str:
         return (
             f"most likely the baud rate: the port uses {baud}, the instrument can be set to {rates}; or a noisy cable"
         )
-    return (
-        f"is it this instrument, set as `dbbstation instruments {protocol.name}` says, with nothing else on the line?"
-    )
+    return f"is it this instrument, set as `dbbstation instrument list {protocol.name}` says, with nothing else on the line?"
 
 
 def parity_in(raw: bytes) -> str:

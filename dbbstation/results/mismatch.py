@@ -174,7 +174,7 @@ class MismatchResult(Framed):
         left: whether anything exceeds noise.
         not_asked: own physics not tested, with reasons by name.
         stopped: why the search ended early; may be empty.
-        out: absent if none was written.
+        corrected: file of the table; absent if none was written.
         figure: absent if none was written.
         table: columns by name, with corrected simulation and residual.
     """
@@ -197,7 +197,7 @@ class MismatchResult(Framed):
     next: tuple[NextMeasurement, ...]
     not_asked: Mapping[str, str]
     stopped: str
-    out: Annotated[str | None, Absent] = None
+    corrected: Annotated[str | None, Absent] = None
     figure: Annotated[str | None, Absent] = None
     table: Annotated[Mapping[str, tuple[str | float, ...]], AsItIs, Kept]
 

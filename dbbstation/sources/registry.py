@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 GROUP = "dbbstation.sources"
 """Entry points of this group name classes that derive from `ErrorSource`."""
 
-HOW_TO_ADD = "one of your own is given with --source-file FILE.py, or its package installed"
+HOW_TO_ADD = "one of your own is given with --source-files FILE.py, or its package installed"
 """What a name that nobody knows may lack."""
 
 

@@ -76,7 +76,7 @@ def calibrate(
       dbbstation calibrate monday tuesday --exclude h --json
       dbbstation calibrate standard-test --method conv-a
       dbbstation calibrate monday --sources strut-reference-length,base-joints,gravity,cog-shift,drive-friction
-      dbbstation calibrate monday --source-file scale_bow.py --sources strut-reference-length,base-joints,scale-bow
+      dbbstation calibrate monday --source-files scale_bow.py --sources strut-reference-length,base-joints,scale-bow
 
     Args:
         known: error sources by name; None: those of package, installed packages and `source_files`.

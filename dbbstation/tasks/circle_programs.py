@@ -75,7 +75,7 @@ def program(
     Examples:
       dbbstation program --plan table2.yaml --machine machine.yaml --out nominal
       dbbstation program --plan table2.yaml --machine machine.yaml --model model.yaml --out compensated
-      dbbstation program --plan table2.yaml --machine machine.yaml --test a,f --out two --json
+      dbbstation program --plan table2.yaml --machine machine.yaml --tests a,f --out two --json
 
     Args:
         known: error sources by name; None: those of package, installed packages and `source_files`.

@@ -48,10 +48,10 @@ def circles(
     \b
     Examples:
       dbbstation circles session
-      dbbstation circles session --filter 50 --csv circles.csv
+      dbbstation circles session --filter 50 --table circles.csv
       dbbstation circles session --findings --model model.yaml
-      dbbstation circles session --test a --budget --json
-      dbbstation circles session --test a --quick-look
+      dbbstation circles session --tests a --budget --json
+      dbbstation circles session --tests a --quick-look
 
     Args:
         stop: asked after each run.

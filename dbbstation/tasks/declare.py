@@ -48,7 +48,7 @@ class Option:
     Attributes:
         help: one or two sentences, the unit in brackets; of a flag that is True by default what its absence means.
         kind: `argument` has no flag; `path`, `file` or `folder`; empty: by the type.
-        flag: if it is not `--name`.
+        flag: if it is not the name with hyphens.
         setting: key in the shop's settings; `factor` converts to this unit, `goes_with` as of `ShopOption`.
         least: `most`, `above`: range of a number.
         only_with: parameter that it needs.

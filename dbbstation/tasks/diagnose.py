@@ -67,7 +67,7 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml --figure diagnosis.svg
       dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
       dbbstation diagnose 2026-11-20-hexapod-7 --effects
-      dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
+      dbbstation diagnose 2026-11-20-hexapod-7 --source-files scale_bow.py
       dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
 
     Args:

@@ -19,7 +19,7 @@ STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-out
 """Stages of an identification, and the share of its time that has passed by then [%]."""
 
 
-@task("drive", label="identification", stages=STAGES)
+@task("identify", label="identification", stages=STAGES)
 def identify(
     recordings: Annotated[
         Files,
@@ -51,10 +51,10 @@ def identify(
 
     \b
     Examples:
-      dbbstation drive strut3.csv
-      dbbstation drive slow.csv fast.csv
-      dbbstation drive strut3.csv --force-per-ampere 410 --figure strut3.svg
-      dbbstation drive strut3.csv --sources coulomb-friction,friction-asymmetry --json
+      dbbstation identify strut3.csv
+      dbbstation identify slow.csv fast.csv
+      dbbstation identify strut3.csv --force-per-ampere 410 --figure strut3.svg
+      dbbstation identify strut3.csv --sources coulomb-friction,friction-asymmetry --json
 
     Returns:
         What was found; `drawing` draws it, and `table` has what was compared.

@@ -140,7 +140,7 @@ def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
         found |= dict.fromkeys(split_head(run.path, faults))
     if not runs:
         faults.append(
-            Problem("export", 0, 0, "no run is left to be exported", "exclude fewer tests, or give another --state")
+            Problem("export", 0, 0, "no run is left to be exported", "exclude fewer tests, or give another --states")
         )
     if faults:
         raise InputError(faults)

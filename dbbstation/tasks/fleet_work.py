@@ -60,11 +60,11 @@ class FleetOptions:
         """Return the options of a single session's command, in order."""
         words = [] if self.sources is None else ["--sources", ",".join(self.sources)]
         for path in self.source_files:
-            words += ["--source-file", name_of(path)]
+            words += ["--source-files", name_of(path)]
         words += ["--law-over-time"] if self.law_over_time else []
         words += [] if self.method == "jig" else ["--method", self.method]
         words += ["--findings"] if self.findings else []
-        words += [word for name in self.tests for word in ("--test", name)]
+        words += [word for name in self.tests for word in ("--tests", name)]
         return words + [word for name in self.exclude for word in ("--exclude", name)]
 
 

@@ -29,7 +29,7 @@ def history(
     tests: o.Tests = (),
     exclude: o.Exclude = (),
     source_files: o.SourceFiles = (),
-    anew: Annotated[bool, Option("Read every session anew, whatever the index knows.", flag="--rebuild")] = False,
+    anew: Annotated[bool, Option("Read every session anew, whatever the index knows.")] = False,
     tolerances: Sequence[Tolerance] = (),
     coverage_factor: float = 2.0,
     progress: Progress = silent,
@@ -46,8 +46,8 @@ def history(
     \b
     Examples:
       dbbstation history sessions
-      dbbstation history sessions --html history.html --csv history.csv
-      dbbstation history sessions --test a,f --false-alarms 0.0001 --json
+      dbbstation history sessions --page history.html --table history.csv
+      dbbstation history sessions --tests a,f --false-alarms 0.0001 --json
 
     Args:
         tolerances: limits of circles.

@@ -117,7 +117,6 @@ def mismatch(
         Option(
             "Python file with physics of your own. It is executed. May be given more than once.",
             kind="path",
-            flag="--source-file",
             metavar="FILE.py",
         ),
     ] = (),

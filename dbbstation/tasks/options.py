@@ -20,16 +20,13 @@ RecordedSessions = Annotated[
     Sessions | Recorded,
     Option("session folders, or what `load` returned of them.", kind="argument", metavar="SESSION...", objects=True),
 ]
-Tests = Annotated[
-    Names, Option("Take these tests only; may be given more than once.", flag="--test", metavar="TEST,...")
-]
+Tests = Annotated[Names, Option("Take these tests only; may be given more than once.", metavar="TEST,...")]
 Exclude = Annotated[Names, Option("Leave tests out; may be given more than once.", metavar="TEST,...")]
 SourceFiles = Annotated[
     Files,
     Option(
         "Python file with an error source of your own. It is executed. May be given more than once.",
         kind="path",
-        flag="--source-file",
         metavar="FILE.py",
     ),
 ]

@@ -28,7 +28,7 @@ SIMULATING = "simulating runs"
 @task("simulate", label="runs")
 def simulate(
     model: Annotated[o.Model, o.model("Model file of `calibrate`.")],
-    plan: Annotated[File, Option("Test plan.", kind="file")],
+    plan: Annotated[File, Option("test plan.", kind="argument", metavar="PLAN")],
     *,
     source_files: o.SourceFiles = (),
     tests: o.Tests = (),
@@ -47,7 +47,7 @@ def simulate(
 
     \b
     Examples:
-      dbbstation simulate --model model.yaml --plan table2.yaml --out predicted
+      dbbstation simulate --model model.yaml table2.yaml --out predicted
       dbbstation evaluate predicted --model other-model.yaml
 
     Args:

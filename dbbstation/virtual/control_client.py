@@ -34,7 +34,7 @@ class ControlClient:
             raise MachineError(
                 "this is no control address of a virtual machine on this computer",
                 where=url,
-                remedy="give the one that `dbbstation emulate` prints, such as tcp://127.0.0.1:41234",
+                remedy="give the one that `dbbstation instrument emulate` prints, such as tcp://127.0.0.1:41234",
             )
         self.url = url
         self._address = ("127.0.0.1", port)
@@ -59,7 +59,7 @@ class ControlClient:
             raise MachineError(
                 f"the virtual machine does not answer `{' '.join(words)}`: {error}",
                 where=self.url,
-                remedy="is `dbbstation emulate` still running?",
+                remedy="is `dbbstation instrument emulate` still running?",
             ) from None
         if not answer.get("ok"):
             raise MachineError(str(answer.get("error", "it refuses")), where=self.url)

@@ -24,4 +24,4 @@ if __name__ == "__main__":
         "  - {quantity: centre-deviation, largest: 42, unit: µm}\n",
         encoding="utf-8",
     )
-    main(["history", str(place / "sessions"), "--html", str(place / "history.html"), "--force"])
+    main(["history", str(place / "sessions"), "--page", str(place / "history.html"), "--force"])

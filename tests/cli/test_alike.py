@@ -29,7 +29,7 @@ NO_FORCE = {
 }
 
 NO_TESTS = {
-    "emulate": "is told at its control address which test to run",
+    "instrument emulate": "is told at its control address which test to run",
     "import": "takes the files that are given",
     "measure": "the operator skips tests with a key, and the session says which are missing",
     "station": "as measure",
@@ -52,7 +52,7 @@ TAKES_TESTS = {"sessions", "folder", "folders", "a", "plan", "plan_file", "sessi
 LACKING = {
     "--json": (NO_JSON, bool, {"as_json"}),
     "--force": (NO_FORCE, lambda names: bool(names & WRITES), {"force"}),
-    "--test and --exclude": (NO_TESTS, lambda names: bool(names & TAKES_TESTS), {"tests", "exclude"}),
+    "--tests and --exclude": (NO_TESTS, lambda names: bool(names & TAKES_TESTS), {"tests", "exclude"}),
 }
 
 
@@ -86,10 +86,10 @@ def named_in(data):
 def test_test_and_exclude_choose_tests_of_a_session(run):
     words = ("evaluate", SMALL, "--model", MODEL, "--json")
     assert named_in(run(*words).data) == {"a", "g", "l"}
-    assert named_in(run(*words, "--test", "a,l").data) == {"a", "l"}
-    assert named_in(run(*words, "--test", "a", "--test", "l").data) == {"a", "l"}
+    assert named_in(run(*words, "--tests", "a,l").data) == {"a", "l"}
+    assert named_in(run(*words, "--tests", "a", "--tests", "l").data) == {"a", "l"}
     assert named_in(run(*words, "--exclude", "g").data) == {"a", "l"}
-    assert named_in(run(*words, "--test", "a,g", "--exclude", "g").data) == {"a"}
+    assert named_in(run(*words, "--tests", "a,g", "--exclude", "g").data) == {"a"}
 
 
 def test_a_test_that_no_session_has_is_refused():
@@ -101,8 +101,8 @@ def test_a_test_that_no_session_has_is_refused():
 
 
 def test_test_and_exclude_choose_tests_of_a_plan(run, tmp_path):
-    words = ("simulate", "--model", MODEL, "--plan", PLAN, "--json")
-    made = run(*words, "--test", "c,a,b", "--exclude", "b", "--out", tmp_path / "s")
+    words = ("simulate", "--model", MODEL, PLAN, "--json")
+    made = run(*words, "--tests", "c,a,b", "--exclude", "b", "--out", tmp_path / "s")
     assert made.code == DONE, made.err
     assert made.data["tests"] == ["c", "a"]
     written = {path.name.partition("-")[0] for path in (tmp_path / "s" / "runs").iterdir()}
@@ -111,7 +111,7 @@ def test_test_and_exclude_choose_tests_of_a_plan(run, tmp_path):
     assert refused.code == FAILED
     assert "the plan has no test zz; it has a, b, c" in refused.err
     none = run(
-        "program", "--plan", PLAN, "--machine", MACHINE, "--test", "a", "--exclude", "a", "--out", tmp_path / "nc"
+        "program", "--plan", PLAN, "--machine", MACHINE, "--tests", "a", "--exclude", "a", "--out", tmp_path / "nc"
     )
     assert none.code == FAILED
     assert "no test is left; exclude fewer" in none.err
@@ -143,7 +143,7 @@ def test_a_dry_run_lists_every_fault_where_program_stops_at_the_first(run, tmp_p
     for test in "abcdefghijklmno":
         for way in ("ccw", "cw"):
             one = run(
-                "program", "--plan", PLAN, "--machine", machine, "--test", test, "--out", tmp_path / f"{test}{way}"
+                "program", "--plan", PLAN, "--machine", machine, "--tests", test, "--out", tmp_path / f"{test}{way}"
             )
             if one.code == FAILED:
                 refused.add(test)
@@ -157,14 +157,14 @@ def test_a_dry_run_lists_every_fault_where_program_stops_at_the_first(run, tmp_p
 def test_a_dry_run_takes_the_options_of_program(run, tmp_path):
     """Test a lies at -1150 mm: with 60 mm of clearance it leaves a travel that ends at -1100, with the bar on it stays."""
     machine = low(tmp_path)
-    words = ("check", PLAN, machine, "--test", "a")
+    words = ("check", PLAN, machine, "--tests", "a")
     assert run(*words).code == DONE
     assert run(*words, "--clearance-mm", "60").code == FAILED
     assert run(*words, "--clearance-mm", "60", "--bar-stays-on").code == DONE
 
 
 def test_choosing_tests_without_a_dry_run_is_refused(run):
-    assert run("check", PLAN, "--test", "a").code == USAGE
+    assert run("check", PLAN, "--tests", "a").code == USAGE
 
 
 def test_of_several_machines_none_is_dry_run(run, tmp_path):

@@ -274,7 +274,7 @@ def test_files_in_each_others_places(run, fifteen, model):
 def test_poses(run, tmp_path, model, text, what):
     poses = tmp_path / "in.csv"
     poses.write_text(text)
-    outcome = run("predict", "--model", model, "--poses", poses, "--out", tmp_path / "out.csv")
+    outcome = run("predict", "--model", model, poses, "--table", tmp_path / "out.csv")
     assert outcome.code == FAILED
     assert outcome.err.startswith(str(poses))
     assert what in outcome.err
@@ -304,7 +304,7 @@ def test_an_output_never_takes_the_place_of_a_file_that_was_read(run, tmp_path, 
     copy = Path(shutil.copyfile(model, tmp_path / "copy.yaml"))
     before = copy.read_bytes()
     session = shipped_folder("fixtures") / "sessions" / "small"
-    outcome = run("report", session, "--model", copy, "--out", copy, "--force")
+    outcome = run("report", session, "--model", copy, "--page", copy, "--force")
     assert outcome.code == FAILED
     assert copy.read_bytes() == before
 

@@ -43,7 +43,7 @@ def test_such_a_number_is_refused_by_the_name_of_its_option(tmp_path, number):
         (
             "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg",
             "{},0,0,0,0,0",
-            ["predict", "--model", MODEL, "--out", "actual.csv", "--poses"],
+            ["predict", "--model", MODEL, "--table", "actual.csv"],
         ),
         ("t_s,position_mm,force_n", "0.004,{},2", ["check"]),
         ("t_s,length_mm", "0.1,{}", ["check"]),

@@ -123,7 +123,7 @@ def test_evaluate_predicts_other_places(run, elsewhere, model):
 
 
 def test_simulated_recordings_are_those_of_the_model(run, tmp_path, fifteen, model):
-    simulated = run("simulate", "--model", model, "--plan", fifteen / "plan.yaml", "--out", tmp_path / "again")
+    simulated = run("simulate", "--model", model, fifteen / "plan.yaml", "--out", tmp_path / "again")
     assert simulated.code == DONE
     assert run("check", tmp_path / "again").code == DONE
     data = run("evaluate", tmp_path / "again", "--model", model, "--json").data
@@ -134,7 +134,7 @@ def test_simulated_recordings_are_those_of_the_model(run, tmp_path, fifteen, mod
 def test_predict_adds_uncertainties_and_keeps_other_columns(run, tmp_path, model):
     header = "name,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg"
     (tmp_path / "in.csv").write_text(f"{header}\nmiddle,0,0,-1008,0,0,0\ncorner,100,100,-1150,-10,10,0\n")
-    files = ["--poses", tmp_path / "in.csv", "--out", tmp_path / "out.csv"]
+    files = [tmp_path / "in.csv", "--table", tmp_path / "out.csv"]
     outcome = run("predict", "--model", model, *files, "--json")
     assert outcome.code == DONE
     with (tmp_path / "out.csv").open(newline="", encoding="utf-8") as file:
@@ -152,7 +152,7 @@ def test_predict_adds_uncertainties_and_keeps_other_columns(run, tmp_path, model
 
 
 def test_programs_name_their_origin_and_are_said_in_json(run, tmp_path, fifteen, model):
-    session = ["--plan", fifteen / "plan.yaml", "--machine", fifteen / "machine.yaml", "--test", "d"]
+    session = ["--plan", fifteen / "plan.yaml", "--machine", fifteen / "machine.yaml", "--tests", "d"]
     outcome = run("program", *session, "--model", model, "--out", tmp_path / "nc", "--json")
     assert outcome.code == DONE
     assert sorted(path.name for path in (tmp_path / "nc").iterdir()) == ["d-ccw.ngc", "d-cw.ngc"]
@@ -195,7 +195,9 @@ def test_every_shipped_file_is_good(run):
     assert len(outcome.out.splitlines()) == len(files) + 1
 
 
-@pytest.mark.parametrize("arguments", [["instruments"], ["ports"], ["instruments", "streaming-encoder"]])
+@pytest.mark.parametrize(
+    "arguments", [["instrument", "list"], ["instrument", "ports"], ["instrument", "list", "streaming-encoder"]]
+)
 def test_lists_are_json_too(run, arguments):
     outcome = run(*arguments, "--json")
     assert outcome.code == DONE

@@ -117,7 +117,7 @@ def test_the_bars_expansion_is_corrected_once(session, tmp_path):
 
 def test_the_table_is_what_json_has(session, tmp_path):
     out = tmp_path / "circles.csv"
-    data = call("circles", session, "--findings", "--csv", out, "--json").data
+    data = call("circles", session, "--findings", "--table", out, "--json").data
     with out.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(data["runs"])
@@ -126,16 +126,16 @@ def test_the_table_is_what_json_has(session, tmp_path):
         assert float(row["f_max_um"]) == pytest.approx(run["f_um"]["max"], rel=1e-8)
         assert float(row["u_g_um"]) == pytest.approx(run["uncertainty"]["G"]["u_um"], rel=1e-8)
         assert row["finding_bump"] == "good"
-    again = call("circles", session, "--csv", out)
+    again = call("circles", session, "--table", out)
     assert again.code == FAILED
     assert "--force" in again.err
-    assert call("circles", session, "--csv", out, "--force").code == DONE
+    assert call("circles", session, "--table", out, "--force").code == DONE
 
 
 def test_tests_are_chosen_as_elsewhere(session):
-    assert {run["test"] for run in call("circles", session, "--test", "f", "--json").data["runs"]} == {"f"}
+    assert {run["test"] for run in call("circles", session, "--tests", "f", "--json").data["runs"]} == {"f"}
     assert {run["test"] for run in call("circles", session, "--exclude", "f", "--json").data["runs"]} == {"a"}
-    assert call("circles", session, "--test", "z").code == FAILED
+    assert call("circles", session, "--tests", "z").code == FAILED
     nothing = call("circles", session, "--exclude", "a,f")
     assert nothing.code == FAILED
     assert "no accepted run is left" in nothing.err
@@ -152,7 +152,7 @@ def test_a_model_without_findings_is_no_use(session):
 
 
 def test_budget_and_findings_are_printed(session):
-    out = call("circles", session, "--test", "a", "--budget", "--findings").out
+    out = call("circles", session, "--tests", "a", "--budget", "--findings").out
     assert "noise of the readings" in out
     assert "not stated, and not in U: " in out
     assert "nothing is wrong" in out
@@ -207,7 +207,7 @@ def test_a_quick_look_is_printed_as_symptoms():
     both, single = by_test["g", 1], by_test["a", 2]
     assert single["directions"] == ["cw"]
     # The second harmonic of both directions, as `circles` has it: A cos 2(θ - θ_0) is -β R/2 sin 2θ + s R/2 cos 2θ.
-    runs = call("circles", SMALL, "--test", "g", "--json").data["runs"]
+    runs = call("circles", SMALL, "--tests", "g", "--json").data["runs"]
     waves = [
         run["harmonics"][0]["amplitude_um"] * np.exp(2j * np.radians(run["harmonics"][0]["peak_deg"])) for run in runs
     ]

@@ -97,7 +97,7 @@ def test_what_is_printed_is_what_json_says(compared):
 def test_a_recording_and_its_simulated_twin(run, three, tmp_path):
     """What calibrates to noise is no difference: the chain of files, angles and centres adds none."""
     assert run("calibrate", three, "--out", tmp_path / "model.yaml").code == DONE
-    twin = ["--model", tmp_path / "model.yaml", "--plan", three / "plan.yaml", "--out", tmp_path / "twin"]
+    twin = [three / "plan.yaml", "--model", tmp_path / "model.yaml", "--out", tmp_path / "twin"]
     assert run("simulate", *twin).code == DONE
     outcome = run("compare", tmp_path / "twin", three)
     assert outcome.code == DONE

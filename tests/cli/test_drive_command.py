@@ -1,4 +1,4 @@
-"""`dbbstation drive` as a person or a program calls it."""
+"""`dbbstation identify` as a person or a program calls it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def strut(tmp_path_factory):
 
 
 def test_a_person_reads_names_values_and_the_gain(run, strut):
-    outcome = run("drive", strut)
+    outcome = run("identify", strut)
     assert outcome.code == DONE
     assert "Mass and viscous friction leave" in outcome.out
     assert "coulomb-friction    identified" in outcome.out
@@ -34,7 +34,7 @@ def test_a_person_reads_names_values_and_the_gain(run, strut):
 
 def test_a_program_reads_the_same(run, strut, tmp_path):
     out, figure = tmp_path / "compared.csv", tmp_path / "strut.svg"
-    outcome = run("drive", strut, "--json", "--out", out, "--figure", figure)
+    outcome = run("identify", strut, "--json", "--table", out, "--figure", figure)
     assert outcome.code == DONE
     data = outcome.data
     assert [step["added"] for step in data["held_back"]["steps"]] == [None, "coulomb-friction", "friction-asymmetry"]
@@ -45,9 +45,9 @@ def test_a_program_reads_the_same(run, strut, tmp_path):
     left = table["force_n"] - table["model_force_n"]
     assert np.sqrt(np.mean(left**2)) == pytest.approx(data["residual_rms_n"]["after"], rel=1e-3)
     assert figure.read_bytes().count(b"<svg") == 1
-    assert run("drive", strut, "--figure", figure).code == FAILED
+    assert run("identify", strut, "--figure", figure).code == FAILED
     first = figure.read_bytes()
-    assert run("drive", strut, "--figure", figure, "--force").code == DONE
+    assert run("identify", strut, "--figure", figure, "--force").code == DONE
     assert figure.read_bytes() == first
 
 
@@ -56,10 +56,10 @@ def test_currents_and_chosen_causes(run, strut, tmp_path):
     rows = [line.split(",") for line in strut.read_text().splitlines()[2:]]
     text = "\n".join(f"{t},{x},{float(f) / 400.0:.7f}" for t, x, f in rows)
     path.write_text("t_s,position_mm,motor_current_a\n" + text + "\n")
-    refused = run("drive", path)
+    refused = run("identify", path)
     assert refused.code == FAILED
     assert "current.csv:1: there is `motor_current_a` and no `force_n`" in refused.err
-    outcome = run("drive", path, "--force-per-ampere", "400", "--sources", "coulomb-friction", "--json")
+    outcome = run("identify", path, "--force-per-ampere", "400", "--sources", "coulomb-friction", "--json")
     assert [s["name"] for s in outcome.data["sources"]] == ["coulomb-friction"]
     # The asymmetry that was not asked for pulls at it.
     assert outcome.data["sources"][0]["parameters"]["coulomb_n"]["value"] == pytest.approx(20.0, rel=0.1)
@@ -73,11 +73,11 @@ def test_currents_and_chosen_causes(run, strut, tmp_path):
         (("nowhere.csv",), "there is no such file"),
         (("{strut}", "--sources", "coulomb-frictoin"), "did you mean coulomb-friction?"),
         (("{strut}", "--cutoff-hz", "900"), "a cut-off of 900 Hz does not suit"),
-        (("{strut}", "--out", "nowhere/x.csv"), "there is no folder"),
+        (("{strut}", "--table", "nowhere/x.csv"), "there is no folder"),
     ],
 )
 def test_what_cannot_be_done_is_said(run, strut, arguments, said):
-    outcome = run("drive", *(argument.format(strut=strut) for argument in arguments))
+    outcome = run("identify", *(argument.format(strut=strut) for argument in arguments))
     assert outcome.code == FAILED
     assert said in outcome.err
     assert outcome.out == ""
@@ -85,7 +85,7 @@ def test_what_cannot_be_done_is_said(run, strut, arguments, said):
 
 def test_the_example_of_the_documentation(run):
     """fixtures/drives/strut.csv, made by `python -m tests.diagnosis.drive.make_example`, says in its head what is true."""
-    data = run("drive", shipped_folder("fixtures") / "drives" / "strut.csv", "--json").data
+    data = run("identify", shipped_folder("fixtures") / "drives" / "strut.csv", "--json").data
     numbers = [
         (data["parameters"]["mass_kg"], 80.0),
         (data["friction"]["forwards"]["viscous_n_s_m"], 160.0),

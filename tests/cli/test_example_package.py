@@ -36,8 +36,8 @@ def run(tmp_path_factory):
 
 
 def test_the_instrument_is_listed_and_emulated_bytes_are_described(run):
-    assert "example-gauge" in run("instruments")
-    assert "9600 baud" in run("instruments", "example-gauge")
+    assert "example-gauge" in run("instrument", "list")
+    assert "9600 baud" in run("instrument", "list", "example-gauge")
 
 
 def test_the_source_passes_the_trial_of_its_contract(run):

@@ -18,13 +18,30 @@ PATIENCE_S = 60
 
 
 @pytest.mark.parametrize(
+    ("former", "now"),
+    [
+        (["drive", "x.csv"], "it is now `identify`"),
+        (["ports"], "it is now `instrument ports`"),
+        (["history", "x", "--rebuild"], "--anew"),
+        (["predict", "--poses", "x.csv"], "POSES without a flag"),
+        (["circles", "x", "--test", "a"], "--tests"),
+        (["jig", "sheet", "x", "--k", "2"], "--coverage"),
+    ],
+)
+def test_a_former_name_is_answered_with_the_new_one(run, former, now):
+    outcome = run(*former)
+    assert outcome.code == USAGE
+    assert now in outcome.err
+
+
+@pytest.mark.parametrize(
     "arguments",
     [
         ["calibrat"],
         ["calibrate"],
         ["calibrate", "session", "--colour"],
         ["evaluate", "session"],
-        ["simulate", "--model", "m", "--plan", "p", "--out", "o", "--samples", "3"],
+        ["simulate", "--model", "m", "p", "--out", "o", "--samples", "3"],
         ["check"],
         ["check", "--schema", "dbb-plan/9"],
         ["compensate", "part.ngc", "--model", "m", "--out", "o", "--start", "1,2,3"],
@@ -50,8 +67,8 @@ def written(tmp_path, model, elsewhere):
     out = tmp_path / "out"
     return {
         "calibrate": (["calibrate", elsewhere, "--out", out], out),
-        "predict": (["predict", "--model", model, "--poses", tmp_path / "in.csv", "--out", out], out),
-        "program": (["program", "--plan", plan, "--machine", machine, "--test", "d", "--out", out], out / "d-cw.ngc"),
+        "predict": (["predict", "--model", model, tmp_path / "in.csv", "--table", out], out),
+        "program": (["program", "--plan", plan, "--machine", machine, "--tests", "d", "--out", out], out / "d-cw.ngc"),
         "compensate": (["compensate", tmp_path / "part.ngc", "--model", model, "--out", out], out),
     }
 
@@ -73,7 +90,7 @@ def test_nothing_is_overwritten_without_force(run, written, command):
 
 def test_a_session_is_never_overwritten(run, tmp_path, model, elsewhere):
     (tmp_path / "out").mkdir()
-    outcome = run("simulate", "--model", model, "--plan", elsewhere / "plan.yaml", "--out", tmp_path / "out")
+    outcome = run("simulate", "--model", model, elsewhere / "plan.yaml", "--out", tmp_path / "out")
     assert outcome.code == FAILED
     assert "the session folder exists already" in outcome.err
     assert list((tmp_path / "out").iterdir()) == []
@@ -84,7 +101,7 @@ def test_a_folder_that_cannot_be_written(run, tmp_path, model):
     (tmp_path / "locked").mkdir(mode=0o500)
     (tmp_path / "in.csv").write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n")
     out = tmp_path / "locked" / "out.csv"
-    outcome = run("predict", "--model", model, "--poses", tmp_path / "in.csv", "--out", out)
+    outcome = run("predict", "--model", model, tmp_path / "in.csv", "--table", out)
     assert outcome.code == FAILED
     assert "permission denied" in outcome.err
 

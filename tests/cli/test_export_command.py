@@ -99,7 +99,7 @@ def _unsealed(folder):
 
 def test_rows_say_angle_and_deviation_as_the_circle_has_them(run, tmp_path):
     table = tmp_path / "t.csv"
-    assert run("export", SEALED, "--out", table, "--test", "a", "--state", "accepted").code == DONE
+    assert run("export", SEALED, "--out", table, "--tests", "a", "--states", "accepted").code == DONE
     session = read_session(SEALED)
     rows = rows_of(table)
     assert {row["test"] for row in rows} == {"a"}
@@ -165,5 +165,5 @@ def test_bad_words_are_answered_and_nothing_is_replaced(run, tmp_path, spoilt):
     assert broken.code == FAILED
     assert "l-cw-1.csv" in broken.err
     assert table.read_text(encoding="utf-8") == "mine"
-    assert "no run is left" in run("export", SMALL, "--out", tmp_path / "u.csv", "--state", "complete").err
-    assert run("export", SEALED, "--out", tmp_path / "u.csv", "--test", "zz").code == FAILED
+    assert "no run is left" in run("export", SMALL, "--out", tmp_path / "u.csv", "--states", "complete").err
+    assert run("export", SEALED, "--out", tmp_path / "u.csv", "--tests", "zz").code == FAILED

@@ -75,7 +75,7 @@ def test_the_ending_says_the_format(run, elsewhere, tmp_path, command, ending):
         ("calibrate", "session"),
         ("diagnose", "session"),
         ("compare", "one", "other"),
-        ("drive", "recording.csv"),
+        ("identify", "recording.csv"),
         ("study", "gravity"),
         ("study", "concealed-gravity"),
     ],

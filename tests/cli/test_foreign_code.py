@@ -28,7 +28,7 @@ MODEL = shipped_folder("fixtures") / "models" / "small.yaml"
 def test_a_source_file_that_ends_the_program_is_named_with_its_line(tmp_path, text, what):
     own = tmp_path / "own.py"
     own.write_text(text, encoding="utf-8")
-    done = call("sources", "--source-file", own)
+    done = call("sources", "--source-files", own)
     assert done.code == FAILED
     assert what in done.err
     assert "fault of dbbstation" not in done.err

@@ -12,6 +12,7 @@ import pytest
 
 from dbbstation.cli import COMMANDS, DONE, cli
 from dbbstation.cli.control import control
+from dbbstation.cli.instrument import TABLE
 from dbbstation.cli.jig import jig
 from dbbstation.cli.session import session
 from dbbstation.cli.study import STUDIES
@@ -19,7 +20,13 @@ from dbbstation.cli.study import STUDIES
 HEAVY = ("numba", "scipy", "rich", "textual", "matplotlib", "pydantic", "numpy")
 
 
-GROUPS = {"study": STUDIES, "session": session.commands, "jig": jig.commands, "control": control.commands}
+GROUPS = {
+    "study": STUDIES,
+    "session": session.commands,
+    "jig": jig.commands,
+    "instrument": TABLE,
+    "control": control.commands,
+}
 LINES = [name for name in sorted(COMMANDS) if name not in GROUPS]
 LINES += [f"{group} {name}" for group, names in GROUPS.items() for name in sorted(names)]
 """Everything that can be called."""

@@ -106,7 +106,7 @@ def test_each_session_has_its_date(told):
 
 
 def test_the_table_and_the_json_hold_the_same_numbers(told, sessions, tmp_path):
-    assert call("history", sessions, "--csv", tmp_path / "h.csv").code == DONE
+    assert call("history", sessions, "--table", tmp_path / "h.csv").code == DONE
     with (tmp_path / "h.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     every = [(q["quantity"], v) for q in told.data["machines"][0]["quantities"] for v in q["values"]]
@@ -116,9 +116,9 @@ def test_the_table_and_the_json_hold_the_same_numbers(told, sessions, tmp_path):
         assert bool(row["z"]) is (value["z"] is not None)
         assert float(row["z"] or 0.0) == pytest.approx(value["z"] or 0.0, rel=1e-8)
     assert (tmp_path / "h.csv.provenance.json").exists()
-    refused = call("history", sessions, "--csv", tmp_path / "h.csv")
+    refused = call("history", sessions, "--table", tmp_path / "h.csv")
     assert (refused.code, "exists already" in refused.err) == (FAILED, True)
-    assert call("history", sessions, "--csv", tmp_path / "h.csv", "--force").code == DONE
+    assert call("history", sessions, "--table", tmp_path / "h.csv", "--force").code == DONE
 
 
 def test_the_second_time_says_the_same_and_reads_no_recording(told, sessions, monkeypatch):
@@ -161,7 +161,7 @@ def test_several_processes_give_the_same(few, monkeypatch):
     monkeypatch.setattr("dbbstation.tasks.histories.RUNS_WORTH_PROCESSES", 1)
     monkeypatch.setattr("os.cpu_count", lambda: 2)
     monkeypatch.setattr("dbbstation.tasks.session_figures.session_figures", None)
-    again = call("history", few, "--json", "--rebuild")
+    again = call("history", few, "--json", "--anew")
     assert (again.out, again.err) == (before.out, before.err)
     assert [one["name"] for one in again.data["left_out"]] == ["w003"]
 
@@ -180,7 +180,7 @@ def test_a_recording_that_is_damaged_afterwards_is_noticed_at_once(few):
     before = call("history", few, "--json").data["left_out"]
     run = few / "w003" / "runs" / "a-cw-2.csv"
     run.write_bytes(run.read_bytes()[:-40])
-    for more in ((), ("--rebuild",)):
+    for more in ((), ("--anew",)):
         found = call("history", few, "--json", *more).data["left_out"]
         assert [one["name"] for one in found] == [*(one["name"] for one in before), "w003"]
 
@@ -329,7 +329,7 @@ def test_a_folder_without_sessions_is_refused(kind, tmp_path, few):
 
 
 def test_a_test_that_no_session_has_is_refused(few):
-    outcome = call("history", few, "--test", "zz")
+    outcome = call("history", few, "--tests", "zz")
     assert (outcome.code, "no session has a test zz; tests are a" in outcome.err) == (FAILED, True)
 
 
@@ -382,7 +382,7 @@ class Page(html.parser.HTMLParser):
 
 
 def test_the_page_stands_alone_and_draws_every_quantity(sessions, told, tmp_path):
-    assert call("history", sessions, "--html", tmp_path / "h.html").code == DONE
+    assert call("history", sessions, "--page", tmp_path / "h.html").code == DONE
     text = (tmp_path / "h.html").read_text("utf-8")
     page = Page()
     page.feed(text)
@@ -393,7 +393,7 @@ def test_the_page_stands_alone_and_draws_every_quantity(sessions, told, tmp_path
     assert text.count("<svg") == len(told.data["machines"][0]["quantities"])
     assert text.count('class="event changed"') == 2
     again = tmp_path / "again.html"
-    assert call("history", sessions, "--html", again).code == DONE
+    assert call("history", sessions, "--page", again).code == DONE
     assert again.read_text("utf-8") == text
 
 
@@ -402,7 +402,7 @@ def test_what_people_typed_is_escaped(few, tmp_path):
     for folder in few.iterdir():
         edit(folder, "PM600-0007", evil)
     shutil.move(few / "w002", few / "<b>w")
-    assert call("history", few, "--html", tmp_path / "h.html").code == DONE
+    assert call("history", few, "--page", tmp_path / "h.html").code == DONE
     text = (tmp_path / "h.html").read_text("utf-8")
     assert "<script" not in text
     assert "<b>w" not in text
@@ -412,6 +412,6 @@ def test_what_people_typed_is_escaped(few, tmp_path):
 def test_a_result_never_takes_the_place_of_a_session_file(few):
     target = few / "w001" / "session.yaml"
     before = target.read_bytes()
-    outcome = call("history", few, "--html", target, "--force")
+    outcome = call("history", few, "--page", target, "--force")
     assert outcome.code == FAILED
     assert target.read_bytes() == before

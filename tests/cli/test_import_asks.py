@@ -39,7 +39,7 @@ def runs_of(folder):
             "old.csv",
             "angle_deg,deviation_um,when",
             ",20.11.2026 08:04",
-            ["--column", "when=started", "--zone", "+01:00"],
+            ["--columns", "when=started", "--zone", "+01:00"],
         ),
     ],
 )
@@ -118,7 +118,7 @@ def test_runs_with_pauses_between_them_are_named_in_order(run, tmp_path):
 def test_a_column_that_counts_runs_parts_them(run, tmp_path):
     rows = [f"a-ccw,{row}" for row in FROM] + [f"a-cw,{row}" for row in BACK]
     file = table(tmp_path / "old.csv", rows, "Messung,angle_deg,deviation_um")
-    done = taken(run, file, tmp_path / "s", "--column", "Messung=run")
+    done = taken(run, file, tmp_path / "s", "--columns", "Messung=run")
     assert done.code == DONE, done.err
     assert list(runs_of(tmp_path / "s")[0]) == ["a-ccw-1", "a-cw-1"]
 

@@ -190,7 +190,7 @@ def test_options_say_how_numbers_are_written_before_the_shop_and_not_beside_a_ma
 
 def test_what_this_program_exported_has_dots_whatever_the_shop_writes(run, tmp_path):
     out, told = tmp_path / "x.csv", settings(tmp_path, ",", ";")
-    assert run("export", FIXTURES / "sessions" / "small", "--test", "a", "--out", out).code == DONE
+    assert run("export", FIXTURES / "sessions" / "small", "--tests", "a", "--out", out).code == DONE
     words = ["--out", tmp_path / "s", *WHERE, *UNKNOWN, "--yes", "--dry-run"]
     found = run("--settings", told, "import", out, *words)
     assert found.code == DONE, found.err
@@ -256,8 +256,8 @@ def test_other_faults_of_words_are_answered(run, tmp_path):
     assert "no run of the plan" in run(*words, "--zero-mm", "150", "--run", "old.csv=zz-ccw").err
     assert "names 0 of the files" in run(*words, "--zero-mm", "150", "--run", "new.csv=a").err
     assert "nothing says which test" in run(*words, "--zero-mm", "150").err
-    assert "--column angel=angle:deg: the columns are" in run(*words, "--column", "angel=angle:deg").err
-    assert "write NAME=MEANING" in run(*words, "--column", "angle_deg=angle:mm").err
+    assert "--columns angel=angle:deg: the columns are" in run(*words, "--columns", "angel=angle:deg").err
+    assert "write NAME=MEANING" in run(*words, "--columns", "angle_deg=angle:mm").err
     latin = tmp_path / "latin.csv"
     latin.write_bytes("Winkel [°],Abweichung [µm]\n".encode("cp1252") + "\n".join(rows).encode())
     refused = run("import", latin, "--out", tmp_path / "s")

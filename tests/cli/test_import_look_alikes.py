@@ -117,11 +117,11 @@ def test_what_is_not_understood_is_refused_with_its_line(run, tmp_path, kind):
 @pytest.mark.parametrize(
     ("head", "asks"),
     [
-        ("X [mm];Y [mm]", "--column 'NAME=deviation:µm'"),
+        ("X [mm];Y [mm]", "--columns 'NAME=deviation:µm'"),
         ("Angle (°);CCW (µm)", "these are not understood: CCW (µm)"),
-        ("angle;deviation", "--column 'deviation=deviation:UNIT'"),
-        ("angle_gon;deviation_um", "--column 'angle_gon=angle:UNIT'"),
-        ("Drehlage;deviation_um", "not understood: Drehlage, say --column 'NAME=angle:deg'"),
+        ("angle;deviation", "--columns 'deviation=deviation:UNIT'"),
+        ("angle_gon;deviation_um", "--columns 'angle_gon=angle:UNIT'"),
+        ("Drehlage;deviation_um", "not understood: Drehlage, say --columns 'NAME=angle:deg'"),
     ],
 )
 def test_what_a_column_means_is_asked_for(run, tmp_path, head, asks):

@@ -47,7 +47,7 @@ def test_predict_and_compensate_use_it_and_say_so(kept, run, tmp_path):
     _, model = kept
     poses = tmp_path / "poses.csv"
     poses.write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n", encoding="utf-8")
-    predicted = run("predict", "--model", model, "--poses", poses, "--out", tmp_path / "actual.csv", "--json")
+    predicted = run("predict", "--model", model, poses, "--table", tmp_path / "actual.csv", "--json")
     assert predicted.code == 0, predicted.err
     assert predicted.data["unknown_causes"] == ["unexplained-wave"]
     assert "unexplained-wave, an error whose cause is unknown" in predicted.err

@@ -113,7 +113,7 @@ def test_what_rows_cannot_say_is_noted(run, tmp_path):
 
 def test_a_program_reads_the_same_and_the_files_hold_it(run, warm, tmp_path):
     out, figure = tmp_path / "out.csv", tmp_path / "figure.svg"
-    outcome = run("mismatch", warm, *QUICK, "--json", "--out", out, "--figure", figure)
+    outcome = run("mismatch", warm, *QUICK, "--json", "--table", out, "--figure", figure)
     assert outcome.code == DONE
     data = outcome.data
     assert data["mismatch"] is True
@@ -129,10 +129,10 @@ def test_a_program_reads_the_same_and_the_files_hold_it(run, warm, tmp_path):
     assert np.allclose(left, [float(row["left_mm"]) for row in written], atol=1e-6)
     assert np.sqrt(np.mean(left**2)) == pytest.approx(data["residual_rms"]["after"], rel=1e-3)
     assert figure.read_bytes().count(b"<svg") == 1
-    again = run("mismatch", warm, *QUICK, "--out", out)
+    again = run("mismatch", warm, *QUICK, "--table", out)
     assert again.code == FAILED
     assert "--force" in again.err
-    assert run("mismatch", warm, *QUICK, "--out", out, "--force").code == DONE
+    assert run("mismatch", warm, *QUICK, "--table", out, "--force").code == DONE
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +147,7 @@ def bent(tmp_path_factory):
 
 
 def test_what_predicts_worse_than_the_simulation_is_said_first_and_no_correction_is_offered(run, bent, tmp_path):
-    outcome = run("mismatch", bent, *COLUMNS, "--out", tmp_path / "corrected.csv")
+    outcome = run("mismatch", bent, *COLUMNS, "--table", tmp_path / "corrected.csv")
     first, *others = outcome.out.splitlines()
     assert outcome.code == FAILED
     assert (
@@ -194,7 +194,7 @@ def test_units_may_be_stated_and_variables_chosen(run, warm, tmp_path):
 
 def test_physics_of_ones_own(run):
     folder = shipped_folder("fixtures")
-    source = ("--source-file", folder / "sources" / "screw_expansion.py")
+    source = ("--source-files", folder / "sources" / "screw_expansion.py")
     data = run("mismatch", folder / "tables" / "axis.csv", *QUICK, *source, "--json").data
     (own,) = [f for f in data["findings"] if f["name"] == "screw-expansion"]
     assert own["verdict"] == "identified"
@@ -208,7 +208,7 @@ def test_physics_that_lacks_a_column_is_said(run, warm, tmp_path):
     path = tmp_path / "bare.csv"
     path.write_text(warm.read_text().replace("oil_temp_c", "oil"))
     source = shipped_folder("fixtures") / "sources" / "screw_expansion.py"
-    outcome = run("mismatch", path, *QUICK, "--source-file", source, "--json")
+    outcome = run("mismatch", path, *QUICK, "--source-files", source, "--json")
     assert "screw-expansion cannot be asked: the table has no column oil_temp_c" in outcome.err
     assert "screw-expansion" in outcome.data["not_asked"]
 
@@ -282,8 +282,8 @@ def test_what_cannot_be_used_is_left_out_and_said(run, warm, tmp_path):
 def test_a_table_with_decimal_commas_says_the_same(run, warm, tmp_path):
     german, out, plain = tmp_path / warm.name, tmp_path / "out.csv", tmp_path / "plain.csv"
     german.write_text(warm.read_text().replace(",", ";").replace(".", ","))
-    told = run("mismatch", german, *QUICK, "--decimal", ",", "--out", out, "--json").data
-    expected = run("mismatch", warm, *QUICK, "--out", plain, "--json").data
+    told = run("mismatch", german, *QUICK, "--decimal", ",", "--table", out, "--json").data
+    expected = run("mismatch", warm, *QUICK, "--table", plain, "--json").data
     assert told["findings"] == expected["findings"]
     assert out.read_text() == plain.read_text()
     outcome = run("mismatch", german, *QUICK)
@@ -294,7 +294,7 @@ def test_a_table_with_decimal_commas_says_the_same(run, warm, tmp_path):
 def test_the_table_says_where_it_comes_from(run, warm, tmp_path):
     out = tmp_path / "out.csv"
     table = shutil.copy(warm, tmp_path / "another.csv")  # that nobody has read yet
-    assert run("mismatch", table, *QUICK, "--out", out).code == DONE
+    assert run("mismatch", table, *QUICK, "--table", out).code == DONE
     told = json.loads((tmp_path / "out.csv.provenance.json").read_text())
     assert list(told["inputs"].values()) == [hashlib.sha256(warm.read_bytes()).hexdigest()]
     assert told["command"].startswith("dbbstation mismatch")

@@ -67,7 +67,7 @@ def decay(tmp_path):
 @pytest.mark.slow
 def test_the_drag_of_the_example_is_found_and_written(run, tmp_path):
     out, corrected, figure = (tmp_path / name for name in ("missing.py", "corrected.csv", "figure.svg"))
-    outcome = run(*ASKED, "--no-held-out", "--json", "--out", out, "--corrected", corrected, "--figure", figure)
+    outcome = run(*ASKED, "--no-held-out", "--json", "--out", out, "--table", corrected, "--figure", figure)
     assert outcome.code == 0, outcome.err
     (found,) = [f for f in outcome.data["findings"] if f["verdict"] == "identified"]
     assert found["name"] == "quadratic drag of speed at shaft"
@@ -206,7 +206,7 @@ def test_physics_of_ones_own_competes_at_its_port(run, decay, tmp_path):
     (tmp_path / "run.csv").write_text(f"t_s,level_m\n{rows}\n")
     (tmp_path / "outlet.py").write_text(OUTLET)
     out = tmp_path / "missing.py"
-    outcome = run(*asked, "--source-file", tmp_path / "outlet.py", "--json", "--out", out)
+    outcome = run(*asked, "--source-files", tmp_path / "outlet.py", "--json", "--out", out)
     assert outcome.code == 0, outcome.err
     (found,) = [f for f in outcome.data["findings"] if f["name"].startswith("outlet")]
     assert found["verdict"] == "identified"
@@ -233,7 +233,7 @@ def test_physics_of_ones_own_competes_at_its_port(run, decay, tmp_path):
 def test_a_fault_of_ones_own_physics_is_told_with_its_line(run, decay, tmp_path, fault, line, said):
     asked = decay()
     (tmp_path / "outlet.py").write_text(OUTLET.replace(*fault))
-    outcome = run(*asked, "--source-file", tmp_path / "outlet.py")
+    outcome = run(*asked, "--source-files", tmp_path / "outlet.py")
     assert outcome.code == 1
     assert f"outlet.py:{line}" in outcome.err
     assert said in outcome.err

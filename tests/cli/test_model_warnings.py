@@ -32,7 +32,7 @@ def failed(tmp_path):
 def test_predict_says_it(failed, run, tmp_path):
     poses = tmp_path / "poses.csv"
     poses.write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n", encoding="utf-8")
-    done = run("predict", "--model", failed, "--poses", poses, "--out", tmp_path / "actual.csv", "--json")
+    done = run("predict", "--model", failed, poses, "--table", tmp_path / "actual.csv", "--json")
     assert done.code == 0, done.err
     assert SAID in done.err
     assert [SAID in text for text in done.data["model_warnings"]] == [True]
@@ -52,7 +52,7 @@ def test_compensate_says_it(failed, run, tmp_path):
 
 
 def test_programs_say_it(failed, run, tmp_path):
-    given = ("--plan", PLAN, "--machine", MACHINE, "--model", failed, "--test", "a", "--prefer", "accuracy")
+    given = ("--plan", PLAN, "--machine", MACHINE, "--model", failed, "--tests", "a", "--prefer", "accuracy")
     done = run("program", *given, "--out", tmp_path / "nc", "--json")
     assert done.code == 0, done.err
     assert SAID in done.err
@@ -70,7 +70,7 @@ def test_evaluate_says_it(failed, run):
 
 def page_of(run, model, folder):
     out = folder / "report.html"
-    done = run("report", SMALL, "--model", model, "--out", out, "--json")
+    done = run("report", SMALL, "--model", model, "--page", out, "--json")
     assert done.code == 0, done.err
     return Page(out.read_text("utf-8")).text, done.data
 

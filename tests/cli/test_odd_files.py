@@ -64,7 +64,7 @@ def test_digits_of_another_script_are_no_number(tmp_path, head, rows, cell):
         command = ["mismatch", file, "--measured", "measured", "--simulated", "simulated"]
     elif "a_deg" in head:
         model = FIXTURES / "models" / "small.yaml"
-        command = ["predict", "--model", model, "--poses", file, "--out", tmp_path / "out.csv"]
+        command = ["predict", "--model", model, file, "--table", tmp_path / "out.csv"]
     assert f"{file}:2" in told(*command)
 
 
@@ -73,7 +73,7 @@ def test_times_of_a_byte_log_that_are_none(tmp_path, t_s):
     log = tmp_path / "log.txt"
     log.write_text(f"# dbb-byte-log/1\n# instrument: mahr-c1202\n{t_s} < 41\n0.2 < 42\n", encoding="utf-8")
     for more in ([], ["--json"]):
-        assert f"{log}:3:1: this line of the byte log cannot be read" in told("replay", log, *more)
+        assert f"{log}:3:1: this line of the byte log cannot be read" in told("instrument", "replay", log, *more)
 
 
 def scaled(tmp_path, column, power):
@@ -147,13 +147,13 @@ def circle_of_links(tmp_path):
         ["session", "list", "LOOP"],
         ["session", "reject", "LOOP", "a-ccw-1", "--reason", "x"],
         ["export", "SESSION", "--out", "LOOP"],
-        ["circles", "SESSION", "--csv", "LOOP"],
+        ["circles", "SESSION", "--table", "LOOP"],
         ["history", "LOOP"],
-        ["sources", "--source-file", "LOOP"],
-        ["replay", "LOOP"],
-        ["instruments", "LOOP"],
+        ["sources", "--source-files", "LOOP"],
+        ["instrument", "replay", "LOOP"],
+        ["instrument", "list", "LOOP"],
         ["settings", "--settings", "LOOP"],
-        ["monitor", "--instrument", "mahr-c1202", "--zero-mm", "150", "--port", "LOOP", "--count", "1"],
+        ["instrument", "monitor", "--instrument", "mahr-c1202", "--zero-mm", "150", "--port", "LOOP", "--count", "1"],
     ],
     ids=" ".join,
 )
@@ -166,7 +166,7 @@ def test_links_that_lead_in_a_circle(session, circle_of_links, command):
 
 @pytest.mark.parametrize(
     "command",
-    [["circles", "SESSION", "--csv", ""], ["export", "SESSION", "--out", ""], ["calibrate", "SESSION", "--out", ""]],
+    [["circles", "SESSION", "--table", ""], ["export", "SESSION", "--out", ""], ["calibrate", "SESSION", "--out", ""]],
 )
 def test_an_output_without_a_name(session, command):
     outcome = call(*(session if word == "SESSION" else word for word in command))
@@ -204,12 +204,12 @@ def named_otherwise(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "line",
     [
-        "calibrate s? --out out?.yaml --source-file own?.py --json",
-        "circles s? --csv out?.csv --findings --model m?.yaml",
+        "calibrate s? --out out?.yaml --source-files own?.py --json",
+        "circles s? --table out?.csv --findings --model m?.yaml",
         "evaluate s? --model m?.yaml",
         "export s? --out out?.csv",
-        "history . --csv out?.csv --html out?.html",
-        "report s? --out out?.html",
+        "history . --table out?.csv --page out?.html",
+        "report s? --page out?.html",
         "session list s?",
         "session reject s? a-ccw-1 --reason chip",
         "session seal s?",

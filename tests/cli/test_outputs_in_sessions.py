@@ -24,33 +24,36 @@ from tests.cli.conftest import call
 FIXTURES, PLANS = shipped_folder("fixtures"), shipped_folder("protocols") / "plans"
 MACHINE, MODEL = FIXTURES / "machines" / "reference.yaml", FIXTURES / "models" / "small.yaml"
 DRIVE, TABLE = FIXTURES / "drives" / "strut.csv", FIXTURES / "tables" / "axis.csv"
+PENDULUM = FIXTURES / "simulators"
 RUN = "runs/a-ccw-1.csv"
 
 OF_FILES = {
     "calibrate --out": ["calibrate", "{h}/one", "--out"],
     "calibrate --figure": ["calibrate", "{h}/one", "--figure"],
-    "circles --csv": ["circles", "{h}/one", "--csv"],
+    "circles --table": ["circles", "{h}/one", "--table"],
     "compare --figure": ["compare", "{h}/one", "{h}/one", "--figure"],
     "compensate --out": ["compensate", FIXTURES / "programs" / "none.ngc", "--model", MODEL, "--out"],
     "diagnose --out": ["diagnose", "{h}/one", "--out"],
     "diagnose --figure": ["diagnose", "{h}/one", "--figure"],
-    "drive --out": ["drive", DRIVE, "--out"],
-    "drive --figure": ["drive", DRIVE, "--figure"],
+    "identify --table": ["identify", DRIVE, "--table"],
+    "identify --figure": ["identify", DRIVE, "--figure"],
     "export --out": ["export", "{h}/one", "--out"],
-    "history --html": ["history", "{h}", "--html"],
-    "history --csv": ["history", "{h}", "--csv"],
-    "mismatch --out": ["mismatch", TABLE, "--measured", "measured_um", "--simulated", "simulated_um", "--out"],
+    "history --page": ["history", "{h}", "--page"],
+    "history --table": ["history", "{h}", "--table"],
+    "mismatch --table": ["mismatch", TABLE, "--measured", "measured_um", "--simulated", "simulated_um", "--table"],
+    "mismatch --out": ["mismatch", PENDULUM / "pendulum.csv", "--simulator", PENDULUM / "pendulum.yaml", "--out"],
     "mismatch --figure": ["mismatch", TABLE, "--measured", "measured_um", "--simulated", "simulated_um", "--figure"],
     "plot --out": ["plot", "{h}/one", "--out"],
-    "predict --out": ["predict", "--model", MODEL, "--poses", TABLE, "--out"],
-    "report --out": ["report", "{h}/one", "--out"],
-    "report --pdf": ["report", "{h}/one", "--out", "{h}/report.html", "--pdf"],
+    "predict --table": ["predict", "--model", MODEL, TABLE, "--table"],
+    "report --page": ["report", "{h}/one", "--page"],
+    "report --pdf": ["report", "{h}/one", "--page", "{h}/report.html", "--pdf"],
 }
 """Commands that write a file, with all that they need before its name."""
 
 ELSEWHERE = {
     "bar --out", "demo --out", "import --out", "import --mapping", "jig holders --out", "jig sheet --out", "measure --out",
-    "fleet --out", "measure --spy", "monitor --log", "monitor --spy", "program --out", "simulate --out", "station --out", "station --spy",
+    "fleet --out", "fleet --table", "measure --spy", "study sensitivities --table", "control kinematics --out",
+    "control parameters --out", "instrument monitor --log", "instrument monitor --spy", "program --out", "simulate --out", "station --out", "station --spy",
     "study blind --figure", "study concealed-gravity --figure", "study gravity --figure",
 }  # fmt: skip
 """Options whose command needs an instrument or long work before it writes, or that make a session: what they write through is
@@ -89,7 +92,7 @@ def outputs() -> set[str]:
     return found
 
 
-WRITING = {"--out", "--csv", "--html", "--figure", "--pdf", "--spy", "--log", "--mapping"}
+WRITING = {"--out", "--table", "--page", "--figure", "--pdf", "--spy", "--log", "--mapping"}
 
 
 def test_every_option_that_names_an_output_is_in_the_table():
@@ -125,7 +128,15 @@ def test_what_all_of_them_write_through_refuses_it_too(shop: Path, tmp_path: Pat
 
 def test_a_byte_log_goes_elsewhere_too(shop: Path) -> None:
     outcome = call(
-        "monitor", "--instrument", "heidenhain-nd281b", "--port", "none", "--spy", shop / "one" / RUN, "--force"
+        "instrument",
+        "monitor",
+        "--instrument",
+        "heidenhain-nd281b",
+        "--port",
+        "none",
+        "--spy",
+        shop / "one" / RUN,
+        "--force",
     )
     assert outcome.code != 0
     assert (shop / "one" / RUN).read_bytes() == (FIXTURES / "sessions" / "logged" / RUN).read_bytes()
@@ -136,7 +147,6 @@ def test_sealed_runs_and_copies_may_only_be_read(tmp_path: Path) -> None:
         "simulate",
         "--model",
         MODEL,
-        "--plan",
         PLANS / "ten-minute-check.yaml",
         "--out",
         tmp_path / "s",
@@ -171,7 +181,7 @@ def full(tmp_path: Path):
     ("words", "printed"),
     [
         (["session", "reject", "session", "a-ccw-1", "--reason", "chip"], False),
-        (["circles", "session", "--csv", "table.csv"], False),
+        (["circles", "session", "--table", "table.csv"], False),
         (["session", "list", "session"], True),
     ],
 )

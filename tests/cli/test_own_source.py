@@ -55,12 +55,12 @@ def truth(tmp_path_factory):
 
 
 def test_it_is_simulated_as_the_independent_machine_moves(truth, run, tmp_path):
-    line = ("simulate", "--model", truth, "--plan", PLANS / "table2.yaml", "--out", tmp_path / "s")
+    line = ("simulate", "--model", truth, PLANS / "table2.yaml", "--out", tmp_path / "s")
     refused = run(*line)
     assert refused.code == FAILED
     assert "no error source is called `scale-bow`" in refused.err
-    assert "one of your own is given with --source-file FILE.py, or its package installed" in refused.err
-    done = run(*line, "--source-file", EXAMPLE)
+    assert "one of your own is given with --source-files FILE.py, or its package installed" in refused.err
+    done = run(*line, "--source-files", EXAMPLE)
     assert done.code == 0, done.err
     simulated = load_sessions([tmp_path / "s"])
     true = {f"{r.slot.test.name}-{r.slot.direction}": r for r in true_runs(table_ii_plan(1), [BowedScales()])}
@@ -81,7 +81,7 @@ def test_the_diagnosis_names_it_and_the_joint_model_is_read_with_its_file(bowed,
     session = bowed
     joint = tmp_path / "joint.yaml"
     asked = ("--sources", "gravity,backlash,screw-lead,scale-bow")
-    found = run("diagnose", session, "--source-file", EXAMPLE, *asked, "--out", joint, "--json")
+    found = run("diagnose", session, "--source-files", EXAMPLE, *asked, "--out", joint, "--json")
     assert found.code == 0, found.err
     (first, *_) = found.data["sources"]
     assert (first["name"], first["verdict"]) == ("scale-bow", "identified")
@@ -90,9 +90,9 @@ def test_the_diagnosis_names_it_and_the_joint_model_is_read_with_its_file(bowed,
     assert np.all(np.abs(values - BOW_UM) < 4 * np.array(sigma) + 0.5)
     poses = tmp_path / "poses.csv"
     poses.write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n50,20,-1100,5,0,0\n", encoding="utf-8")
-    with_model = ("predict", "--model", joint, "--poses", poses, "--out", tmp_path / "actual.csv")
-    assert "--source-file" in run(*with_model).err
-    assert run(*with_model, "--source-file", EXAMPLE).code == 0
+    with_model = ("predict", "--model", joint, poses, "--table", tmp_path / "actual.csv")
+    assert "--source-files" in run(*with_model).err
+    assert run(*with_model, "--source-files", EXAMPLE).code == 0
 
 
 @pytest.mark.parametrize("command", ["check", "evaluate", "program", "compensate"])
@@ -113,7 +113,7 @@ def test_whatever_reads_a_model_says_what_is_missing_and_takes_the_file(bowed, t
             machine,
             "--model",
             model,
-            "--test",
+            "--tests",
             "a",
             "--step-deg",
             "5",
@@ -123,21 +123,21 @@ def test_whatever_reads_a_model_says_what_is_missing_and_takes_the_file(bowed, t
     out = {"program": ("--out", tmp_path / "out"), "compensate": ("--out", tmp_path / "out.ngc")}.get(command, ())
     refused = run(*line, *out)
     assert refused.code == FAILED
-    assert "--source-file" in refused.err
-    taken = run(*line, *out, "--source-file", EXAMPLE)
+    assert "--source-files" in refused.err
+    taken = run(*line, *out, "--source-files", EXAMPLE)
     assert taken.code == 0, taken.err
 
 
 def test_calibrate_fits_it_where_it_is_named(bowed, run):
     session = bowed
     sources = "strut-reference-length,base-joints,scale-bow"
-    fitted = run("calibrate", session, "--source-file", EXAMPLE, "--sources", sources, "--json")
+    fitted = run("calibrate", session, "--source-files", EXAMPLE, "--sources", sources, "--json")
     assert fitted.code == 0, fitted.err
     (bow,) = [source for source in fitted.data["sources"] if source["name"] == "scale-bow"]
     values = np.array([number["value"] for number in bow["parameters"].values()])
     sigma = np.array([number["uncertainty"] for number in bow["parameters"].values()])
     assert np.abs(values - BOW_UM).max() < 4.0 * sigma.max()
-    assert "scale-bow is known now, but not fitted" in run("calibrate", session, "--source-file", EXAMPLE).err
+    assert "scale-bow is known now, but not fitted" in run("calibrate", session, "--source-files", EXAMPLE).err
     unknown = run("calibrate", session, "--sources", sources)
     assert unknown.code == FAILED
-    assert "--source-file" in unknown.err
+    assert "--source-files" in unknown.err

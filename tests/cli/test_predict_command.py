@@ -42,7 +42,7 @@ def predicted(run, level, tmp_path_factory):
         model, out = folder / f"{name}.yaml", folder / f"{name}.csv"
         calibrated = run("calibrate", session, "--out", model, "--json")
         assert calibrated.code == DONE, calibrated.err
-        line = ("predict", "--model", model, "--poses", folder / "in.csv", "--out", out, "--force")
+        line = ("predict", "--model", model, folder / "in.csv", "--table", out, "--force")
         told, said = run(*line, "--json"), run(*line)
         assert (told.code, said.code) == (DONE, DONE), told.err
         with out.open(newline="") as file:
@@ -105,7 +105,7 @@ def test_the_header_of_a_compensated_program_says_what_is_not_known(predicted, r
 def test_the_report_states_no_uncertainty_of_such_a_parameter(predicted, run, level, tmp_path):
     model, *_ = predicted["unknown"]
     page = tmp_path / "report.html"
-    made = run("report", level, "--model", model, "--out", page)
+    made = run("report", level, "--model", model, "--page", page)
     assert made.code == DONE, made.err
     text = page.read_text(encoding="utf-8")
     assert "Not visible, held at nominal: all six base joints together along Z" in text

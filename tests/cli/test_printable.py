@@ -167,7 +167,8 @@ def test_no_command_passes_orders_on_to_the_terminal(session, line):
 
 
 @pytest.mark.parametrize(
-    "line", [["history", "{t}", "--csv", "{o}"], ["circles", "{s}", "--csv", "{o}"], ["export", "{s}", "--out", "{o}"]]
+    "line",
+    [["history", "{t}", "--table", "{o}"], ["circles", "{s}", "--table", "{o}"], ["export", "{s}", "--out", "{o}"]],
 )
 def test_no_table_holds_a_formula(session, tmp_path, line):
     out = tmp_path / "out.csv"
@@ -227,7 +228,7 @@ def test_no_name_in_a_file_makes_a_line_of_its_own(tmp_path, kind):
         ("mountings", "jig holders s.csv --jig sound/jig.yaml --out NAME", None),
         ("session small", "export NAME --out NAME.csv", "s"),
         ("session begun", "check NAME", "s"),
-        ("session begun", "report NAME --out NAME.html", "s"),
+        ("session begun", "report NAME --page NAME.html", "s"),
         ("session begun", "evaluate NAME --model sound/model.yaml", "s"),
         ("byte log", "replay NAME", "log.txt"),
         ("table", "mismatch NAME --measured a --simulated b", "t.csv"),

@@ -28,8 +28,8 @@ def test_monitor_takes_a_profile_and_spies_and_replay_knows_both(run, tmp_path: 
     spy = tmp_path / "bytes.txt"
     with VirtualInstrument(OLD, lambda _: 150.0) as virtual:
         line = ("--instrument", "streaming-encoder", "--profile", "no-checksum", "--port", virtual.port)
-        outcome = run("monitor", *line, "--count", "5", "--json", "--spy", spy)
-        again = run("monitor", *line, "--count", "1", "--spy", spy)
+        outcome = run("instrument", "monitor", *line, "--count", "5", "--json", "--spy", spy)
+        again = run("instrument", "monitor", *line, "--count", "1", "--spy", spy)
     assert outcome.code == DONE, outcome.err
     rows = rows_of(outcome.out)
     assert [row["length_mm"] for row in rows[:-1]] == [150.0] * 5
@@ -37,17 +37,17 @@ def test_monitor_takes_a_profile_and_spies_and_replay_knows_both(run, tmp_path: 
     assert again.code == FAILED
     assert "exists already" in again.err
     assert "# instrument: streaming-encoder\n# profile: no-checksum\n" in spy.read_text()
-    replayed = run("replay", spy, "--json")
+    replayed = run("instrument", "replay", spy, "--json")
     assert [one["length_mm"] for one in replayed.data["readings"]][:5] == [150.0] * 5
-    assert not run("replay", spy, "--profile", "crc", "--json").data["readings"]
+    assert not run("instrument", "replay", spy, "--profile", "crc", "--json").data["readings"]
 
 
 def test_a_relative_display_is_read_from_its_zero(run):
     gauge = with_zero(load_instrument("tesa-tt80"), 150.0)
     with VirtualInstrument(gauge, lambda _: 150.0003, clock=ScaledClock(5)) as virtual:
         line = ("--instrument", "tesa-tt80", "--port", virtual.port, "--count", "2", "--json")
-        missing = run("monitor", *line)
-        outcome = run("monitor", *line, "--zero-mm", "150.0")
+        missing = run("instrument", "monitor", *line)
+        outcome = run("instrument", "monitor", *line, "--zero-mm", "150.0")
     assert missing.code == FAILED
     assert "give the calibrated length with --zero-mm" in missing.err
     rows = rows_of(outcome.out)
@@ -56,16 +56,16 @@ def test_a_relative_display_is_read_from_its_zero(run):
 
 
 def test_instruments_shows_the_profile_and_names_the_others(run):
-    shown = run("instruments", "keyence-dl-rs1a", "--profile", "gt-70a", "--json").data
+    shown = run("instrument", "list", "keyence-dl-rs1a", "--profile", "gt-70a", "--json").data
     assert shown["profile"] == "gt-70a"
     assert shown["profiles"] == ["gt2", "gt-70a", "il", "il-300"]
     assert (
         "profile   gt-70a (there are gt2, gt-70a, il, il-300)"
-        in run("instruments", "keyence-dl-rs1a", "--profile", "gt-70a").out
+        in run("instrument", "list", "keyence-dl-rs1a", "--profile", "gt-70a").out
     )
-    wrong = run("instruments", "keyence-dl-rs1a", "--profile", "gt-71")
+    wrong = run("instrument", "list", "keyence-dl-rs1a", "--profile", "gt-71")
     assert "did you mean gt-70a?" in wrong.err
-    assert run("instruments", "--profile", "gt-70a").code == USAGE
+    assert run("instrument", "list", "--profile", "gt-70a").code == USAGE
 
 
 def settings(tmp_path: Path, text: str) -> Path:
@@ -77,11 +77,13 @@ def settings(tmp_path: Path, text: str) -> Path:
 def test_settings_have_a_profile_that_belongs_to_their_instrument(run, tmp_path: Path):
     own = settings(tmp_path, "instrument: streaming-encoder\nprofile: no-checksum\n")
     with VirtualInstrument(OLD, lambda _: 150.0) as virtual:
-        taken = run("--settings", own, "monitor", "--port", virtual.port, "--count", "1")
+        taken = run("--settings", own, "instrument", "monitor", "--port", virtual.port, "--count", "1")
     assert taken.code == DONE, taken.err
     assert "--instrument streaming-encoder, --profile no-checksum" in taken.err
     # Another instrument on the command line is not asked for a profile of this one.
-    other = run("--settings", own, "monitor", "--instrument", "heidenhain-nd281b", "--port", "/dev/ttyNONE9")
+    other = run(
+        "--settings", own, "instrument", "monitor", "--instrument", "heidenhain-nd281b", "--port", "/dev/ttyNONE9"
+    )
     assert "there is no such port" in other.err
     alone = run("check", settings(tmp_path, "profile: no-checksum\n"))
     assert alone.code == FAILED

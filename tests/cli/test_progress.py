@@ -250,7 +250,7 @@ def _fail_above(poses):
 INTERRUPTED = {
     "calibrate": ["calibrate", "SESSION", "--out", "model.yaml", "--force"],
     "evaluate": ["evaluate", "SESSION", "--model", MODEL],
-    "predict": ["predict", "--model", MODEL, "--poses", "poses.csv", "--out", "out.csv"],
+    "predict": ["predict", "--model", MODEL, "poses.csv", "--table", "out.csv"],
     "study": ["study", "coverage", "--machines", "50"],
     "program": ["program", "--plan", PLAN, "--machine", MACHINE, "--model", MODEL, "--out", "nc"],
 }

@@ -71,7 +71,7 @@ def test_a_program_names_program_command_and_inputs_once(run, tmp_path):
         MACHINE,
         "--model",
         MODEL,
-        "--test",
+        "--tests",
         "a",
         "--step-deg",
         "1",
@@ -85,7 +85,7 @@ def test_a_program_names_program_command_and_inputs_once(run, tmp_path):
     assert command.startswith(
         "; command: dbbstation program --plan table2.yaml --machine reference.yaml --model small.yaml"
     )
-    assert {"--test a", "--step-deg 1.0"} <= {
+    assert {"--tests a", "--step-deg 1.0"} <= {
         " ".join(pair) for pair in zip(command.split(), command.split()[1:], strict=False)
     }
     for path in (PLAN, MACHINE, MODEL):
@@ -93,7 +93,7 @@ def test_a_program_names_program_command_and_inputs_once(run, tmp_path):
 
 
 def test_a_long_command_is_cut_into_comments_that_controls_take():
-    command = "dbbstation program " + " ".join(f"--test t{k:03}" for k in range(60))
+    command = "dbbstation program " + " ".join(f"--tests t{k:03}" for k in range(60))
     said = Provenance(PROGRAM, command, {"a.yaml": "ab" * 32, "b.yaml": "cd" * 32}).comments(
         {"plan file": f"sha256 {'ab' * 32}"}
     )
@@ -104,14 +104,14 @@ def test_a_long_command_is_cut_into_comments_that_controls_take():
 
 def test_a_table_stays_plain_csv_with_a_file_beside_it(run, tmp_path, poses):
     out = tmp_path / "out.csv"
-    assert run("predict", "--model", MODEL, "--poses", poses, "--out", out).code == DONE
+    assert run("predict", "--model", MODEL, poses, "--table", out).code == DONE
     with out.open(newline="") as file:
         (row,) = csv.DictReader(file)
     assert {"x_mm", "u_z_mm"} <= row.keys()
     beside = json.loads((tmp_path / "out.csv.provenance.json").read_text())
     assert beside == {
         "program": PROGRAM,
-        "command": "dbbstation predict --model small.yaml --poses poses.csv",
+        "command": "dbbstation predict poses.csv --model small.yaml",
         "inputs": {"small.yaml": sha256(MODEL), "poses.csv": sha256(poses)},
     }
 
@@ -119,7 +119,7 @@ def test_a_table_stays_plain_csv_with_a_file_beside_it(run, tmp_path, poses):
 @pytest.mark.parametrize("name", ["out.csv", "out.csv.provenance.json"])
 def test_neither_file_of_a_table_is_overwritten_without_force(run, tmp_path, poses, name):
     (tmp_path / name).write_text("mine")
-    command = ("predict", "--model", MODEL, "--poses", poses, "--out", tmp_path / "out.csv")
+    command = ("predict", "--model", MODEL, poses, "--table", tmp_path / "out.csv")
     outcome = run(*command)
     assert outcome.code == 1
     assert f"{name}: the file exists already" in outcome.err
@@ -176,7 +176,7 @@ def test_the_same_files_elsewhere_give_the_same_bytes(run, tmp_path, poses):
         shutil.copy(poses, folder / "poses.csv")
         done = [
             run("calibrate", folder / "small", "--out", folder / f"{name}.yaml", "--figure", folder / f"{name}.svg"),
-            run("predict", "--model", MODEL, "--poses", folder / "poses.csv", "--out", folder / f"{name}.csv"),
+            run("predict", "--model", MODEL, folder / "poses.csv", "--table", folder / f"{name}.csv"),
         ]
         assert [outcome.code for outcome in done] == [DONE, DONE]
     for ending in ("yaml", "svg", "csv", "csv.provenance.json"):
@@ -202,7 +202,7 @@ def test_options_of_the_settings_stand_in_the_command(run, tmp_path):
         PLAN,
         "--machine",
         MACHINE,
-        "--test",
+        "--tests",
         "a",
         "--out",
         tmp_path / "o",
@@ -211,7 +211,7 @@ def test_options_of_the_settings_stand_in_the_command(run, tmp_path):
         settings,
     )
     told = outcome.data["provenance"]
-    assert told["command"] == "dbbstation program --plan table2.yaml --machine reference.yaml --test a --step-deg 2.0"
+    assert told["command"] == "dbbstation program --plan table2.yaml --machine reference.yaml --tests a --step-deg 2.0"
     assert told["inputs"]["shop.yaml"] == sha256(settings)
 
 

@@ -52,7 +52,7 @@ def better(tmp_path_factory):
 @pytest.fixture(scope="module")
 def written(session, tmp_path_factory):
     out = tmp_path_factory.mktemp("out") / "report.html"
-    outcome = call("report", session, "--out", out, "--json")
+    outcome = call("report", session, "--page", out, "--json")
     assert outcome.code == DONE, outcome.err
     return out.read_text("utf-8"), outcome.data
 
@@ -145,7 +145,7 @@ def test_it_is_sound_html_and_refers_to_nothing_outside(written):
 
 def test_the_same_files_give_the_same_bytes(session, written, tmp_path):
     again = tmp_path / "other-name.html"
-    assert call("report", session, "--out", again, "--json").code == DONE
+    assert call("report", session, "--page", again, "--json").code == DONE
     assert again.read_text("utf-8") == written[0]
 
 
@@ -156,7 +156,7 @@ def test_what_people_typed_is_escaped(session, tmp_path):
         re.sub(r"^name:.*$", f"name: '{EVIL} & \"co\"'", plan.read_text("utf-8"), flags=re.MULTILINE), "utf-8"
     )
     out = tmp_path / "report.html"
-    outcome = call("report", folder, "--job", f"'{EVIL}", "--out", out)
+    outcome = call("report", folder, "--job", f"'{EVIL}", "--page", out)
     assert outcome.code == DONE, outcome.err
     text = out.read_text("utf-8")
     page = Page(text)
@@ -187,7 +187,7 @@ def test_traces_can_be_read_off(session, written):
     points = np.array([p.split(",") for p in re.search(r'ccw" points="([^"]*)"', figure)[1].split()], dtype=float)
     deviation = (np.hypot(*(points - 160.0).T) - radius) / scale
     # Places are given to a tenth of a unit.
-    plain = call("circles", session, "--test", "a", "--json").data["runs"][0]
+    plain = call("circles", session, "--tests", "a", "--json").data["runs"][0]
     assert plain["direction"] == run["direction"]
     assert np.ptp(deviation) == pytest.approx(plain["uncertainty"]["G(LS)"]["as_read_um"], abs=0.2 / scale)
     assert 'data-name="CCW 1"' in figure
@@ -208,7 +208,7 @@ def test_the_first_page_holds_circles_against_the_tolerances(session, written, t
     for largest, kind in ((size["um"], "cannot tell"), (size["um"] + off, "within"), (size["um"] - off, "exceeded")):
         out = tmp_path / f"{kind}.html"
         limits = settings(tmp_path, ("centre-deviation", f"{largest:.5f}"))
-        outcome = call("--settings", limits, "report", session, "--out", out, "--json")
+        outcome = call("--settings", limits, "report", session, "--page", out, "--json")
         assert outcome.data["verdict"]["kind"] == kind
         assert outcome.data["tolerances"][0]["worst"]["test"] == worst["test"]
         assert outcome.data["verdict"]["headline"] in out.read_text("utf-8").replace("&#39;", "'")
@@ -226,7 +226,7 @@ def shown_in_the_median(centre_um, u_um):
 
 def test_before_and_now_stand_side_by_side_as_measured(session, better, tmp_path):
     out = tmp_path / "both.html"
-    outcome = call("report", better, "--before", session, "--out", out, "--json")
+    outcome = call("report", better, "--before", session, "--page", out, "--json")
     assert outcome.code == DONE, outcome.err
     # The offset of which half of all measured ones are shorter than this one: they are longer by their noise.
     centres = {
@@ -255,14 +255,14 @@ def test_before_of_another_machine_is_said(session, tmp_path):
     joint = re.search(r"base_joints_mm:\D*(-?\d+\.\d+)", text)
     machine.write_text(text[: joint.start(1)] + f"{float(joint[1]) + 1.0:.6f}" + text[joint.end(1) :], "utf-8")
     out = tmp_path / "other.html"
-    outcome = call("report", session, "--before", folder, "--out", out)
+    outcome = call("report", session, "--before", folder, "--page", out)
     assert outcome.code == DONE, outcome.err
     assert "The session before is of another nominal machine" in out.read_text("utf-8")
 
 
 def test_a_model_stands_beside(tmp_path):
     out = tmp_path / "model.html"
-    outcome = call("report", SMALL, "--model", MODEL, "--out", out, "--json")
+    outcome = call("report", SMALL, "--model", MODEL, "--page", out, "--json")
     assert outcome.code == DONE, outcome.err
     evaluated = call("evaluate", SMALL, "--model", MODEL, "--json").data
     assert outcome.data["model"]["runs"] == evaluated["runs"]
@@ -282,7 +282,7 @@ def test_each_recording_is_read_once(tmp_path, monkeypatch):
         return read_run(path, sha256=sha256)
 
     monkeypatch.setattr("dbbstation.files.recordings.session.read_run", read)
-    outcome = call("report", SMALL, "--before", before, "--model", MODEL, "--out", tmp_path / "report.html")
+    outcome = call("report", SMALL, "--before", before, "--model", MODEL, "--page", tmp_path / "report.html")
     assert outcome.code == 0, outcome.err
     assert len(counted) == 12
     assert set(counted.values()) == {1}
@@ -302,7 +302,7 @@ def test_one_direction_only(session, tmp_path):
     text = re.sub(r"(direction: \"?cw.*state: \"?)accepted", r"\1rejected", path.read_text("utf-8"))
     path.write_text(text, "utf-8")
     out = tmp_path / "one.html"
-    outcome = call("report", folder, "--out", out, "--json")
+    outcome = call("report", folder, "--page", out, "--json")
     assert outcome.code == DONE, outcome.err
     assert {run["direction"] for run in outcome.data["circles"]["runs"]} == {"ccw"}
     assert "No test was measured in both directions" in Page(out.read_text("utf-8")).text
@@ -312,7 +312,7 @@ def test_no_accepted_run_is_said(session, tmp_path):
     folder = copy_of(session, tmp_path)
     path = folder / "session.yaml"
     path.write_text(re.sub(r"(state: \"?)accepted", r"\1rejected", path.read_text("utf-8")), "utf-8")
-    outcome = call("report", folder, "--out", tmp_path / "none.html")
+    outcome = call("report", folder, "--page", tmp_path / "none.html")
     assert outcome.code == FAILED
     assert "no accepted run is left" in outcome.err
     assert not (tmp_path / "none.html").exists()
@@ -321,17 +321,17 @@ def test_no_accepted_run_is_said(session, tmp_path):
 def test_no_file_is_replaced_without_force(session, tmp_path):
     out = tmp_path / "there.html"
     out.write_text("mine")
-    refused = call("report", session, "--out", out)
+    refused = call("report", session, "--page", out)
     assert refused.code == FAILED
     assert "--force" in refused.err
     assert out.read_text() == "mine"
-    assert call("report", session, "--test", "a", "--out", out, "--force").code == DONE
+    assert call("report", session, "--tests", "a", "--page", out, "--force").code == DONE
 
 
 def test_a_pdf_needs_a_browser_and_says_which(session, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("DBBSTATION_CHROMIUM", raising=False)
-    refused = call("report", session, "--out", tmp_path / "r.html", "--pdf", tmp_path / "r.pdf")
+    refused = call("report", session, "--page", tmp_path / "r.html", "--pdf", tmp_path / "r.pdf")
     assert refused.code == FAILED
     assert "install Chromium" in refused.err
     assert not (tmp_path / "r.html").exists()
@@ -340,7 +340,19 @@ def test_a_pdf_needs_a_browser_and_says_which(session, tmp_path, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.skipif(None in map(shutil.which, ("chromium", "unshare")), reason="no Chromium, or no unshare")
 def test_a_pdf_needs_no_network(session, tmp_path):
-    words = [sys.executable, "-m", "dbbstation", "report", session, "--test", "a", "--out", "r.html", "--pdf", "r.pdf"]
+    words = [
+        sys.executable,
+        "-m",
+        "dbbstation",
+        "report",
+        session,
+        "--tests",
+        "a",
+        "--page",
+        "r.html",
+        "--pdf",
+        "r.pdf",
+    ]
     alone = ["unshare", "--map-root-user", "--net", "--", *map(str, words)]
     if subprocess.run([*alone[:4], "true"], capture_output=True, check=False).returncode:
         pytest.skip("this system gives no namespace without a network")
@@ -360,11 +372,11 @@ def test_a_browser_prints(session, tmp_path, monkeypatch):
     )
     browser.chmod(browser.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("DBBSTATION_CHROMIUM", str(browser))
-    outcome = call("report", session, "--test", "a", "--out", tmp_path / "r.html", "--pdf", tmp_path / "r.pdf")
+    outcome = call("report", session, "--tests", "a", "--page", tmp_path / "r.html", "--pdf", tmp_path / "r.pdf")
     assert outcome.code == DONE, outcome.err
     assert (tmp_path / "r.pdf").read_bytes() == b"%PDF"
     browser.write_text("#!/bin/sh\necho no display >&2\nexit 3\n")
-    failed = call("report", session, "--test", "a", "--out", tmp_path / "s.html", "--pdf", tmp_path / "s.pdf")
+    failed = call("report", session, "--tests", "a", "--page", tmp_path / "s.html", "--pdf", tmp_path / "s.pdf")
     assert failed.code == FAILED
     assert "did not print: no display" in failed.err
 
@@ -372,7 +384,7 @@ def test_a_browser_prints(session, tmp_path, monkeypatch):
 def test_each_test_is_held_against_the_tolerances_before_and_now(session, better, tmp_path):
     """By hand from the figures of each circle: the decision rule of ISO 14253-1, the worst circle of a test stands for it."""
     limits = settings(tmp_path, ("centre-deviation", "18"), ("circular-deviation", "9"))
-    outcome = call("--settings", limits, "report", better, "--before", session, "--out", tmp_path / "r.html", "--json")
+    outcome = call("--settings", limits, "report", better, "--before", session, "--page", tmp_path / "r.html", "--json")
     told = {(one["test"], one["quantity"]): one for one in outcome.data["tolerances_by_test"]}
     assert set(told) == {(test, name) for test in "af" for name in ("centre-deviation", "circular-deviation")}
     said = set()

@@ -188,7 +188,7 @@ def test_a_protocol_file_is_found_from_the_settings_folder(run, shop, tmp_path):
     (shop / "gauge.yaml").write_text(text.replace("name: heidenhain-nd281b", "name: gauge"), encoding="utf-8")
     write(shop / "own.yaml", "instrument: gauge.yaml\nport: no-port\n")
     os.chdir(tmp_path)
-    outcome = run("--settings", shop / "own.yaml", "monitor")
+    outcome = run("--settings", shop / "own.yaml", "instrument", "monitor")
     assert outcome.code == FAILED
     assert "no-port" in outcome.err.splitlines()[-1]
 
@@ -196,7 +196,7 @@ def test_a_protocol_file_is_found_from_the_settings_folder(run, shop, tmp_path):
 def test_programs_take_limit_and_steps(run, shop):
     """A turn with 45 degrees more on either side in steps of one degree, and five moves before and after it."""
     beside(shop, "program: {step_deg: 1.0}\nlimits: {largest_correction_mm: 0.01}\n")
-    nominal = ("program", "--plan", PLAN, "--machine", MACHINE, "--test", "a", "--json")
+    nominal = ("program", "--plan", PLAN, "--machine", MACHINE, "--tests", "a", "--json")
     outcome = run(*nominal, "--out", "nominal")
     assert outcome.code == DONE, outcome.err
     points = {each["points"] for each in outcome.data["programs"]}
@@ -231,12 +231,9 @@ def test_a_table_with_decimal_commas(run, shop, separator):
     (shop / "german.csv").write_text(f"{separator.join(titles)}\n{separator.join(german)}\n", encoding="utf-8")
     plain = ",".join(cell.replace(",", ".") for cell in german)
     (shop / "plain.csv").write_text(f"{','.join(titles)}\n{plain}\n", encoding="utf-8")
-    assert run("predict", "--model", MODEL, "--poses", "german.csv", "--out", "one.csv").code == DONE
+    assert run("predict", "--model", MODEL, "german.csv", "--table", "one.csv").code == DONE
     write(shop / "none.yaml", "")
-    assert (
-        run("--settings", "none.yaml", "predict", "--model", MODEL, "--poses", "plain.csv", "--out", "two.csv").code
-        == DONE
-    )
+    assert run("--settings", "none.yaml", "predict", "--model", MODEL, "plain.csv", "--table", "two.csv").code == DONE
     assert (shop / "one.csv").read_text() == (shop / "two.csv").read_text()
 
 
@@ -244,7 +241,7 @@ def test_a_number_in_the_other_language_is_refused_and_never_read_as_another(run
     """1.500 is fifteen hundred to some and one and a half to others."""
     beside(shop, 'numbers: {decimal: ","}\n')
     (shop / "poses.csv").write_text("x_mm;y_mm;z_mm;a_deg;b_deg;c_deg\n1.500;0;-1008;0;0;0\n", encoding="utf-8")
-    outcome = run("predict", "--model", MODEL, "--poses", "poses.csv", "--out", "out.csv")
+    outcome = run("predict", "--model", MODEL, "poses.csv", "--table", "out.csv")
     assert outcome.code == FAILED
     assert "poses.csv:2: x_mm is '1.500', not a number; the decimal sign is a comma" in outcome.err
 

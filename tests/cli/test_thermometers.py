@@ -51,7 +51,7 @@ def test_calibrate_follows_the_thermometer_and_keeps_its_form(run, sessions, tmp
         in run("evaluate", sessions / "logged", "--model", model).out
     )
     poses.write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n")
-    refused = run("predict", "--model", model, "--poses", poses, "--out", tmp_path / "actual.csv")
+    refused = run("predict", "--model", model, poses, "--table", tmp_path / "actual.csv")
     assert refused.code == FAILED
     assert "thermal-frame needs temperature" in refused.err
 

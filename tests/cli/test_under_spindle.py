@@ -35,7 +35,7 @@ def model_file(truth, tmp_path):
 
 def test_simulate_puts_the_ball_up_where_the_model_has_the_tool_tip(run, truth, model_file, tmp_path):
     out = tmp_path / "predicted"
-    outcome = run("simulate", "--model", model_file, "--plan", PLAN, "--out", out, "--samples", 36)
+    outcome = run("simulate", "--model", model_file, PLAN, "--out", out, "--samples", 36)
     assert outcome.code == DONE
     session = read_session(out)
     assert len(session.runs) == 30

@@ -96,7 +96,7 @@ def test_it_checks_a_plan_that_it_ships(installed, tmp_path):
 
 
 def test_it_knows_its_instruments(installed, tmp_path):
-    done = run(installed, tmp_path, "dbbstation", "instruments")
+    done = run(installed, tmp_path, "dbbstation", "instrument", "list")
     assert (done.returncode, done.stderr) == (0, "")
     assert "heidenhain-nd281b" in done.stdout
     assert list(tmp_path.iterdir()) == []

@@ -45,8 +45,11 @@ EXEMPT = {
     ("docs/calibration.md", "dbbstation calibrate standard-test"): "thirty circles that are in no repository",
     ("docs/currents.md", "dbbstation calibrate recorded"): "thirty circles at 50 Hz with currents, a minute to record",
     ("docs/diagnosis.md", "dbbstation diagnose measured"): "the session of the demonstration, as in the README",
-    ("docs/drive.md", "dbbstation drive emps.csv"): "a recording that is not ours to give; see test_drive_real.py",
-    ("docs/getting-started.md", "dbbstation emulate"): "a machine that runs until it is stopped; its port changes",
+    ("docs/drive.md", "dbbstation identify emps.csv"): "a recording that is not ours to give; see test_drive_real.py",
+    (
+        "docs/getting-started.md",
+        "dbbstation instrument emulate",
+    ): "a machine that runs until it is stopped; its port changes",
     ("docs/getting-started.md", "dbbstation measure"): "thirty circles at ten times real speed, four minutes",
     ("docs/getting-started.md", "dbbstation calibrate recorded"): "the session that took four minutes",
     ("docs/getting-started.md", "dbbstation predict"): "the model of that session",

@@ -125,12 +125,12 @@ def test_a_pipe_that_takes_the_place_of_a_file_is_not_waited_for(tmp_path, pipe,
     "line",
     [
         ["check"],
-        ["replay"],
+        ["instrument", "replay"],
         ["mismatch", "--measured", "a", "--simulated", "b"],
-        ["drive"],
+        ["identify"],
         ["jig"],
         ["evaluate", "--model"],
-        ["sources", "--source-file"],
+        ["sources", "--source-files"],
         ["--settings"],
     ],
     ids=" ".join,
@@ -145,7 +145,7 @@ def test_no_command_waits_for_a_pipe(tmp_path, line, name):
 
 
 def test_a_device_is_no_byte_log():
-    outcome = call("replay", "/dev/zero")
+    outcome = call("instrument", "replay", "/dev/zero")
     assert outcome.code == 1
     assert outcome.err == "/dev/zero: this is a pipe or a device, a file is needed; write it to a file first\n"
 
@@ -255,10 +255,10 @@ def test_a_long_name_is_not_echoed(tmp_path):
     ("name", "size", "line"),
     [
         ("plan.yaml", 10_000_001, ["check"]),
-        ("drive.csv", 200_000_001, ["drive"]),
+        ("drive.csv", 200_000_001, ["identify"]),
         ("table.csv", 200_000_001, ["mismatch", "--measured", "a", "--simulated", "b"]),
-        ("sheet.dmo", 20_000_001, ["jig", "sheet", "--jig", "j.yaml", "--u-um", "1", "--out", "o.yaml"]),
-        ("own.py", 1_000_001, ["sources", "--source-file"]),
+        ("sheet.dmo", 20_000_001, ["jig", "sheet", "--before", "j.yaml", "--u-um", "1", "--out", "o.yaml"]),
+        ("own.py", 1_000_001, ["sources", "--source-files"]),
         ("run.csv", 2_000_000_001, ["check"]),
     ],
 )

@@ -159,7 +159,7 @@ def _seeds() -> list[Seed]:
             "model in use",
             {"model.yaml": MODEL.read_bytes(), **_sound(plan=PLAN, machine=MACHINE), f"{SOUND}poses.csv": POSES},
             {
-                f"predict --model model.yaml --poses {SOUND}poses.csv --out out/p.csv": 3,
+                f"predict --model model.yaml {SOUND}poses.csv --table out/p.csv": 3,
                 f"program --plan {SOUND}plan.yaml --machine {SOUND}machine.yaml --model model.yaml --out out/nc": 0.3,
             },
             1,
@@ -167,7 +167,7 @@ def _seeds() -> list[Seed]:
         Seed(
             "poses",
             {"poses.csv": POSES, **_sound(model=MODEL)},
-            {f"predict --model {SOUND}model.yaml --poses poses.csv --out out/p.csv": 1},
+            {f"predict --model {SOUND}model.yaml poses.csv --table out/p.csv": 1},
             2,
         ),
         Seed(
@@ -187,11 +187,11 @@ def _seeds() -> list[Seed]:
             {"log.txt": LOG},
             {
                 "replay log.txt": 3,
-                "replay log.txt --json": 3,
-                "replay log.txt --instrument heidenhain-nd281b": 1,
-                "replay log.txt --instrument mahr-c1202 --zero-mm 150": 1,
+                "instrument replay log.txt --json": 3,
+                "instrument replay log.txt --instrument heidenhain-nd281b": 1,
+                "instrument replay log.txt --instrument mahr-c1202 --zero-mm 150": 1,
                 **{
-                    f"replay log.txt --json --instrument {path.stem}": 0.3
+                    f"instrument replay log.txt --json --instrument {path.stem}": 0.3
                     for path in sorted((PROTOCOLS / "instruments").glob("*.yaml"))
                 },
             },
@@ -203,7 +203,7 @@ def _seeds() -> list[Seed]:
             {"t.csv": b"".join((FIXTURES / "tables" / "axis.csv").read_bytes().splitlines(keepends=True)[:90])},
             {
                 "mismatch t.csv --measured measured_mm --simulated simulated_mm --no-held-out": 4,
-                "mismatch t.csv --measured measured_mm --simulated simulated_mm --no-held-out --json --out out/t.csv": 1,
+                "mismatch t.csv --measured measured_mm --simulated simulated_mm --no-held-out --json --table out/t.csv": 1,
             },
             0.6,
         ),
@@ -247,7 +247,7 @@ def _seeds() -> list[Seed]:
         Seed(
             "own source",
             {"own.py": (FIXTURES / "sources" / "scale_bow.py").read_bytes()},
-            {"sources --source-file own.py": 1},
+            {"sources --source-files own.py": 1},
             1,
         ),
     ]
@@ -258,12 +258,12 @@ def _seeds() -> list[Seed]:
             "session list s": 8,
             "session list s --json": 3,
             "export s --out out/e.csv": 3,
-            "history . --csv out/h.csv": 1,
-            "circles s --csv out/c.csv": 1.5,
+            "history . --table out/h.csv": 1,
+            "circles s --table out/c.csv": 1.5,
             "circles s --json": 1,
             f"evaluate s --model {SOUND}model.yaml": 1,
             "calibrate s": 0.3,
-            "report s --out out/r.html": 0.2,
+            "report s --page out/r.html": 0.2,
             "plot s --out out/p.svg": 0.1,
             "session reject s a-ccw-1 --reason spoilt": 1,
             "session seal s": 1,

@@ -42,7 +42,7 @@ def test_a_seal_that_was_taken_out_or_made_anew_shows_every_time(folder: Path) -
         anchor = writer.session.seal.anchor
     assert seals(folder) == []
     without_seal(folder / "one")
-    for more in ((), (), ("--rebuild",)):
+    for more in ((), (), ("--anew",)):
         (note,) = seals(folder, *more)
         assert note.startswith(f"one carries no seal, one ended with {anchor[:16]} on ")
     seal_session(folder / "one")

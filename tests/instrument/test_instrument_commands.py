@@ -41,7 +41,8 @@ def run(command: click.Command, *arguments: str) -> tuple[str, str]:
 def test_help_has_an_example(command: click.Command) -> None:
     text, _ = run(command, "--help")
     assert "Example" in text
-    assert f"\n    dbbstation {command.name}" in text
+    name = "list" if command is instruments else command.name
+    assert f"\n    dbbstation instrument {name}" in text
 
 
 def test_help_loads_no_serial_library() -> None:
@@ -130,6 +131,7 @@ def test_ctrl_c_ends_the_monitor_with_its_totals() -> None:
             sys.executable,
             "-c",
             code,
+            "instrument",
             "monitor",
             "--instrument",
             ENCODER.name,

@@ -18,7 +18,9 @@ ND = load_instrument("heidenhain-nd281b")
 
 
 def test_no_such_port() -> None:
-    with pytest.raises(InstrumentError, match=r"/dev/ttyNONE9: there is no such port; .*see `dbbstation ports`"):
+    with pytest.raises(
+        InstrumentError, match=r"/dev/ttyNONE9: there is no such port; .*see `dbbstation instrument ports`"
+    ):
         open_link("/dev/ttyNONE9", ND.line)
 
 

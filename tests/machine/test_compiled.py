@@ -48,7 +48,7 @@ def read_only(tmp_path):
 def test_a_command_of_an_install_that_cannot_be_written_to_runs_and_says_so(read_only, tmp_path):
     (tmp_path / "poses.csv").write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n", encoding="utf-8")
     model = shipped_folder("fixtures") / "models" / "small.yaml"
-    command = ["predict", "--model", str(model), "--poses", "poses.csv", "--out", "actual.csv"]
+    command = ["predict", "--model", str(model), "poses.csv", "--table", "actual.csv"]
     where = "import dbbstation; print(dbbstation.__file__)"
     asked = {"env": read_only, "cwd": tmp_path, "capture_output": True, "text": True}
     assert str(tmp_path) in subprocess.run([sys.executable, "-c", where], check=False, **asked).stdout

@@ -110,7 +110,9 @@ class EntryPoint:
 def test_two_dialects_with_one_ending_are_told_apart_by_the_program():
     assert dialect_of_file("x.loud", "alpha 1").name == "alpha"
     assert dialect_of_file("x.loud", "beta 1").name == "beta"
-    with pytest.raises(StationError, match=r"x.loud: the program may be in several NC dialects: alpha, beta; .*--from"):
+    with pytest.raises(
+        StationError, match=r"x.loud: the program may be in several NC dialects: alpha, beta; .*--written-in"
+    ):
         dialect_of_file("x.loud", "gamma 1")
 
 

@@ -55,7 +55,7 @@ def test_all_programs_of_a_plan(tmp_path):
 
 
 def test_headers_name_model_and_sessions_by_hash(tmp_path, model_file):
-    arguments = ["--plan", PLAN, "--machine", MACHINE, "--model", model_file, "--test", "c", "--json"]
+    arguments = ["--plan", PLAN, "--machine", MACHINE, "--model", model_file, "--tests", "c", "--json"]
     said = json.loads(run(program, *arguments, "--out", tmp_path / "one").stdout)
     text = (tmp_path / "one" / "c-cw.ngc").read_text()
     digest = hashlib.sha256(model_file.read_bytes()).hexdigest()
@@ -71,13 +71,13 @@ def test_headers_name_model_and_sessions_by_hash(tmp_path, model_file):
 
 def test_nothing_is_overwritten_without_force(tmp_path):
     arguments = ["--plan", PLAN, "--machine", MACHINE, "--out", tmp_path / "nc"]
-    run(program, *arguments, "--test", "b")
+    run(program, *arguments, "--tests", "b")
     (tmp_path / "nc" / "b-cw.ngc").write_text("mine")
     with pytest.raises(OutputError, match="--force"):
         run(program, *arguments)
     assert sorted(path.name for path in (tmp_path / "nc").iterdir()) == ["b-ccw.ngc", "b-cw.ngc"]
     assert (tmp_path / "nc" / "b-cw.ngc").read_text() == "mine"
-    run(program, *arguments, "--test", "b", "--force")
+    run(program, *arguments, "--tests", "b", "--force")
     assert (tmp_path / "nc" / "b-cw.ngc").read_text() != "mine"
 
 
@@ -93,7 +93,7 @@ def test_a_circle_outside_the_travel_leaves_nothing_on_disk(tmp_path):
 def test_an_unknown_test_and_an_unknown_dialect_are_named(tmp_path):
     arguments = ["--plan", PLAN, "--machine", MACHINE, "--out", tmp_path / "nc"]
     with pytest.raises(StationError, match="no test z"):
-        run(program, *arguments, "--test", "z")
+        run(program, *arguments, "--tests", "z")
     with pytest.raises(StationError, match="'klingon'"):
         run(program, *arguments, "--dialect", "klingon")
 
@@ -136,7 +136,7 @@ def test_the_limit_of_corrections_is_an_option_within_limits(tmp_path, model_fil
     part = tmp_path / "part.ngc"
     part.write_text(PART)
     arguments = {
-        "program": [program, "--plan", PLAN, "--machine", MACHINE, "--test", "a"],
+        "program": [program, "--plan", PLAN, "--machine", MACHINE, "--tests", "a"],
         "compensate": [compensate, part],
     }[command]
     arguments += ["--model", model_file, "--out", tmp_path / "out"]
@@ -178,8 +178,8 @@ def test_a_start_pose_lets_a_program_begin_anywhere(tmp_path, model_file):
     with pytest.raises(StationError, match="no NC dialect"):
         run(compensate, part, "--model", model_file, "--out", out)
     with pytest.raises(InputError, match="nobody knows where"):
-        run(compensate, part, "--from", "linuxcnc", "--model", model_file, "--out", out)
-    run(compensate, part, "--from", "linuxcnc", "--start", "0,0,-1000,0,0,0", "--model", model_file, "--out", out)
+        run(compensate, part, "--written-in", "linuxcnc", "--model", model_file, "--out", out)
+    run(compensate, part, "--written-in", "linuxcnc", "--start", "0,0,-1000,0,0,0", "--model", model_file, "--out", out)
     moves = [line for line in out.read_text().splitlines() if line.startswith("G1 ")]
     assert len(moves) == 1
     assert float(moves[0].split()[1].removeprefix("X")) == pytest.approx(10.0, abs=1.0)

@@ -172,6 +172,6 @@ def test_two_hundred_sound_circles(tmp_path):
 def test_computed_recordings_without_noise_have_no_findings(tmp_path, samples):
     model = shipped_folder("fixtures") / "models" / "small.yaml"
     plan = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"
-    outcome = call("simulate", "--model", model, "--plan", plan, "--out", tmp_path / "computed", "--samples", samples)
+    outcome = call("simulate", "--model", model, plan, "--out", tmp_path / "computed", "--samples", samples)
     assert outcome.code == 0, outcome.err
     assert [f"{j.run.label}: {f.text}" for j in read(tmp_path / "computed").judged() for f in j.wrong] == []

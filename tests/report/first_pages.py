@@ -76,7 +76,7 @@ def four_reports(folder):
     settings = settings_in(folder)
     for name, words in asked.items():
         out = folder / f"{name}.html"
-        outcome = call("--settings", settings, "report", *words, "--out", out, "--json")
+        outcome = call("--settings", settings, "report", *words, "--page", out, "--json")
         assert outcome.code == DONE, outcome.err
         out.with_suffix(".json").write_text(outcome.out, encoding="utf-8")
 

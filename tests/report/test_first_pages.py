@@ -76,7 +76,7 @@ def test_it_is_no_certificate(reports):
 
 def test_a_certificate_is_refused_where_something_is_lacking(folder, tmp_path):
     out = tmp_path / "refused.html"
-    words = ("report", folder / "bare", "--certificate", "--place", PLACE, "--out", out)
+    words = ("report", folder / "bare", "--certificate", "--place", PLACE, "--page", out)
     done = call("--settings", settings_in(tmp_path), *words)
     assert done.code == FAILED
     assert "operator unknown" in done.err

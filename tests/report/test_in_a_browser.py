@@ -57,7 +57,7 @@ def _report(folder):
     settings.write_text("format: dbb-settings/1\ntolerances:\n" + "".join(f"  - {one}\n" for one in limits), "utf-8")
     out = folder / "report.html"
     outcome = call(
-        "--settings", settings, "report", sealed, "--before", SMALL, "--model", MODEL, "--job", "12", "--out", out
+        "--settings", settings, "report", sealed, "--before", SMALL, "--model", MODEL, "--job", "12", "--page", out
     )
     assert outcome.code == DONE, outcome.err
     assert all(f'class="said {kind} ' in out.read_text("utf-8") for kind in ("within", "exceeded", "cannot"))
@@ -70,7 +70,7 @@ def _history(folder):
     out = folder / "history.html"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-        outcome = call("history", folder / "sessions", "--html", out)
+        outcome = call("history", folder / "sessions", "--page", out)
     assert outcome.code == DONE, outcome.err
     assert all(f'class="event {kind}"' in out.read_text("utf-8") for kind in ("changed", "stands"))
     return out
@@ -130,7 +130,7 @@ def test_the_tab_key_reaches_all_in_order_and_shows_where_it_is(browser, page, d
 
 def test_the_report_can_be_enlarged_by_keys_and_read_off_by_the_pointer(browser, tmp_path):
     out = tmp_path / "report.html"
-    assert call("report", SMALL, "--test", "a", "--out", out).code == DONE
+    assert call("report", SMALL, "--tests", "a", "--page", out).code == DONE
     browser.open(out)
     figure = 'document.querySelector("figure.polar")'
     assert browser.run(f'{figure}.querySelectorAll("button").length') == 3

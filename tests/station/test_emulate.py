@@ -1,4 +1,4 @@
-"""`dbbstation emulate` in a process of its own."""
+"""`dbbstation instrument emulate` in a process of its own."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 def command(plan_file: Path, *more: str, instrument: str = STREAM) -> list[str]:
     words = ["--instrument", instrument, "--plan", str(plan_file), "--machine", str(MACHINE_FILE)]
-    return [sys.executable, "-m", "dbbstation", "emulate", *words, *more]
+    return [sys.executable, "-m", "dbbstation", "instrument", "emulate", *words, *more]
 
 
 def started(words: list[str]) -> subprocess.Popen[str]:

@@ -119,7 +119,7 @@ def test_a_session_goes_on_in_its_own_world(plan_file: Path, tmp_path: Path) -> 
 def test_the_report_of_a_virtual_session_says_so_in_its_title(tmp_path: Path) -> None:
     for name, virtual in (("virtual", True), ("logged", False)):
         page = tmp_path / f"{name}.html"
-        outcome = call("report", SESSIONS / name, "--out", page)
+        outcome = call("report", SESSIONS / name, "--page", page)
         assert outcome.code == 0, outcome.err
         text = page.read_text(encoding="utf-8")
         assert ("<title>VIRTUAL MACHINE. " in text) is virtual

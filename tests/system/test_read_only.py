@@ -66,7 +66,7 @@ def run(folder, line):
         "session list small",
         "export small --out mine/e.csv",
         "history . --json",
-        "history . --csv mine/h.csv",
+        "history . --table mine/h.csv",
     ],
 )
 def test_what_only_reads_works(here, line):
@@ -79,11 +79,11 @@ def test_what_only_reads_works(here, line):
     [
         "export small --out e.csv",
         "calibrate small --out m.yaml",
-        "report small --out r.html",
-        "history . --csv h.csv",
+        "report small --page r.html",
+        "history . --table h.csv",
         "session reject small a-ccw-1 --reason spoilt",
         "session amend sealed --reason changed",
-        "fleet . --do circles --out f",
+        "fleet . --task circles --out f",
     ],
 )
 def test_what_writes_there_is_refused_in_one_sentence(here, line):

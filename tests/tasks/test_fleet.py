@@ -41,7 +41,7 @@ def calibrated(recorded, tmp_path_factory):
     sessions = shutil.copytree(recorded, folder / "sessions")
     spoilt = sessions / "m01" / "runs" / "a-ccw-1.csv"
     spoilt.write_text(spoilt.read_text("utf-8") + "1,2,3,4,5,6,7\n", "utf-8")
-    outcome = call("fleet", sessions, "--do", "calibrate", "--out", folder / "out", "--jobs", "2", "--json")
+    outcome = call("fleet", sessions, "--task", "calibrate", "--out", folder / "out", "--jobs", "2", "--json")
     return folder, outcome
 
 
@@ -184,7 +184,7 @@ def test_a_machine_of_another_geometry_is_compared_in_figures_only_and_that_is_s
 
 def test_reports_and_tables_as_parquet(sessions, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
-    words = ["fleet", sessions, "--do", "circles", "--out", tmp_path / "out"]
+    words = ["fleet", sessions, "--task", "circles", "--out", tmp_path / "out"]
     done = call(*words, "--table", tmp_path / "all.parquet")
     assert done.code == DONE, done.err
     # The CSV has nine digits.
@@ -192,7 +192,7 @@ def test_reports_and_tables_as_parquet(sessions, tmp_path):
     rows = list(csv.DictReader((tmp_path / "out" / "circles.csv").read_text("utf-8").splitlines()))
     assert table.column_names == list(TABLE)
     assert table.column("value").to_pylist() == pytest.approx([float(row["value"]) for row in rows], rel=1e-8)
-    written = call("fleet", sessions / "m00", "--do", "report", "--out", tmp_path / "reports")
+    written = call("fleet", sessions / "m00", "--task", "report", "--out", tmp_path / "reports")
     assert written.code == DONE, written.err
     assert len(list((tmp_path / "reports" / "report").glob("m00-*.html"))) == 1
 
@@ -201,7 +201,7 @@ def test_reports_and_tables_as_parquet(sessions, tmp_path):
 def test_sessions_without_a_serial_number_are_one_machine_or_each_its_own_and_that_is_said(sessions, tmp_path):
     for path in sessions.glob("*/session.yaml"):
         path.write_text(re.sub(r"serial_number: M\d\d\n", "", path.read_text("utf-8")), "utf-8")
-    together = call("fleet", sessions, "--do", "circles", "--out", tmp_path / "out", "--test", "a", "--json")
+    together = call("fleet", sessions, "--task", "circles", "--out", tmp_path / "out", "--tests", "a", "--json")
     (name,) = {one["machine"] for one in together.data["sessions"]}
     (note,) = together.data["notes"]
     assert note.startswith(f"{COUNT} sessions of {name} have no serial number: they are counted as one machine")
@@ -209,7 +209,7 @@ def test_sessions_without_a_serial_number_are_one_machine_or_each_its_own_and_th
     assert together.data["comparison"]["machines"] == 1
     page = Page((tmp_path / "out" / "circles.html").read_text("utf-8"))
     assert note in page.text
-    apart = call("fleet", sessions, "--do", "circles", "--out", tmp_path / "out", "--test", "a", "--json", "--apart")
+    apart = call("fleet", sessions, "--task", "circles", "--out", tmp_path / "out", "--tests", "a", "--json", "--apart")
     assert {one["machine"] for one in apart.data["sessions"]} == {f"{name} (m{k:02d})" for k in range(COUNT)}
     assert {one["state"] for one in apart.data["sessions"]} == {"up-to-date"}
     assert apart.data["comparison"]["machines"] == COUNT
@@ -218,11 +218,11 @@ def test_sessions_without_a_serial_number_are_one_machine_or_each_its_own_and_th
 
 
 def test_words_that_fit_nothing_are_refused(sessions, tmp_path):
-    assert call("fleet", sessions, "--do", "circles", "--sources", "gravity").code == USAGE
-    assert call("fleet", sessions, "--do", "circles", "--table", tmp_path / "t.xlsx").code == USAGE
+    assert call("fleet", sessions, "--task", "circles", "--sources", "gravity").code == USAGE
+    assert call("fleet", sessions, "--task", "circles", "--table", tmp_path / "t.xlsx").code == USAGE
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear", "utf-8")
-    done = call("fleet", sessions, "--do", "circles", "--out", tmp_path / "mine")
+    done = call("fleet", sessions, "--task", "circles", "--out", tmp_path / "mine")
     assert done.code == FAILED
     assert "something lies in it" in done.err
 

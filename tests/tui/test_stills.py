@@ -60,7 +60,7 @@ def fault() -> Happening:
     error = InstrumentError(
         "the line was closed while it was in use",
         where="/dev/ttyUSB0",
-        remedy="plug the instrument in again, then look with `dbbstation ports` whether its port is still called so",
+        remedy="plug the instrument in again, then look with `dbbstation instrument ports` whether its port is still called so",
     )
     happening.events += happening.sequencer.fail(error)
     return happening

@@ -40,7 +40,7 @@ def busy(processes):
 
 
 def measured(plan, folder, instrument):
-    command = [*PROGRAM, "emulate", "--plan", plan, *WHAT, instrument, "--seed", "4", "--wait", "--json"]
+    command = [*PROGRAM, "instrument", "emulate", "--plan", plan, *WHAT, instrument, "--seed", "4", "--wait", "--json"]
     with subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True) as machine:
         try:
             place = json.loads(machine.stdout.readline())

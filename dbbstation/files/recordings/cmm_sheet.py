@@ -92,18 +92,18 @@ def read_sheet(
     faults = [
         missing_column(name, table.names, str(path), table.header) for name in found.values() if name not in table.names
     ]
-    remedy = f"say which with --column {missing[0] if missing else 'x'}=NAME; columns here: {', '.join(table.names)}"
+    remedy = f"say which with --columns {missing[0] if missing else 'x'}=NAME; columns here: {', '.join(table.names)}"
     faults += [Problem(str(path), table.header, 0, f"no column is taken for {key}", remedy) for key in missing]
     if "ball" not in found and not ({"bore"} if of_one_holder else {"bore", "holder"}) <= set(found):
         what = "no column says which ball a row is"
         faults.append(
-            Problem(str(path), table.header, 0, what, "say it with --column ball=NAME, or with bore and holder")
+            Problem(str(path), table.header, 0, what, "say it with --columns ball=NAME, or with bore and holder")
         )
     of_u = [key for key in ("u", "ux", "uy", "uz") if key in found]
     if of_u and coverage is None:
         what = "the sheet has uncertainties, and nothing says what they are"
         faults.append(
-            Problem(str(path), table.header, 0, what, "give --k: 2 for U (k = 2), 1 for standard uncertainties")
+            Problem(str(path), table.header, 0, what, "give --coverage: 2 for U (k = 2), 1 for standard uncertainties")
         )
     if not faults:
         faults += [fault for key in (*AXES, *of_u) if key in found for fault in _bad_cells(table, found[key])]
@@ -144,7 +144,7 @@ def jig_of_sheet(
         bore, holder = (one.bore, one.holder) if known is None else (known.bore, known.holder)
         u_um = one.uncertainty_um if one.uncertainty_um is not None else uncertainty_um
         if not holder:
-            remedy = f"say --name '{one.name}=BALL'; the jig has {', '.join(before.balls)}"
+            remedy = f"say --names '{one.name}=BALL'; the jig has {', '.join(before.balls)}"
             faults.append(Problem(file, one.line, 0, f"the jig has no ball `{name}`", remedy))
         elif name in balls:
             faults.append(Problem(file, one.line, 0, f"the ball `{name}` comes a second time", "take one of them out"))
@@ -156,11 +156,11 @@ def jig_of_sheet(
                     one.line,
                     0,
                     what,
-                    "give --u-um, the standard uncertainty of a coordinate, or name the column of them: --column u=NAME",
+                    "give --u-um, the standard uncertainty of a coordinate, or name the column of them: --columns u=NAME",
                 )
             )
         elif not all(map(math.isfinite, one.centre_mm)):
-            faults.append(Problem(file, one.line, 0, f"`{name}` has no z", "say which column it is: --column z=NAME"))
+            faults.append(Problem(file, one.line, 0, f"`{name}` has no z", "say which column it is: --columns z=NAME"))
         else:
             x, y, z = (float(f"{value:.7f}") for value in one.centre_mm)  # 0.1 nm: no digits of the conversion
             balls[name] = BallSchema.model_construct(

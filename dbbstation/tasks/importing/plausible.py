@@ -164,12 +164,12 @@ def check_units(
         if len(numbers) > 1 and float(np.ptp(numbers)) == 0.0:
             raise UnusableTravelError(
                 f"column {table.names.index(name) + 1}, {name}: it is {float(numbers[0]):g} in every row of the run, which no gauge reads",
-                "it may be what was wanted and not what was read: name another column with --column; --trust unit takes the numbers as they are",
+                "it may be what was wanted and not what was read: name another column with --columns; --trust unit takes the numbers as they are",
             )
         return
     name = named[found.means]
     meant = " or ".join(one.replace(":", " in ") for one in found.others)
-    say = " or ".join(f"--column '{name}={one}'" for one in found.others)
+    say = " or ".join(f"--columns '{name}={one}'" for one in found.others)
     raise UnusableTravelError(
         f"column {table.names.index(name) + 1}, {name}: {found.what}",
         f"it may be {meant}: say {say}, or correct the mapping; --trust unit takes the numbers as they are",

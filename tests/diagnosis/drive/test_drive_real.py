@@ -10,7 +10,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from dbbstation.cli.drive import drive
+from dbbstation.cli.identify import identify as drive
 
 
 @pytest.fixture(scope="module")

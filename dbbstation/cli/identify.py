@@ -1,4 +1,4 @@
-"""`dbbstation drive`: mass and friction of one strut drive, and what a model of these leaves out."""
+"""`dbbstation identify`: mass and friction of one strut drive, and what a model of these leaves out."""
 
 from __future__ import annotations
 
@@ -132,9 +132,9 @@ def _number(number: Value) -> str:
     return f"{number.value:#.4g} ± {number.uncertainty:.2g} {number.unit}"
 
 
-drive = command(
+identify = command(
     task,
     show,
-    CommandOutput("out", "Write what was compared here, as CSV.", table=True, field="compared"),
+    CommandOutput("table", "Write what was compared here, as CSV.", table=True, field="compared"),
     figure("Draw force and friction here"),
 )

@@ -1,0 +1,34 @@
+"""Former names of commands and flags: an unknown one is answered with the new one."""
+
+RENAMED = {
+    "drive": "identify",
+    "emulate": "instrument emulate",
+    "instruments": "instrument list",
+    "monitor": "instrument monitor",
+    "ports": "instrument ports",
+    "replay": "instrument replay",
+}
+
+RENAMED_FLAGS = {
+    "bar --calibrator": "--calibrator-serial",
+    "circles --csv": "--table",
+    "compensate --from": "--written-in",
+    "export --state": "--states",
+    "fleet --do": "--task",
+    "history --csv": "--table",
+    "history --html": "--page",
+    "history --rebuild": "--anew",
+    "holders --column": "--columns",
+    "holders --jig": "--before",
+    "identify --out": "--table",
+    "mismatch --corrected": "--table",
+    "predict --out": "--table",
+    "predict --poses": "POSES without a flag",
+    "report --out": "--page",
+    "sheet --column": "--columns",
+    "sheet --jig": "--before",
+    "sheet --k": "--coverage",
+    "sheet --name": "--names",
+    "simulate --plan": "PLAN without a flag",
+}
+"""By command and flag; names that only gained an `s` are suggested anyway."""

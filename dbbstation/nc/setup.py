@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError, Problem
 from dbbstation.nc.toolpath import SYSTEMS
 
 if TYPE_CHECKING:
@@ -58,51 +56,3 @@ class Setup:
         if self.parameters is None or name in self.places:
             return 0.0
         return self.parameters.get(FIRST_PARAMETERS[name] + ROTATION_BEHIND, 0.0)
-
-
-_PARAMETER = re.compile(r"\s*(\d+)\s+([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*")
-_TOOL_WORD = re.compile(r"([A-Z])\s*([-+]?\d+(?:\.\d*)?|[-+]?\.\d+)")
-
-
-def parameters_of(text: str, file: str) -> dict[int, float]:
-    """Return the numbered parameters of a LinuxCNC parameter file.
-
-    Raises:
-        InputError: a line that is none, or none at all.
-    """
-    found: dict[int, float] = {}
-    for number, line in enumerate(text.splitlines(), 1):
-        match = _PARAMETER.fullmatch(line)
-        if match is None and line.strip():
-            raise InputError(
-                [Problem(file, number, 1, "no line of a parameter file", "it needs a number and its value")]
-            )
-        if match is not None:
-            found[int(match[1])] = float(match[2])
-    if not found:
-        raise InputError(
-            [Problem(file, 0, 0, "no parameter in it", "name LinuxCNC's parameter file, such as linuxcnc.var")]
-        )
-    return found
-
-
-def lengths_of(text: str, file: str) -> dict[int, tuple[float, ...]]:
-    """Return the offsets of tools by number of a LinuxCNC tool table.
-
-    Raises:
-        InputError: a line that is none, or none at all.
-    """
-    found: dict[int, tuple[float, ...]] = {}
-    for number, line in enumerate(text.splitlines(), 1):
-        said = line.partition(";")[0].upper()
-        words = {letter: float(value) for letter, value in _TOOL_WORD.findall(said)}
-        if not said.strip():
-            continue
-        if "T" not in words or _TOOL_WORD.sub("", said).strip():
-            raise InputError(
-                [Problem(file, number, 1, "no line of a tool table", "it needs T and words such as Z52.1")]
-            )
-        found[int(words["T"])] = tuple(words.get(axis, 0.0) for axis in "XYZABC")
-    if not found:
-        raise InputError([Problem(file, 0, 0, "no tool in it", "name LinuxCNC's tool table, such as tool.tbl")])
-    return found

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
+from dbbstation.files.formats.linuxcnc_control import lengths_of, parameters_of
 from dbbstation.files.source_text import read_bytes
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse
-from dbbstation.nc.setup import FIRST_PARAMETERS, Setup, lengths_of, parameters_of
+from dbbstation.nc.setup import FIRST_PARAMETERS, Setup
 from dbbstation.results.model_warnings import model_warnings, unknown_causes
 from dbbstation.tasks.models import model_of
 

@@ -200,6 +200,45 @@ def test_comments_may_be_in_any_letters(tmp_path, model_file):
         assert "; Fr?ser ? 6 um" in out.read_text()
 
 
+SHOP = "%\nO0001 (PART)\nG21\nT1 M6\nG0 G90 G54 X0. Y0. S800 M3\nG43 H1 Z5.\nG1 Z-1. F100\nX10.\nG91 G28 Z0.\nG90\nM30\n%\n"
+
+
+def test_offsets_and_lengths_come_from_linuxcncs_files_and_the_command(tmp_path, model_file):
+    part, out = tmp_path / "part.ngc", tmp_path / "true.ngc"
+    part.write_text(SHOP)
+    (tmp_path / "linuxcnc.var").write_text(
+        "5163\t-950.0\n5210\t0\n5211\t9.0\n5220\t1\n5221\t20.000000\n5222\t-5.0\n5223\t-1000.0\n"
+    )
+    (tmp_path / "tool.tbl").write_text("T1 P1 Z12.5 D6 ;end mill\nT2 P2 Z+3.5\n")
+    files = ("--parameters", tmp_path / "linuxcnc.var", "--tools", tmp_path / "tool.tbl")
+    common = (part, "--model", model_file, "--out", out, "--force", "--angles", "0,0,0")
+    with pytest.raises(InputError, match=r"part\.ngc:6:5: the length of tool 1 is not known"):
+        run(compensate, *common)
+    run(compensate, *common, *files)
+    text = out.read_text()
+    for said in ("work system G54: X20 Y-5 Z-1000", "the length of tool 1: Z12.5", "after a new touch-off"):
+        assert said in text
+    lines = text.splitlines()
+    first = next(line for line in lines if line.startswith("G0 "))
+    assert [word[0] for word in first.split()] == [
+        "G",
+        "X",
+        "Y",
+        "A",
+        "B",
+        "C",
+    ]  # where Z stands is not known before G43
+    cuts = [line for line in lines if line.startswith("G1 ")]
+    np.testing.assert_allclose([float(cuts[0].split("Z")[1].split()[0])], [-1.0], atol=0.5)
+    run(compensate, *common, *files, "--offset", "G54=0,0,-990", "--tool-length", "1=10")
+    assert "work system G54: Z-990" in out.read_text()
+    assert "the length of tool 1: Z10" in out.read_text()
+    assert run(compensate, *common, "--offset", "G54=0,0").exit_code == 2
+    (tmp_path / "tool.tbl").write_text("tools of the shop\n")
+    with pytest.raises(InputError, match=r"tool\.tbl:1:1: no line of a tool table"):
+        run(compensate, *common, *files)
+
+
 @pytest.mark.parametrize("command", [program, compensate])
 def test_help_has_examples(command):
     result = run(command, "--help")

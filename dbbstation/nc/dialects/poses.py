@@ -1,0 +1,84 @@
+"""Poses as a table, for a postprocessor of the shop's own: machine coordinates and F of each move, before and after."""
+
+from __future__ import annotations
+
+import csv
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.nc.dialect import Dialect, plain
+from dbbstation.nc.toolpath import RowKind, Toolpath, ToolpathBuilder, rounded
+from dbbstation.nc.words import CannotSayError, digits
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+COLUMNS = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,feed"
+"""The feed of the tip in mm/min, of moves that only turn in deg/min; empty in rapids."""
+
+
+class Poses(Dialect):
+    """A row for each move. Dwells, stops, tools and spindle stay in the program that the postprocessor writes."""
+
+    name = "poses"
+    extension = ".csv"
+    what = "poses as a CSV table, for a postprocessor of your own"
+
+    def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
+        """Return the table, the header as lines that begin with #.
+
+        Raises:
+            CannotSayError: a row that is no move.
+        """
+        told = ~toolpath.is_move & (toolpath.kind != RowKind.COMMENT)
+        if told.any():
+            row = int(np.argmax(told))
+            what = f"{RowKind(toolpath.kind[row]).name.lower().replace('_', ' ')} {toolpath.text.get(row, '')}".rstrip()
+            raise CannotSayError(self.name, what, where=f"{toolpath.name}:{toolpath.line[row]}")
+        lines = [*(f"# {plain(text)}" for text in header), COLUMNS]
+        moves = toolpath.is_move
+        form = ",".join(f"%.{decimals}f" for decimals in self.decimals)
+        for pose, feed in zip(
+            rounded(toolpath.poses[moves], self.decimals).tolist(), toolpath.feed[moves].tolist(), strict=True
+        ):
+            lines.append(f"{form % tuple(pose)},{'' if math.isnan(feed) else digits(feed)}")
+        return "\n".join(lines) + "\n"
+
+    def read(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:  # type: ignore[override]  # takes no setup
+        """Return the moves of a table."""
+        path, faults, named = ToolpathBuilder(name, start), [], False
+        for line, row in enumerate(csv.reader(text.splitlines()), 1):
+            if row and row[0].startswith("#"):
+                path.say(RowKind.COMMENT, ",".join(row).removeprefix("# "), line=line)
+            elif not named and row:
+                named = True
+                if ",".join(each.strip() for each in row) != COLUMNS:
+                    faults.append(Problem(name, line, 1, "the columns are others", f"name them {COLUMNS}"))
+            elif row:
+                self._move(
+                    path,
+                    row,
+                    Problem(name, line, 1, "no pose and feed", "give seven numbers, the feed empty in rapids"),
+                    faults,
+                )
+        if faults:
+            raise InputError(faults[:20])
+        return path.built()
+
+    @staticmethod
+    def _move(path: ToolpathBuilder, row: list[str], fault: Problem, faults: list[Problem]) -> None:
+        try:
+            pose, feed = np.array([float(each) for each in row[:6]]), float(row[6]) if row[6].strip() else 0.0
+        except (ValueError, IndexError):
+            pose, feed = np.full(6, np.nan), -1.0
+        if len(row) != len(COLUMNS.split(",")) or not np.isfinite([*pose, feed]).all() or feed < 0.0:
+            faults.append(fault)
+        elif feed > 0.0:
+            path.feed(pose[None], feed, line=fault.line)
+        else:
+            path.rapid(pose, line=fault.line)

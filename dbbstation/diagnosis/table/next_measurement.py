@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.inference.variables import TRAVELS
+from dbbstation.inference.variables import TRAVELS, Kind
 from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -104,9 +104,13 @@ def _apart(found: Mismatch) -> Iterator[Next]:
     for a, one in enumerate(variables):
         for b, other in enumerate(variables[:a]):
             if alike[a, b] > ALIKE and led & {one.name, other.name}:
+                clock, body = (one, other) if one.kind is Kind.TIME else (other, one)
+                how = f"Measure with {clock.name} held while {body.name} moves"
+                if clock.kind is Kind.TIME:  # nobody can hold it
+                    how = f"Measure with another course of {body.name} over {clock.name}"
                 text = (
-                    f"Measure with {other.name} held while {one.name} moves: they move together here (correlation "
-                    f"{alike[a, b]:.3f}), and which of them the mismatch follows is not known."
+                    f"{how}: they move together here (correlation {alike[a, b]:.3f}), and which of them the mismatch "
+                    f"follows is not known."
                 )
                 yield Next(text, (other.name, one.name))
 

@@ -45,6 +45,8 @@ def sentence_of(found: Mismatch, finding: CauseFinding) -> str:
     parts = [_where(found, finding)]
     if finding.family is not None:
         parts.append(MEANINGS[finding.family])
+        if finding.family is Family.PRODUCT and finding.label:
+            parts.append(f"Its factors are zero at {finding.label.removeprefix('about ')}.")
         if finding.acts is Acts.ONCE:
             parts.append(PERSISTS if finding.persists else RECURS if finding.recurs else HAPPENED)
     if finding.name in found.texts:

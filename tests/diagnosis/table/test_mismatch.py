@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -281,3 +282,21 @@ def test_uncertainties_are_not_less_than_those_of_parts_that_differ():
     assert told.uncertainty == pytest.approx(np.std(slopes, ddof=1) / np.sqrt(10.0), rel=0.1)
     assert plain.uncertainty < 0.3 * told.uncertainty
     assert told.value == plain.value
+
+
+def test_the_printed_product_can_be_put_into_a_simulation(tmp_path, rate_hz):
+    """Coefficient and zeros as people read them leave nothing of the product in the table."""
+    tables = load_tables([record(FOUND["product"][0]).write(tmp_path / "x.csv")], ASKED).table
+    result = mismatch_result(find_mismatch(tables, hold_out=False))
+    found = next(one for one in result.findings if one.name in FOUND["product"][1])
+    places = re.findall(r"(\w+) (-?[\d.e+]+)", re.search(r"zero at (.*?)\. ", found.text + " ")[1])
+    values = {v.name: v.values for v in tables.variables}
+    away = [values[name] - float(zero) for name, zero in places if name in values]
+    assert len(away) == 2
+    left = tables.measured - tables.simulated - found.values["coefficient"].value * away[0] * away[1]
+    term = np.prod([column - column.mean() for column in away], axis=0)
+    design = np.column_stack([term, *away, np.ones(len(term))])
+    covariance = np.linalg.inv(design.T @ design)
+    coefficient = (covariance @ design.T @ left)[0]
+    u = np.sqrt(covariance[0, 0]) * np.std(left - design @ np.linalg.lstsq(design, left)[0])
+    assert abs(coefficient) < 3.0 * np.hypot(u, found.values["coefficient"].uncertainty)

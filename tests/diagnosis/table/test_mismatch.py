@@ -284,7 +284,7 @@ def test_uncertainties_are_not_less_than_those_of_parts_that_differ():
     assert told.value == plain.value
 
 
-def test_the_printed_product_can_be_put_into_a_simulation(tmp_path, rate_hz):
+def test_the_printed_product_can_be_put_into_a_simulation(tmp_path):
     """Coefficient and zeros as people read them leave nothing of the product in the table."""
     tables = load_tables([record(FOUND["product"][0]).write(tmp_path / "x.csv")], ASKED).table
     result = mismatch_result(find_mismatch(tables, hold_out=False))

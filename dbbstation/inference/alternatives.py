@@ -71,13 +71,9 @@ class Alternatives:
         columns = [self._place[name] for name in names if name in self._place]
         return float(self._weights @ self._inside[:, columns].any(axis=1)) if columns else 0.0
 
-    def class_with(self, name: str) -> tuple[str, ...]:
-        """Return a cause's class, or itself."""
-        return next((equal for equal in self.classes.values() if name in equal), (name,))
-
     def ambiguity(self, name: str) -> tuple[str, ...]:
         """Return causes of which one is present if this is not, most probable first."""
-        chosen = list(self.class_with(name))
+        chosen = list(next((equal for equal in self.classes.values() if name in equal), (name,)))
         own = self._inside[:, self._place[name]] if name in self._place else np.zeros(len(self._weights), dtype=bool)
         both = (self._weights * own) @ self._inside
         every = self._weights @ self._inside

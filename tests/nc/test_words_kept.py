@@ -168,6 +168,23 @@ def test_a_ball_bar_program_stops_where_a_tool_length_is_in_force(linuxcnc, tabl
     assert any(name == "MESSAGE" and "tool length" in said for name, said in made) is stops
 
 
+# Tool changes.
+
+
+@pytest.mark.parametrize("start", [None, np.array([0.0, 0.0, -1000.0, 0.0, 0.0, 0.0])])
+def test_behind_a_tool_change_no_rapid_names_an_axis_that_the_program_does_not(linuxcnc, crooked, start):
+    """The changer may have moved it: Z would go down to where it stood before, with a tool that may be longer."""
+    text = f"{FIRST}G1 X5 F100\nT1 M6\nG0 X20\nY9\nG0 Z-990\nG1 Z-1000\nM2\n"
+    done = compensated_program(linuxcnc.read(text, "x.ngc", start=start), linuxcnc, Inverse(crooked)).text.splitlines()
+    change = done.index("T1 M6")
+    across, along, down, cut = done[change + 1 : change + 5]
+    assert "Z" not in across + along
+    assert "Y" not in across
+    assert "X20" in across.replace("X19.9", "X20")
+    assert "Z" in down
+    assert {"A", "B", "C"} <= {word[0] for word in f"{across} {along} {down} {cut}".split()}
+
+
 # Path control.
 
 

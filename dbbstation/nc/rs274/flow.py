@@ -33,15 +33,6 @@ _KEYWORDS = frozenset(
 )
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
 
-OPENED_BY = {
-    "elseif": ("if",),
-    "else": ("if",),
-    "endif": ("if",),
-    "endwhile": ("while",),
-    "endrepeat": ("repeat",),
-    "endsub": ("sub",),
-}
-
 
 class OLine(NamedTuple):
     """A line that begins with an O-word.

@@ -57,6 +57,9 @@ TAKES_AXES = frozenset({10.0, 28.0, 30.0, 52.0, 92.0})
 """Codes of one line that take its axis words for themselves."""
 
 PAUSE, OPTIONAL_STOP = 0.0, 1.0
+TURNS = 0b111000
+"""A, B and C, which no tool changer is taken to move where they were declared."""
+
 ENDS = frozenset({2.0, 30.0})
 CENTRES = "IJK"
 
@@ -120,8 +123,8 @@ class _Interpreter:
         pose = np.full(6, np.nan) if start is None else np.array(start, dtype=np.float64)
         self._state = ControlState(setup, pose)
         self.flow = Flow(text, file, self._state.parameter)
-        self._fixed = bits_of(~np.isnan(pose))
-        self._given = bool(self._fixed == ALL_AXES)
+        self._given = not np.isnan(pose).any()
+        self._fixed = bits_of(~np.isnan(pose)) & TURNS
         self._motion: float | None = None
         self._speed = Feed(0.0, 0.0)
         self._per_move = False

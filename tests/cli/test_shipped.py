@@ -25,8 +25,6 @@ QUICK = (
     "settings",
     "sources",
 )
-SLOW = ("calibrate", "compare", "history", "plot", "report", "simulate", "diagnose", "drive", "fleet")
-
 
 OF_ONES_OWN = {
     "--anchor": "an anchor that was noted of one's own session",
@@ -62,13 +60,6 @@ def said(folder, line):
 
 @pytest.mark.parametrize("line", runnable(QUICK))
 def test_examples_of_quick_commands_run(folder, line):
-    done = said(folder, line)
-    assert done.code == 0, done.err
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("line", runnable(SLOW))
-def test_examples_of_long_commands_run(folder, line):
     done = said(folder, line)
     assert done.code == 0, done.err
 

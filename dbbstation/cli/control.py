@@ -38,14 +38,18 @@ def control() -> None:
 @click.option("--out", type=_FILE, required=True, help="Component to write: NAME.comp.")
 @_MACHINE
 @click.option(
-    "--leave-out", "left_out", multiple=True, metavar="SOURCE", help="Source that is not corrected; repeatable."
+    "--leave-out",
+    "left_out",
+    multiple=True,
+    metavar="SOURCE,...",
+    help="Leave these sources uncorrected; may be given more than once.",
 )
 @click.option(
-    "--thermometer",
+    "--thermometers",
     "thermometers",
     multiple=True,
-    metavar="NAME",
-    help="Thermometer of the control, as its column without `_temp_c`; repeatable.",
+    metavar="NAME,...",
+    help="Thermometers of the control, as columns without `_temp_c`; may be given more than once.",
 )
 @_FORCE
 @_JSON
@@ -68,7 +72,7 @@ def kinematics(
     \b
     Examples:
       dbbstation control kinematics --model model.yaml --out dbbkins.comp
-      dbbstation control kinematics --model model.yaml --out dbbkins.comp --leave-out backlash --thermometer machine
+      dbbstation control kinematics --model model.yaml --out dbbkins.comp --leave-out backlash --thermometers machine
     """  # noqa: D301 (click reads the escape)
     from datetime import UTC, datetime
 
@@ -82,8 +86,8 @@ def kinematics(
         date=datetime.now(UTC).date().isoformat(),
         known=every_source(source_files),
         machine=machine,
-        left_out=left_out,
-        thermometers=thermometers,
+        left_out=_each(left_out),
+        thermometers=_each(thermometers),
         force=force,
     )
     for note in result.notes:
@@ -170,6 +174,10 @@ def parameters(
     )
     _print("INI file", result.ini)
     _print("The way back", result.way_back)
+
+
+def _each(texts: tuple[str, ...]) -> list[str]:
+    return [name.strip() for text in texts for name in text.split(",") if name.strip()]
 
 
 def _um(value: float | None) -> str:

@@ -128,7 +128,7 @@ def test_a_thermometer_that_the_control_lacks_is_named(reference: Machine) -> No
     source = known_sources()["thermal-struts"].by_temperature()
     assert source is not None
     with pytest.raises(
-        ModelError, match=r"thermal-struts follows a thermometer, and the control has not .*machine_temp_c"
+        ModelError, match=r"thermal-struts follows a thermometer, and the control has no .*machine_temp_c"
     ):
         made_of(MachineModel(of, (Fitted(source, np.array([11.0])),)))
 

@@ -98,9 +98,15 @@ class FollowsTemperature(LinearSource):
         Raises:
             ModelError: names missing ones.
         """
-        return self.chosen(known_thermometers(motion), "not every run of the session has")
+        remedy = "give recordings with that column, or a model without this source"
+        return self.chosen(known_thermometers(motion), "not every run of the session has", remedy)
 
-    def chosen(self, logged: Collection[str], lacks: str = "the control has not") -> tuple[str, ...]:
+    def chosen(
+        self,
+        logged: Collection[str],
+        lacks: str = "the control has no",
+        remedy: str = "name the thermometers of the control with --thermometers, or leave the source out with --leave-out",
+    ) -> tuple[str, ...]:
         """Return the best choice of its thermometers.
 
         Raises:
@@ -113,7 +119,7 @@ class FollowsTemperature(LinearSource):
         raise ModelError(
             f"the error source {self.name} follows a thermometer, and {lacks} "
             + ", or ".join(", ".join(names) for names in missing),
-            remedy="give recordings with that column, or a model without this source",
+            remedy=remedy,
         )
 
 

@@ -36,6 +36,8 @@ class Dialect(ABC):
     name: ClassVar[str]
     extension: ClassVar[str]
     """Of its program files, with the dot."""
+    also_read: ClassVar[Sequence[str]] = ()
+    """Other endings of programs that it reads."""
     what: ClassVar[str]
     """The control, in one line."""
     look_ahead: ClassVar[LookAhead | None] = None

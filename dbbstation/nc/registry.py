@@ -55,7 +55,7 @@ def dialect_of_file(file: str, text: str) -> Dialect:
         StationError: no dialect has that extension, or several have it and the program does not tell them apart.
     """
     extension, known = PurePath(file).suffix.lower(), known_dialects()
-    having = [dialect for dialect in known.values() if dialect.extension == extension]
+    having = [dialect for dialect in known.values() if extension in (dialect.extension, *dialect.also_read)]
     if not having:
         extensions = ", ".join(f"{dialect.extension} ({name})" for name, dialect in known.items())
         raise StationError(

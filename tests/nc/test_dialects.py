@@ -63,6 +63,11 @@ def test_an_unknown_dialect_is_refused_with_the_known_ones():
         dialect_named("shouting")
 
 
+@pytest.mark.parametrize("file", ["part.ngc", "PART.NC", "part.tap", "part.gcode"])
+def test_programs_of_other_posts_are_read_by_their_usual_endings(file):
+    assert dialect_of_file(file, "G21").name == "linuxcnc"
+
+
 def test_every_dialect_describes_itself():
     for name, dialect in known_dialects().items():
         assert dialect.name == name

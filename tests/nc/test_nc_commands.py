@@ -173,7 +173,7 @@ def test_a_part_that_leaves_the_travel_leaves_nothing_on_disk(tmp_path, model_fi
 
 
 def test_a_start_pose_lets_a_program_begin_anywhere(tmp_path, model_file):
-    part, out = tmp_path / "part.nc", tmp_path / "true.ngc"
+    part, out = tmp_path / "part.xyz", tmp_path / "true.ngc"
     part.write_text("G91 G1 X10 F100\nM2\n")
     with pytest.raises(StationError, match="no NC dialect"):
         run(compensate, part, "--model", model_file, "--out", out)

@@ -46,6 +46,7 @@ class LinuxCNC(WordDialect):
 
     name = "linuxcnc"
     extension = ".ngc"
+    also_read = (".nc", ".tap", ".cnc", ".gcode", ".gc", ".eia")
     what = "LinuxCNC (RS274/NGC)"
     look_ahead = LookAhead(share=0.5)
     takes_setup = True

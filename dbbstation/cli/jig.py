@@ -105,7 +105,7 @@ def sheet(
 
     \b
     Examples:
-      dbbstation jig sheet cmm.csv --before plate.yaml --columns x=X --columns "u=U (k=2)" --k 2 --out new.yaml
+      dbbstation jig sheet cmm.csv --before plate.yaml --columns x=X --columns "u=U (k=2)" --coverage 2 --out new.yaml
       dbbstation jig sheet plate.dmo --before plate.yaml --names SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_result, print_table

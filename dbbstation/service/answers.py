@@ -100,11 +100,11 @@ class ReportAnswer:
     """Shown facts of a report."""
 
     verdict: ReportVerdict
-    tolerances: tuple[ComparedTolerance, ...]
+    tolerances: tuple[ComparedTolerance, ...] = ()
 
 
 @dataclass(frozen=True)
 class AcceptanceAnswer(ReportAnswer):
     """Tolerances of two sessions, in total and by test."""
 
-    tolerances_by_test: tuple[ToleranceOfTest, ...]
+    tolerances_by_test: tuple[ToleranceOfTest, ...] = ()

@@ -10,6 +10,7 @@ from dbbstation.diagnosis.findings import Diagnosis, SourceFinding, Unexplained,
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.inference.held_out import HeldOut
+from dbbstation.inference.levels import DifferenceFound, Differs, Levels
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import sources_named
@@ -49,6 +50,19 @@ def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None):
         after=after,
         held_out=(HeldOut(5e-3, 3.0), HeldOut(4e-4, 1.0)),
         chosen_anew=None,
+        levels=Levels(
+            DifferenceFound(
+                answer=Differs.YES if sources else Differs.NO,
+                why="",
+                probability=1.0 if sources else 0.0,
+                matters=1e-3,
+                matters_stated=False,
+                independent_samples=900.0,
+                detectable=(),
+            ),
+            follows=(),
+            correction=None,
+        ),
         outliers=(),
         workspace=None,
         locations=(),

@@ -87,7 +87,7 @@ class Values:
 
 
 @dataclass(frozen=True)
-class Left:
+class LeftOfModel:
     """Errors of the tool over a volume: position [µm] and tilt [deg], rms and largest."""
 
     rms_um: float
@@ -121,7 +121,7 @@ class Refitted:
     """
 
     values: Values
-    left: dict[str, Left]
+    left: dict[str, LeftOfModel]
     sources: tuple[SourceLeft, ...]
 
 
@@ -178,11 +178,11 @@ def tool_errors(model: MachineModel, joints: NDArray[np.float64], wanted: Frames
     return np.hstack([actual.position_mm - wanted.position_mm, turn.T / 2.0])
 
 
-def _left(errors: NDArray[np.float64]) -> Left:
+def _left(errors: NDArray[np.float64]) -> LeftOfModel:
     off_um = 1e3 * np.linalg.norm(errors[:, :3], axis=1)
     tilt = np.degrees(np.linalg.norm(errors[:, 3:], axis=1))
     rms = [float(np.sqrt(np.mean(np.square(each)))) for each in (off_um, tilt)]
-    return Left(rms[0], float(off_um.max()), rms[1], float(tilt.max()))
+    return LeftOfModel(rms[0], float(off_um.max()), rms[1], float(tilt.max()))
 
 
 def _typed(own: MachineModel, points: NDArray[np.float64]) -> Values:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.nc.planner import LookAhead
-    from dbbstation.nc.setup import Setup
+    from dbbstation.nc.setup import ControlSetup
     from dbbstation.nc.toolpath import Toolpath
 
 
@@ -64,7 +64,7 @@ class Dialect(ABC):
 
     @abstractmethod
     def read(
-        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: Setup | None = None
+        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: ControlSetup | None = None
     ) -> Toolpath:
         """Return what a program commands.
 
@@ -77,7 +77,7 @@ class Dialect(ABC):
         """
 
     def toolpath(
-        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: Setup | None = None
+        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: ControlSetup | None = None
     ) -> Toolpath:
         """Return what `read` does of a program that moves something.
 

@@ -27,7 +27,7 @@ ZERO = (0.0,) * 6
 
 
 @dataclass(frozen=True)
-class Setup:
+class ControlSetup:
     """What was declared of a control, lengths in mm.
 
     Attributes:

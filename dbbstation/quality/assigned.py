@@ -50,7 +50,7 @@ ANYWHERE_UM = 1e4
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class FormerSitting:
     """The last session of machine and plan.
 
     Attributes:
@@ -79,7 +79,9 @@ class Assigned:
         reference: None: no session before.
     """
 
-    def __init__(self, circles: Sequence[Planned], runs: Sequence[Seen], reference: Reference | None = None) -> None:
+    def __init__(
+        self, circles: Sequence[Planned], runs: Sequence[Seen], reference: FormerSitting | None = None
+    ) -> None:
         self.reference = reference
         self.circles = circles if reference is None else reference.moved(circles)
         self.runs = [one for one in runs if one.analysis is not None]

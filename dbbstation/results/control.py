@@ -36,7 +36,7 @@ class KinematicsResult:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LeftOver:
+class LeftByWay:
     """Errors of the tool over the volume, by how the control is set up: position and tilt, rms and largest."""
 
     way: str
@@ -80,7 +80,7 @@ class ParametersResult:
     model_sha256: str
     low: tuple[float, ...]
     high: tuple[float, ...]
-    left: tuple[LeftOver, ...]
+    left: tuple[LeftByWay, ...]
     sources: tuple[SourceLeftOver, ...]
     home_mm: tuple[float, ...]
     ini: tuple[str, ...]

@@ -14,6 +14,7 @@ from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.job import JobFile, read_job
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.formats.settings_schema import SettingsFile
+from dbbstation.files.gateway import content_of
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_name import SESSION_FILE
@@ -81,7 +82,7 @@ class Operated:
         data = {"tolerances": [one.model_dump(exclude_defaults=True) for one in self.job.tolerances]}
         path = session.absolute().parent / f"{session.name}-tolerances.yaml"
         text = yaml_text({"format": format_of(SettingsFile), **data})
-        before = path.read_text(encoding="utf-8") if path.is_file() else text
+        before = content_of(path).decode(errors="replace") if path.is_file() else text
         if before != text:
             add_note(session, f"the limits of the job were changed, before: {' '.join(before.split())}")
         write_text(path, text, force=True, rewrites=True)

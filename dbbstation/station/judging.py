@@ -11,7 +11,7 @@ from dbbstation.errors import InputError, TraceError
 from dbbstation.files.recordings.entries import RunEntry, RunState
 from dbbstation.files.recordings.judged import circles_of_plan, planned_circles, run_of
 from dbbstation.instrument.reading import DOUBTFUL
-from dbbstation.quality.assigned import Assigned, Reference
+from dbbstation.quality.assigned import Assigned, FormerSitting
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import Others, coefficients_um, seen
@@ -160,7 +160,7 @@ class RunJudge:
         return circles_of_plan(self._writer.session, self._model)
 
     @cached_property
-    def _reference(self) -> Reference | None:
+    def _reference(self) -> FormerSitting | None:
         """Return the session before, if it has every circle of the plan."""
         former, read = self._former, {}
         if former is None:
@@ -173,7 +173,7 @@ class RunJudge:
         dates = [run.started.date() for run in runs if run.started is not None]
         if not dates or any((one.test, str(one.circle.direction)) not in read for one in self._circles):
             return None
-        return Reference(former.folder.name, max(dates), read)
+        return FormerSitting(former.folder.name, max(dates), read)
 
     def _read(self, entry: RunEntry, into: dict[tuple[str, Direction, int], Seen]) -> None:
         """Take in a recorded run; unreadable ones are reported elsewhere."""

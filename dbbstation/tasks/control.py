@@ -21,7 +21,7 @@ from dbbstation.machine.difference import differences, in_words
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.rotation import Rotation
 from dbbstation.machine.travel import check_travel
-from dbbstation.results.control import KinematicsResult, LeftOver, ParametersResult, SourceLeftOver
+from dbbstation.results.control import KinematicsResult, LeftByWay, ParametersResult, SourceLeftOver
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.tasks.programs import program_text, sha256_of
 
@@ -174,7 +174,7 @@ def parameters(
     for i in range(STRUTS):
         settings_of += [f"[JOINT_{i}]", f"HOME and HOME_OFFSET: add {home[i]:.6f}"]
         settings_of += [f"COMP_FILE = joint-{i}.comp", "COMP_FILE_TYPE = 1"] if lines else []
-    left = tuple(LeftOver(way=way, **asdict(one)) for way, one in found.left.items())
+    left = tuple(LeftByWay(way=way, **asdict(one)) for way, one in found.left.items())
     return ParametersResult(
         folder=str(out),
         files=tuple(files),

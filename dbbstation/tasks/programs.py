@@ -14,7 +14,7 @@ from dbbstation.files.formats.linuxcnc_control import lengths_of, parameters_of
 from dbbstation.files.source_text import read_bytes
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse
-from dbbstation.nc.setup import FIRST_PARAMETERS, Setup
+from dbbstation.nc.setup import FIRST_PARAMETERS, ControlSetup
 from dbbstation.results.model_warnings import model_warnings, unknown_causes
 from dbbstation.tasks.models import model_of
 
@@ -121,7 +121,7 @@ def setup_of(
     lengths: Mapping[int, float],
     parameters: Path | None,
     tools: Path | None,
-) -> Setup:
+) -> ControlSetup:
     """Return the offsets and tool lengths of a control as declared and from its files; what is declared comes first.
 
     Args:
@@ -144,7 +144,7 @@ def setup_of(
     table = {} if tools is None else lengths_of(program_text(tools), str(tools))
     own = {tool: (0.0, 0.0, float(length), 0.0, 0.0, 0.0) for tool, length in lengths.items()}
     known = None if parameters is None else parameters_of(program_text(parameters), str(parameters))
-    return Setup(places, table | own, known)
+    return ControlSetup(places, table | own, known)
 
 
 def _content(path: Path) -> bytes:

@@ -15,7 +15,7 @@ from dbbstation.errors import InputError, StationError
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.rs274.reader import read_program
-from dbbstation.nc.setup import Setup
+from dbbstation.nc.setup import ControlSetup
 from dbbstation.nc.toolpath import RowKind, Toolpath
 from dbbstation.sources.contract import Motion
 from tests.nc.interpreter import events, needs_rs274
@@ -106,7 +106,7 @@ READ = {
 }
 """Each was refused once; all are read as LinuxCNC reads them."""
 
-SETUP = Setup({"G28": (1.0, 2.0, -950.0, 0.0, 0.0, 0.0)}, {1: (0.0, 0.0, 2.54, 0.0, 0.0, 0.0)})
+SETUP = ControlSetup({"G28": (1.0, 2.0, -950.0, 0.0, 0.0, 0.0)}, {1: (0.0, 0.0, 2.54, 0.0, 0.0, 0.0)})
 STORED = {5161: 1.0 / 25.4, 5162: 2.0 / 25.4, 5163: -950.0 / 25.4}
 TOOLS = "T1 P1 Z0.1\nT2 P2 Z0\n"
 

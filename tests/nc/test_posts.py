@@ -14,7 +14,7 @@ import pytest
 
 from dbbstation.errors import InputError
 from dbbstation.nc.export import Inverse, compensated_program
-from dbbstation.nc.setup import Setup
+from dbbstation.nc.setup import ControlSetup
 from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import Motion
 from tests.nc.interpreter import MOTION, events, needs_rs274
@@ -30,7 +30,7 @@ COUNT = int(os.environ.get("DBBSTATION_FUZZ", "45"))
 
 PLACES = {"G54": (5.0, -8.0, -1000.0, 0.0, 0.0, 0.0), "G28": (0.0, 0.0, -945.0, 0.0, 0.0, 0.0)}
 LENGTHS = {1: (0.0, 0.0, 12.5, 0.0, 0.0, 0.0), 2: (0.0, 0.0, -3.25, 0.0, 0.0, 0.0)}
-SETUP = Setup(PLACES, LENGTHS)
+SETUP = ControlSetup(PLACES, LENGTHS)
 STORED = {
     number + axis: values[axis] / 25.4
     for number, values in ((5221, PLACES["G54"]), (5161, PLACES["G28"]))
@@ -100,7 +100,7 @@ REFUSED = (
 @pytest.mark.skipif(not NC_FILES.is_dir(), reason="LinuxCNC's nc_files are not installed")
 def test_files_that_come_with_linuxcnc_are_read_as_it_reads_them_or_refused(linuxcnc, tmp_path):
     lengths = dict.fromkeys(range(100), (0.0,) * 6)
-    setup = Setup({"G28": (0.0,) * 6, "G30": (0.0,) * 6}, lengths, {1: 0.0})
+    setup = ControlSetup({"G28": (0.0,) * 6, "G30": (0.0,) * 6}, lengths, {1: 0.0})
     table = "".join(f"T{tool} P{tool} Z0\n" for tool in lengths)
     equal, refused = [], []
     for file in sorted(NC_FILES.glob("*.ngc")):

@@ -15,7 +15,7 @@ import pytest
 
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, compensated_program
-from dbbstation.nc.setup import Setup
+from dbbstation.nc.setup import ControlSetup
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from tests.nc.grammar import part
@@ -47,7 +47,7 @@ LENGTHS = {1: 7.5, 2: -4.0}
 FIRST_OF = {"G28": 5161, "G30": 5181, "G92": 5211, "G54": 5221, "G55": 5241}
 
 
-def declared(seed: int) -> tuple[Setup, dict[int, float], str]:
+def declared(seed: int) -> tuple[ControlSetup, dict[int, float], str]:
     """The setup of a program, and the same as LinuxCNC's parameters and tool table, in inches."""
     places = PLACES if seed % 3 == 0 else {name: PLACES[name] for name in ("G28", "G30")}
     lengths = {tool: (0.0, 0.0, length, 0.0, 0.0, 0.0) for tool, length in LENGTHS.items()}
@@ -55,7 +55,7 @@ def declared(seed: int) -> tuple[Setup, dict[int, float], str]:
     for name, values in places.items():
         stored |= {FIRST_OF[name] + axis: value / (25.4 if axis < 3 else 1.0) for axis, value in enumerate(values)}
     table = "".join(f"T{tool} P{tool} Z{length / 25.4:.9f}\n" for tool, length in LENGTHS.items())
-    return Setup(places, lengths), stored, table
+    return ControlSetup(places, lengths), stored, table
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.rs274.guard import guard_lines
 from dbbstation.nc.rs274.reader import read_program
-from dbbstation.nc.setup import ZERO, Setup
+from dbbstation.nc.setup import ZERO, ControlSetup
 from dbbstation.nc.toolpath import IN_FORCE, PIECE_CORNER_MM, Ending
 from tests.nc.interpreter import events, needs_rs274, printed
 
@@ -119,10 +119,10 @@ def test_moves_in_machine_coordinates_stay_so(linuxcnc):
 @pytest.mark.parametrize("change", [str, str.lower, lambda line: f"N5 {line}", lambda line: line.replace(" ", "\t")])
 def test_a_guard_lets_pass_what_it_holds_for_and_nothing_else(held, change):
     lines = "\n".join(change(line) for line in guard_lines(held))
-    setup = Setup(places={name: values for name, values in held.items() if name != IN_FORCE})
+    setup = ControlSetup(places={name: values for name, values in held.items() if name != IN_FORCE})
     assert len(read_program(f"; part\n{lines}\n{FIRST}M2\n", "part.ngc", setup=setup)) > 0
     for name, values in setup.places.items():
-        off = Setup(places={**setup.places, name: (*values[:5], 0.001)})
+        off = ControlSetup(places={**setup.places, name: (*values[:5], 0.001)})
         with pytest.raises(InputError, match="moves nothing"):
             read_program(f"; part\n{lines}\n{FIRST}M2\n", "part.ngc", setup=off)
 

@@ -17,7 +17,7 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
-from dbbstation.quality.assigned import Assigned, Reference
+from dbbstation.quality.assigned import Assigned, FormerSitting
 from dbbstation.quality.finding import FindingVerdict, Name, undecided
 from dbbstation.quality.knowledge import Run, seen
 from dbbstation.quality.together import read_um
@@ -91,14 +91,14 @@ def test_the_first_circle_alone_decides_nothing_and_a_session_before_decides_it(
     assert alone.finding(alone.runs[0], undecided(Name.TEST, "")).verdict is FindingVerdict.CANNOT_TELL
     assert alone.since(alone.runs[0]) is None
     read = {(test, str(way)): read_um(one) for (test, way), one in runs.items()}
-    before = Reference("monday", date(2026, 5, 12), read)
+    before = FormerSitting("monday", date(2026, 5, 12), read)
     known = Assigned(circles, alone.runs, before)
     assert known.finding(known.runs[0], undecided(Name.TEST, "")).verdict is FindingVerdict.GOOD
     since = known.since(known.runs[0])
     assert since.verdict is FindingVerdict.GOOD
     # The machine was put together anew since: said, and no circle is suspected for it.
     other = {(test, str(way)): read_um(one) for (test, way), one in measured(circles, 6).items()}
-    changed = Assigned(circles, list(runs.values()), Reference("monday", date(2026, 5, 12), other))
+    changed = Assigned(circles, list(runs.values()), FormerSitting("monday", date(2026, 5, 12), other))
     assert suspected(changed) == {}
     since = changed.since(changed.runs[0])
     assert since.verdict is FindingVerdict.CANNOT_TELL

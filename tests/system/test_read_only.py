@@ -29,7 +29,7 @@ def here(tmp_path):
     if os.name == "nt" or (os.geteuid() == 0 and shutil.which("setpriv") is None):
         pytest.skip("no ordinary user to run as")
     folder = tmp_path / "shared"
-    for name in ("small", "sealed"):
+    for name in ("small", "logged"):
         shutil.copytree(FIXTURES / "sessions" / name, folder / name)
     shutil.copy(FIXTURES / "models" / "small.yaml", folder / "model.yaml")
     (folder / "mine").mkdir()
@@ -62,7 +62,7 @@ def run(folder, line):
 @pytest.mark.parametrize(
     "line",
     [
-        "check small sealed",
+        "check small logged",
         "session list small",
         "export small --out mine/e.csv",
         "history . --json",
@@ -82,7 +82,7 @@ def test_what_only_reads_works(here, line):
         "report small --page r.html",
         "history . --table h.csv",
         "session reject small a-ccw-1 --reason spoilt",
-        "session amend sealed --reason changed",
+        "session amend logged --reason changed",
         "fleet . --task circles --out f",
     ],
 )

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dbbstation.nc.setup import Setup
+    from dbbstation.nc.setup import ControlSetup
     from dbbstation.nc.toolpath import Toolpath
 
 MODES = "G21 G90 G94 G17 G40 G49"
@@ -52,7 +52,7 @@ class LinuxCNC(WordDialect):
     takes_setup = True
 
     def read(
-        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: Setup | None = None
+        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: ControlSetup | None = None
     ) -> Toolpath:
         """Return what a program commands."""
         return read_program(text, name, start=start, setup=setup)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.nc.rs274 import codes
 from dbbstation.nc.rs274.codes import ModalGroup
-from dbbstation.nc.rs274.tokens import Comment, Place, Setting, Word, tokens, unknown_value
+from dbbstation.nc.rs274.tokens import Comment, ParameterSetting, Place, Word, tokens, unknown_value
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,7 +39,7 @@ class ProgramBlock:
     place: Place
     words: dict[str, Word] = field(default_factory=dict)
     codes: dict[ModalGroup, Word] = field(default_factory=dict)
-    settings: list[Setting] = field(default_factory=list)
+    settings: list[ParameterSetting] = field(default_factory=list)
     comments: list[str] = field(default_factory=list)
     message: str = ""
 
@@ -59,7 +59,7 @@ def block_of(line: str, place: Place, value_of: Callable[[int | str], float | No
     for token in tokens(_checked(line, place), place, value_of):
         if isinstance(token, Comment):
             _take_comment(block, token)
-        elif isinstance(token, Setting):
+        elif isinstance(token, ParameterSetting):
             block.settings.append(token)
         elif token.letter in "GM":
             _take_code(block, token)

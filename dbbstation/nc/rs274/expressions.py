@@ -71,7 +71,7 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
 }
 
 
-class Reader:
+class ValueReader:
     """Reads values in one line, from a position on.
 
     Args:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274.blocks import BLANKS
-from dbbstation.nc.rs274.expressions import Reader
+from dbbstation.nc.rs274.expressions import ValueReader
 from dbbstation.nc.rs274.tokens import BadLine, Place
 
 if TYPE_CHECKING:
@@ -324,8 +324,8 @@ class Flow:
             raise place.fault(reader.position + 1, "a condition is one value in brackets", "write o100 if [#1 GT 2]")
         return value != 0.0
 
-    def _reader(self, word: OLine, place: Place) -> Reader:
-        return Reader(" " * word.column + word.rest, place, self.value_of)
+    def _reader(self, word: OLine, place: Place) -> ValueReader:
+        return ValueReader(" " * word.column + word.rest, place, self.value_of)
 
 
 def _is_local(which: int | str) -> bool:

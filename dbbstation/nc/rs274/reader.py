@@ -17,7 +17,7 @@ from dbbstation.nc.rs274.cycles import Depths, cycle_steps
 from dbbstation.nc.rs274.flow import Flow
 from dbbstation.nc.rs274.state import AXES, ControlState
 from dbbstation.nc.rs274.tokens import BadLine
-from dbbstation.nc.setup import Setup
+from dbbstation.nc.setup import ControlSetup
 from dbbstation.nc.toolpath import (
     ALL_AXES,
     EXACT_STOP_MM,
@@ -65,7 +65,7 @@ CENTRES = "IJK"
 
 
 def read_program(
-    text: str, file: str, *, start: NDArray[np.float64] | None = None, setup: Setup | None = None
+    text: str, file: str, *, start: NDArray[np.float64] | None = None, setup: ControlSetup | None = None
 ) -> Toolpath:
     """Return what a program commands.
 
@@ -79,7 +79,7 @@ def read_program(
     text = text.removeprefix("\ufeff")
     if "\r" in text and "\n" not in text:
         text = text.replace("\r", "\n")
-    interpreter = _Interpreter(text, file, start, setup or Setup())
+    interpreter = _Interpreter(text, file, start, setup or ControlSetup())
     try:
         interpreter.run_all()
     except BadLine as fault:
@@ -116,7 +116,7 @@ class Feed(NamedTuple):
 class _Interpreter:
     """Modal state; begins as LinuxCNC does, in millimetres."""
 
-    def __init__(self, text: str, file: str, start: NDArray[np.float64] | None, setup: Setup) -> None:
+    def __init__(self, text: str, file: str, start: NDArray[np.float64] | None, setup: ControlSetup) -> None:
         self.path = ToolpathBuilder(file, start)
         self.path.ending = Ending.TEXT  # unless a block says otherwise
         self.path.units_said = False

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.nc.rs274.blocks import ProgramBlock
     from dbbstation.nc.rs274.tokens import Word
-    from dbbstation.nc.setup import Setup
+    from dbbstation.nc.setup import ControlSetup
 
 AXES = "XYZABC"
 
@@ -36,7 +36,7 @@ class ControlState:
         tool: in the spindle; None if not known.
     """
 
-    def __init__(self, setup: Setup, pose: NDArray[np.float64]) -> None:
+    def __init__(self, setup: ControlSetup, pose: NDArray[np.float64]) -> None:
         self.setup, self.pose, self.unit_mm, self.system = setup, pose, 1.0, 1
         self._systems: dict[int, tuple[float, ...]] = {}
         self.g92 = setup.place("G92") or ZERO

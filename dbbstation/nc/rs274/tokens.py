@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from dbbstation.errors import Problem
-from dbbstation.nc.rs274.expressions import NUMBER, Reader
+from dbbstation.nc.rs274.expressions import NUMBER, ValueReader
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -52,7 +52,7 @@ class Word(NamedTuple):
     column: int
 
 
-class Setting(NamedTuple):
+class ParameterSetting(NamedTuple):
     """A parameter by number or lower-case name, and the value that it takes once the line is read."""
 
     parameter: int | str
@@ -100,7 +100,7 @@ def unknown_value(_which: int | str) -> float:
 
 def tokens(
     text: str, place: Place, value_of: Callable[[int | str], float | None] = unknown_value
-) -> Iterator[Word | Setting | Comment]:
+) -> Iterator[Word | ParameterSetting | Comment]:
     """Yield what stands in a line, in order.
 
     Raises:
@@ -118,7 +118,7 @@ def tokens(
         elif kind == "end":
             return
         elif kind in {"word", "setting"}:
-            reader = Reader(text, place, value_of)
+            reader = ValueReader(text, place, value_of)
             reader.position = match.end() if kind == "word" else match.start("setting")
             yield _computed(match, reader, place)
             position = reader.position
@@ -126,14 +126,14 @@ def tokens(
             yield Comment(match[kind or 0], kind == "comment", match.start(kind or 0))
 
 
-def _computed(match: re.Match[str], reader: Reader, place: Place) -> Word | Setting:
+def _computed(match: re.Match[str], reader: ValueReader, place: Place) -> Word | ParameterSetting:
     if match["word"] is not None:
         return _word(match["word"], reader.value(), match.start("word") + 1, place)
     column, which = match.start("setting") + 1, reader.parameter()
     if reader.blanks() != "=":
         raise place.fault(column, "a parameter (#) without a letter before it or = behind it", "write #1=5 or X#1")
     reader.position += 1
-    return Setting(which, reader.value(), column)
+    return ParameterSetting(which, reader.value(), column)
 
 
 def _number(match: re.Match[str], place: Place) -> Word:

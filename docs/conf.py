@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from pathlib import Path
+from types import FunctionType
 from typing import TYPE_CHECKING
 
 HERE = Path(__file__).resolve().parent
@@ -47,8 +48,15 @@ html_show_sourcelink = False
 def setup(app: Sphinx) -> None:
     """Write the pages that come from the code before any page is read."""
     app.connect("builder-inited", lambda _: generate.write_pages(HERE / "_generated"))
+    app.connect("autodoc-skip-member", _of_others)
     app.connect("autodoc-process-docstring", _plain_text, priority=400)  # before napoleon takes sections apart
     app.connect("autodoc-process-docstring", _types, priority=600)  # after it
+
+
+def _of_others(_app: Sphinx, what: str, _name: str, thing: object, skip: bool, _options: object) -> bool:  # noqa: FBT001 - as Sphinx calls it
+    """Skip methods that another package writes into our classes, as matplotlib does."""
+    foreign = what == "class" and isinstance(thing, FunctionType) and not thing.__module__.startswith("dbbstation")
+    return skip or foreign
 
 
 def _plain_text(_app: Sphinx, what: str, _name: str, _thing: object, _options: object, lines: list[str]) -> None:

@@ -100,7 +100,7 @@ def _print_mismatch(result: DiagnosisFigures) -> None:
             f"(probability by chance {chance_in_words(result.probability)})."
         )
     else:
-        echo(f"The recordings agree with the kinematic model (probability {result.probability:.2g}).")
+        echo(f"The kinematic model explains these circles (probability {result.probability:.2g}).")
     echo()
 
 

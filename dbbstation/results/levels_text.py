@@ -86,8 +86,11 @@ def _hidden(one: DifferenceFound, unit: str) -> Iterator[str]:
     """What fitted parameters conceal of causes, and what would show it."""
     named = [d for d in one.detectable if d.size is not None and d.confirm is not None]
     for d in [d for d in named if d.concealed > LIKELY][:MOST_LISTED]:
-        share = f"fitted parameters take up {100.0 * d.concealed:.0f} % of its squares"
-        yield f"Up to {_size(d.size, unit)} rms of {d.follows} may be hidden: {share}. {d.confirm}"
+        share = f"{100.0 * d.concealed:.0f} %"
+        if share == "100 %":
+            yield f"Fitted parameters can hide {d.follows} wholly. {d.confirm}"
+        else:
+            yield f"Up to {_size(d.size, unit)} rms of {d.follows} may be hidden: fitted parameters take up {share} of its squares. {d.confirm}"
 
 
 def _followed(one: Followed, unit: str, values: Mapping[str, Mapping[str, Value]], rows: str) -> Iterator[str]:

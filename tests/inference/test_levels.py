@@ -24,7 +24,17 @@ from dbbstation.inference.followed import (
 )
 from dbbstation.inference.law_form import law_form
 from dbbstation.inference.left_over import left_over
-from dbbstation.inference.levels import TIME, Detectable, Differs, Followed, FollowsAnswer, LawForm, difference_of
+from dbbstation.inference.levels import (
+    TIME,
+    Detectable,
+    DifferenceFound,
+    Differs,
+    Followed,
+    FollowsAnswer,
+    LawForm,
+    Levels,
+    difference_of,
+)
 from dbbstation.inference.levels_of import levels_of, slow_chance
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
 from dbbstation.inference.read_off import Trial, read_off
@@ -32,6 +42,7 @@ from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import DensityGains, Verdict
+from dbbstation.results.levels_text import level_sentences
 from tests.inference.tables import direction, table
 from tests.inference.test_channel import EFFECTS, channel
 
@@ -337,3 +348,16 @@ def test_a_correction_is_made_of_what_follows(both):
     ]
     assert chosen.errors_with(()) == pytest.approx(every, rel=0.05)
     assert np.mean(chosen.errors_with(())) < np.mean(chosen.errors_with({"q"}))
+
+
+@pytest.mark.parametrize(
+    ("concealed", "said"),
+    [
+        (0.999, "Fitted parameters can hide gravity wholly. Measure f at two heights."),
+        (0.91, "Up to 4 µm rms of gravity may be hidden: fitted parameters take up 91 % of its squares."),
+    ],
+)
+def test_what_fitted_parameters_hide_is_said_with_what_shows_it(concealed, said):
+    gravity = Detectable("gravity", 4.0, concealed, "Measure f at two heights.")
+    differs = DifferenceFound(Differs.NO, "", 0.1, 1.0, False, 900.0, (gravity,))  # noqa: FBT003
+    assert said in " ".join(level_sentences(Levels(differs, (), None), "µm", {}))

@@ -282,7 +282,7 @@ def test_poses(run, tmp_path, model, text, what):
 
 
 def test_a_model_of_another_machine_writes_no_programs(run, tmp_path, model):
-    machine = shipped_folder("fixtures") / "machines" / "every-key.yaml"
+    machine = shipped_folder("fixtures") / "machines" / "greatest-feed.yaml"
     plan = shipped_folder("protocols") / "plans" / "table2.yaml"
     files = ["--plan", plan, "--machine", machine, "--model", model]
     outcome = run("program", *files, "--out", tmp_path / "nc")

@@ -67,7 +67,7 @@ PRINTED = {
 NO_FIGURE = {
     **{
         f"budget.SetUpKnowledge.u_{stated}_um": "stated by the session: it goes into budgets"
-        for stated in ("bar", "temperature", "ball", "ball_z")
+        for stated in ("bar", "temperature", "ball", "ball_z", "form")
     },
     "quick_look.QuickLook.sigma_um": "noise of a sample, not printed",
     "outlier.Outlier.uncertainty_um": "beside a run that is left out, not beside a figure of the machine",

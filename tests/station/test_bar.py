@@ -32,7 +32,7 @@ NOW = datetime(2026, 11, 20, 8, 0, tzinfo=UTC)
 BAR = Bar("DBB-0042", 150.0003, 0.0003, NOW, 20.0, 10.0, 10.0, 150.0023, 0.3, "ZB-17")
 PLATE = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
 UNDER_SPINDLE = read_plan(shipped_folder("protocols") / "plans" / "conventional.yaml")
-CALIBRATOR = ["--calibrator", "ZB-17", "--calibrator-mm", "150.0003", "--calibrator-u-um", "0.25"]
+CALIBRATOR = ["--calibrator-serial", "ZB-17", "--calibrator-mm", "150.0003", "--calibrator-u-um", "0.25"]
 CALIBRATOR += ["--certified", "2026-03-01", "--temp-c", "20.3", "--serial-number", "DBB-0042"]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.table.units import meaning_of, stated_meaning
-from dbbstation.errors import InputError
+from dbbstation.errors import ArgumentError
 from dbbstation.inference.channel import Base, Channel
 from dbbstation.inference.settle import settle
 from dbbstation.inference.variables import Kind, Variable
@@ -36,7 +36,7 @@ def test_a_driven_variable_is_stated_with_its_unit_or_without():
     assert found["q1"] == stated_meaning("deg")
     assert (found["torque"].unit, found["torque"].driven) == ("N m", True)
     assert (found["current_a"].unit, found["current_a"].driven) == ("A", True)
-    with pytest.raises(InputError, match="torque=N m:cause"):
+    with pytest.raises(ArgumentError, match="torque=N m:cause"):
         stated_variables("torque=N m:cause")
 
 

@@ -36,7 +36,7 @@ def may_write(folder: Path) -> bool:
 
 def open_private(path: str, flags: int) -> int:
     """Open a file as `open` asks for it; if it is made, only its owner may read it."""
-    return os.open(path, flags, 0o600)
+    return os.open(path, flags | _flags(), 0o600)
 
 
 def open_to_change(path: Path, *, create: bool = False, private: bool = False) -> int:

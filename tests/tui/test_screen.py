@@ -303,7 +303,7 @@ def test_a_verdict_that_was_not_given_is_asked_for_again(short_plan: InlinePlan,
         await circle(pilot, app)
         await press(app, "q")
         await until(pilot, lambda: isinstance(app.screen, TemperatureQuestion))
-        await press(app, "escape")
+        await press(app, "enter")
         await until(pilot, lambda: app.board.state is State.STOPPED)
 
     async def go_on(pilot: Pilot[None], app: StationApp) -> None:

@@ -87,6 +87,7 @@ class Assigned:
         self.runs = [one for one in runs if one.analysis is not None]
         self._planned = [self._label(one.run.test, one.run.circle.direction) for one in self.runs]
         self._known: dict[tuple[int, ...], float] = {}
+        self._logs: dict[tuple[int, int], float] = {}
         self._added: dict[tuple[int, int], tuple[NDArray[np.float64], NDArray[np.float64], float]] = {}
 
     def _label(self, test: str, direction: str) -> int:
@@ -96,7 +97,8 @@ class Assigned:
         """Return the logarithm of the odds against a run's own circle."""
         at, known = self.runs.index(one), self._looked_up
         own = max(score for labels, score in known.items() if labels[at] == self._planned[at])
-        return max(score for labels, score in known.items() if labels[at] != self._planned[at]) - own
+        others = (score for labels, score in known.items() if labels[at] != self._planned[at])
+        return max(others, default=-np.inf) - own
 
     def finding(self, one: Seen, undecided: Finding) -> Finding:
         """Return a finding on which circle a run shows, decided where all runs together decide it."""
@@ -145,22 +147,24 @@ class Assigned:
         """Return assignments with their scores: mistake by mistake about the likeliest so far."""
         followed: set[tuple[int, ...]] = set()
         best = [tuple(self._planned)]
-        self.score(best[0])
+        least = self.score(best[0]) - self._cost
         while any(labels not in followed for labels in best):
             for labels in [each for each in best if each not in followed]:
                 followed.add(labels)
                 for neighbour in self._neighbours(labels):
                     self.score(neighbour)
             best = sorted(self._known, key=self._known.__getitem__, reverse=True)[:WIDE]
+            # One mistake more cannot bring more than it costs where one alone lost as much.
+            best = [labels for labels in best if self._known[labels] >= least]
         return self._known
 
     def _neighbours(self, labels: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
         """Yield assignments that differ by one run, by all runs of a mounting, or by two mountings that change places."""
-        everything = (*range(len(self.circles)), ELSEWHERE, BESIDE, LARGER)
-        for at, label in enumerate(labels):
-            yield from (_put(labels, {at: other}) for other in everything if other != label)
+        open_to = [at for at in range(len(labels)) if not self._settled(labels, [at])]
+        for at in open_to:
+            yield from (_put(labels, {at: other}) for other in self._everything if other != labels[at])
         groups = self._groups
-        for group in groups:
+        for group in (one for one in groups if not self._settled(labels, one)):
             for test in dict.fromkeys(one.test for one in self.circles):
                 changed = self._as_test(group, test)
                 if changed is not None:
@@ -171,6 +175,21 @@ class Assigned:
                 second = self._as_test(other, self.runs[one[0]].run.test)
                 if first is not None and second is not None:
                     yield _put(labels, {**first, **second})
+
+    def _settled(self, labels: tuple[int, ...], runs: Sequence[int]) -> bool:
+        """Return whether no other circles of these runs can come near the planned assignment, wherever they were read.
+
+        No density of a reading is above that at its expectation, known machine errors taken for sure.
+        """
+        others = [k for k in range(len(labels)) if k not in runs]
+        most = sum(max(-0.5 * self._log_variance(k, label) for label in self._everything) for k in runs)
+        cost = self._cost if labels == tuple(self._planned) else 0.0
+        reached = self._likelihood(labels, others) + most - self._mistakes(labels) - cost
+        return reached <= self._known[tuple(self._planned)] - 2.0 * LIMIT
+
+    @cached_property
+    def _everything(self) -> tuple[int, ...]:
+        return (*range(len(self.circles)), ELSEWHERE, BESIDE, LARGER)
 
     @cached_property
     def _groups(self) -> list[list[int]]:
@@ -207,13 +226,17 @@ class Assigned:
     def _same_way(self, run: int, label: int) -> bool:
         return label >= 0 and self.circles[label].circle.direction is self.runs[run].run.circle.direction
 
-    def _likelihood(self, labels: Sequence[int]) -> float:
-        """Return the log density of all readings, machine errors of all sizes alike probable."""
+    def _likelihood(self, labels: Sequence[int], runs: Sequence[int] | None = None) -> float:
+        """Return the log density of readings, machine errors of all sizes alike probable.
+
+        Args:
+            runs: whose readings; None: of all.
+        """
         of_machine = self._of_machine.shape[2]
         wide = of_machine + self._of_session.shape[2]
         square, pull, apart = np.zeros((wide, wide)), np.zeros(wide), 0.0
-        for run, label in enumerate(labels):
-            gram, along, own = self._part(run, label)
+        for run in range(len(labels)) if runs is None else runs:
+            gram, along, own = self._part(run, labels[run])
             square, pull, apart = square + gram, pull + along, apart + own
         scale = np.ones((len(SIZES), wide))
         scale[:, :of_machine] = SIZES[:, None]
@@ -233,21 +256,32 @@ class Assigned:
         if label == ELSEWHERE:
             off = read_um(one) - expected_um(self.circles[self._planned[run]])
             wide = self._of_machine.shape[2] + self._of_session.shape[2]
-            apart = float(off @ off) / ELSEWHERE_UM**2 + 2.0 * COEFFICIENTS * float(np.log(ELSEWHERE_UM))
+            apart = float(off @ off) / ELSEWHERE_UM**2 + self._log_variance(run, label)
             found = np.zeros((wide, wide)), np.zeros(wide), apart
         else:
             shown = self._planned[run] if label < 0 else label
-            own = self._own[shown] + one.u_um**2 * np.eye(COEFFICIENTS)
-            for k in {BESIDE: (FIRST_COSINE, FIRST_SINE), LARGER: (0,)}.get(label, ()):
-                own[k, k] += ELSEWHERE_UM**2
             columns = np.hstack([self._of_machine[shown], self._of_session[shown]])
             off = read_um(one) - expected_um(self.circles[shown])
-            root = np.linalg.cholesky(own)
+            root = self._root(run, label)
             white, apart_by = np.linalg.solve(root, columns), np.linalg.solve(root, off)
-            logs = 2.0 * float(np.sum(np.log(np.diagonal(root))))
-            found = white.T @ white, white.T @ apart_by, float(apart_by @ apart_by) + logs
+            apart = float(apart_by @ apart_by) + self._log_variance(run, label)
+            found = white.T @ white, white.T @ apart_by, apart
         self._added[run, label] = found
         return found
+
+    def _root(self, run: int, label: int) -> NDArray[np.float64]:
+        """Return the Cholesky factor of what a reading scatters by beside all others, shape (7, 7) [µm]."""
+        own = self._own[self._planned[run] if label < 0 else label] + self.runs[run].u_um ** 2 * np.eye(COEFFICIENTS)
+        for k in {BESIDE: (FIRST_COSINE, FIRST_SINE), LARGER: (0,)}.get(label, ()):
+            own[k, k] += ELSEWHERE_UM**2
+        return np.linalg.cholesky(own)
+
+    def _log_variance(self, run: int, label: int) -> float:
+        if label == ELSEWHERE:
+            return 2.0 * COEFFICIENTS * float(np.log(ELSEWHERE_UM))
+        if (run, label) not in self._logs:
+            self._logs[run, label] = 2.0 * float(np.sum(np.log(np.diagonal(self._root(run, label)))))
+        return self._logs[run, label]
 
     @cached_property
     def _of_machine(self) -> NDArray[np.float64]:

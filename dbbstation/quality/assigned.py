@@ -274,7 +274,7 @@ class Assigned:
         own = self._own[self._planned[run] if label < 0 else label] + self.runs[run].u_um ** 2 * np.eye(COEFFICIENTS)
         for k in {BESIDE: (FIRST_COSINE, FIRST_SINE), LARGER: (0,)}.get(label, ()):
             own[k, k] += ELSEWHERE_UM**2
-        return np.linalg.cholesky(own)
+        return np.asarray(np.linalg.cholesky(own), dtype=np.float64)
 
     def _log_variance(self, run: int, label: int) -> float:
         if label == ELSEWHERE:

@@ -79,14 +79,16 @@ def _watch(end: int, seen: Seen) -> None:
     while END not in seen.raw:
         came = os.read(end, 65536)
         seen.raw += came
-        for piece in came.splitlines(keepends=True):
-            stream.feed(piece)
-        shown = [line.rstrip() for line in screen.display]
-        while shown and not shown[-1]:
-            shown.pop()
-        seen.coloured |= any(cell.fg != "default" for row in screen.buffer.values() for cell in row.values())
-        if shown != seen.last:
-            seen.screens.append(shown)
+        # What is drawn and taken away at once is looked at before it is erased.
+        for drawn in re.split(rb"(?=\r\x1b\[2K)", came):
+            for piece in drawn.splitlines(keepends=True):
+                stream.feed(piece)
+            shown = [line.rstrip() for line in screen.display]
+            while shown and not shown[-1]:
+                shown.pop()
+            seen.coloured |= any(cell.fg != "default" for row in screen.buffer.values() for cell in row.values())
+            if shown != seen.last:
+                seen.screens.append(shown)
     seen.raw = seen.raw.removesuffix(END)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from typing import TYPE_CHECKING
 
 import yaml
@@ -10,6 +11,8 @@ import yaml
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.inputs import input_book, virtual_so_far
 from dbbstation.files.provenance import Provenance
+from dbbstation.files.recordings.former import former_sessions
+from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.tasks.session_figures import session_figures
 from tests.cli.conftest import call
@@ -38,3 +41,11 @@ def test_what_comes_from_a_virtual_session_says_so(tmp_path: Path) -> None:
     assert next(iter(comments.items())) == ("VIRTUAL MACHINE", "computed from model.yaml")
     # Its history is one of its own.
     assert session_figures(session).machine == "virtual PM600-0007"
+
+
+def test_a_virtual_session_beside_a_real_one_does_not_mark_it(tmp_path: Path) -> None:
+    for name in ("small", "virtual"):
+        shutil.copytree(shipped_folder("fixtures") / "sessions" / name, tmp_path / name)
+    with input_book():
+        assert not former_sessions(read_session(tmp_path / "small"), tmp_path)
+        assert virtual_so_far() == ()

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError
 from dbbstation.files.recordings.entries import RunState
-from dbbstation.files.recordings.session import read_session
+from dbbstation.files.recordings.session import parse_session
 from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.machine.difference import differences
 
@@ -15,13 +14,14 @@ if TYPE_CHECKING:
     from datetime import datetime
     from pathlib import Path
 
+    from dbbstation.errors import Problem
     from dbbstation.files.recordings.session import SessionFolder
 
 DEPTH = 2
 """Folders below the one that is searched: sessions of a machine, of a month."""
 
 MOST = 30
-"""Sessions that are read: each takes some hundredths of a second, and nobody looks further back here."""
+"""Sessions that are read, the newest first; reading one takes some hundredths of a second."""
 
 
 def former_sessions(
@@ -43,9 +43,11 @@ def former_sessions(
     for _, folder in dated_folders(under):
         if folder == now.folder.absolute():
             continue
-        try:
-            then = read_session(folder)
-        except InputError:
+        faults: list[Problem] = []
+        then = parse_session(
+            folder, faults
+        )  # not `read_session`: a virtual neighbour would mark this session's outputs
+        if then is None or faults:
             continue  # the list of sessions says what is wrong with it
         runs = then.in_state(RunState.ACCEPTED)
         ended = max((run.started for run in runs if run.started is not None), default=None)

@@ -170,10 +170,9 @@ def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: NDArray[np.
     if shift_mm.max(initial=0.0) <= largest_mm:
         return
     worst = int(np.argmax(shift_mm))
-    line = int(toolpath.line[pieces.row[worst]])
     raise StationError(
         f"the model asks for a correction of {shift_mm[worst]:.3f} mm here, more than {largest_mm:g} mm",
-        where=f"{toolpath.name}:{line}" if line else toolpath.name,
+        where=toolpath.where(int(pieces.row[worst])),
         remedy="check that the model is of this machine and its values are right; a machine that is that far off needs "
         "--largest-correction-mm",
     )

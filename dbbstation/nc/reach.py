@@ -60,7 +60,7 @@ def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
     unit, key = ("deg/min", "greatest_turn_deg_min") if turning[row] else ("mm/min", "greatest_feed_mm_min")
     raise MachineError(
         f"the feed is {toolpath.feed[row]:g} {unit}, the machine's greatest {limit[row]:g} {unit}",
-        where=_where(toolpath, row),
+        where=toolpath.where(row),
         remedy=f"give a smaller F; what the machine reaches stands in its file as `{key}`",
     )
 
@@ -91,13 +91,8 @@ class _Poses:
     def refuse(self, machine: Machine, toolpath: Toolpath, outside: int | None) -> None:
         """Refuse a pose, naming its line."""
         if outside is not None:
-            where = _where(toolpath, int(self.row[outside]))
+            where = toolpath.where(int(self.row[outside]))
             check_travel(machine, self.poses[outside : outside + 1], where=where)
-
-
-def _where(toolpath: Toolpath, row: int) -> str:
-    line = int(toolpath.line[row])
-    return f"{toolpath.name}:{line}" if line else toolpath.name
 
 
 def _is_inside(machine: Machine, poses: NDArray[np.float64]) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
 from dbbstation.nc.compensate import Prefer
+from dbbstation.nc.toolpath import line_of
 
 if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
@@ -49,7 +50,7 @@ def check_kept(name: str, done: Compensation, asked_um: float, machine: Machine)
     if done.chord_um > asked_um:
         raise StationError(
             f"the path is kept within {up(done.chord_um)} µm here, not within {asked_um:g} µm",
-            where=where(name, done.chord_line),
+            where=line_of(name, done.chord_line),
             remedy=f"--chord-um {up(done.chord_um)} is kept everywhere; without --strict the program is written as it is",
         )
     if math.isfinite(done.slowest_mm_min):
@@ -57,7 +58,7 @@ def check_kept(name: str, done: Compensation, asked_um: float, machine: Machine)
         raise StationError(
             f"the control reaches {f'F{reached}' if reached else 'no F'} here, with {said_acceleration(machine)}; the program takes about "
             f"{done.seconds:.0f} s at feed, {done.nominal_seconds:.0f} as written",
-            where=where(name, done.slowest_line),
+            where=line_of(name, done.slowest_line),
             remedy=(f"F{reached} is kept everywhere; " if reached else "")
             + "without --strict the program is written as it is",
         )
@@ -67,11 +68,6 @@ def said_acceleration(machine: Machine) -> str:
     """Return the acceleration, and whether the machine file states it."""
     known = "of the machine file" if machine.acceleration_mm_s2 is not None else "assumed: the machine file has none"
     return f"the acceleration of {machine.planned_acceleration_mm_s2 / 1e3:g} m/s² ({known})"
-
-
-def where(name: str, line: int) -> str:
-    """Return the place of a line in a program."""
-    return f"{name}:{line}" if line else name
 
 
 def up(value: float) -> str:

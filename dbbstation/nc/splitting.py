@@ -283,7 +283,7 @@ def _cells(
 
 
 def _in(toolpath: Toolpath, number: NDArray[np.float64]) -> Pieces:
-    number = np.maximum(np.ceil(np.nan_to_num(number)), 1.0)
+    number = np.maximum(np.ceil(number), 1.0)
     _check_number(toolpath, number.sum())
     row, end = in_pieces(number.astype(np.int64))
     return Pieces(row + (end - 1.0 / number[row]), row + end)

@@ -123,6 +123,10 @@ class Toolpath:
     def __len__(self) -> int:
         return len(self.kind)
 
+    def where(self, row: int) -> str:
+        """Return the line of a row, for messages."""
+        return line_of(self.name, int(self.line[row]))
+
     @property
     def corner_mm(self) -> float | None:
         """Return the rounding allowed at the first move [mm], or None."""
@@ -142,17 +146,9 @@ class Toolpath:
         place = dict(zip(row[last].tolist(), np.flatnonzero(last).tolist(), strict=True))
         corners = self.corners_mm[row]
         return replace(
-            self,
-            kind=self.kind[row],
+            self.only(row),
             poses=poses,
-            feed_mm_min=self.feed_mm_min[row],
-            feed_deg_min=self.feed_deg_min[row],
-            dwell_s=self.dwell_s[row],
-            line=self.line[row],
             corners_mm=np.where((corners <= 0.0) & ~last, PIECE_CORNER_MM, corners),
-            offset=self.offset[row],
-            unknown=self.unknown[row],
-            in_machine=self.in_machine[row],
             text=MappingProxyType({place[old]: text for old, text in self.text.items()}),
             arc=None,
         )
@@ -239,7 +235,10 @@ class Toolpath:
 
     def at_time(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return commanded poses at times after the start, shape (n, 6); the ends hold beyond them."""
-        return self._interpolated(time_s, self.end_s)
+        if not len(self):
+            raise ValueError(f"{self.name} has no moves")
+        nodes, ends_s = np.vstack([self.before[:1], self.poses]), np.concatenate([[0.0], self.end_s])
+        return np.column_stack([np.interp(time_s, ends_s, nodes[:, axis]) for axis in range(6)])
 
     def between(self, row: NDArray[np.int64], share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return poses within rows, shape (k, 6); `share` 0 before the row, 1 after it, both of shape (k,)."""
@@ -259,15 +258,8 @@ class Toolpath:
 
     def pieces(self, step_mm: float, step_deg: float) -> NDArray[np.int64]:
         """Return the number of such pieces in each row, shape (n,)."""
-        pieces = np.maximum(np.ceil(np.maximum(self.tip_mm / step_mm, self.turn_deg / step_deg)), 1.0)
-        return np.where(np.isnan(pieces), 1.0, pieces).astype(np.int64)
-
-    def _interpolated(self, at: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
-        if not len(self):
-            raise ValueError(f"{self.name} has no moves")
-        nodes = np.vstack([self.before[:1], self.poses])
-        ends = np.concatenate([[0.0], ends])
-        return np.column_stack([np.interp(at, ends, nodes[:, axis]) for axis in range(6)])
+        pieces = np.ceil(np.maximum(self.tip_mm / step_mm, self.turn_deg / step_deg))
+        return np.maximum(pieces, 1.0).astype(np.int64)
 
 
 _NO_FEED = (np.nan, np.nan)
@@ -474,13 +466,17 @@ def in_pieces(pieces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.
     return row, number / pieces[row]
 
 
+def line_of(program: str, line: int) -> str:
+    """Return a line of a program, for messages; 0 is the program."""
+    return f"{program}:{line}" if line else program
+
+
 def rounded(poses: NDArray[np.float64], decimals: Sequence[int] = DECIMALS) -> NDArray[np.float64]:
     """Return poses, shape (n, 6), as programs write them, without -0."""
     return np.column_stack([np.round(poses[:, axis], places) for axis, places in enumerate(decimals)]) + 0.0
 
 
 def _norm(vectors: NDArray[np.float64], least: float) -> NDArray[np.float64]:
-    """Return lengths of vectors, shape (n, 3), without components below `least`; zero for unknown places."""
-    known = np.nan_to_num(vectors)
-    length: NDArray[np.float64] = np.linalg.norm(np.where(np.abs(known) < least, 0.0, known), axis=1)
+    """Return lengths of vectors, shape (n, 3), without components below `least`."""
+    length: NDArray[np.float64] = np.linalg.norm(np.where(np.abs(vectors) < least, 0.0, vectors), axis=1)
     return length

@@ -187,8 +187,7 @@ class WordDialect(Dialect):
                     line = self._move(kind, words[place], feeds[place], state)
                     yield self.in_machine(line) if in_machine[place] else line
                 except CannotSayError as error:
-                    source = int(toolpath.line[begin + place])
-                    where = f"{toolpath.name}:{source}" if source else toolpath.name
+                    where = toolpath.where(begin + place)
                     raise CannotSayError(error.dialect, error.asked, where=where) from None
 
     def _move(self, kind: int, words: str, feed: float, state: _Modal) -> str:

@@ -64,19 +64,13 @@ def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> 
         return schema.model_validate(document.data)
     except ValidationError as error:
         # Naming what a key may have been meant for takes a millisecond: for the first few only.
-        details = [one for one in error.errors(include_url=False) if not _follows(one, error)]
+        every = error.errors(include_url=False)
+        inside = {detail["loc"][:depth] for detail in every for depth in range(len(detail["loc"]))}
+        # A list is too short where its items have faults, which are told.
+        details = [one for one in every if one["type"] != "too_short" or one["loc"] not in inside]
         details.sort(key=lambda detail: _place(document, detail))
         faults += few([_problem(document, schema, detail) for detail in details[: MOST_FAULTS + 1]], len(details))
         return None
-
-
-def _follows(detail: ErrorDetails, error: ValidationError) -> bool:
-    """Return whether a list is too short only because its items have faults."""
-    place = detail["loc"]
-    return detail["type"] == "too_short" and any(
-        len(other["loc"]) > len(place) and other["loc"][: len(place)] == place
-        for other in error.errors(include_url=False, include_context=False, include_input=False)
-    )
 
 
 def format_of(schema: type[Schema]) -> str:

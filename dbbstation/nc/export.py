@@ -22,6 +22,7 @@ from dbbstation.nc.reach import STEP_DEG as REACH_DEG
 from dbbstation.nc.reach import STEP_MM as REACH_MM
 from dbbstation.nc.reach import check_feeds, check_reach
 from dbbstation.nc.remarks import check_kept, remarks_on
+from dbbstation.nc.setup import offset_text
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
@@ -332,10 +333,7 @@ def _holds_for(path: Toolpath) -> list[str]:
     """Return what a program is right for, besides the model."""
     if path.holds is None:
         return []
-    held = {
-        name: " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", values, strict=True) if value) or "zero"
-        for name, values in path.holds.items()
-    }
+    held = {name: offset_text(values) for name, values in path.holds.items()}
     lengths = {name: held.pop(name) for name in list(held) if name[0] == "H"}
     said = [f"right for {'' if name == 'G92' else 'work system '}{name}: {offset}" for name, offset in held.items()]
     said += [f"right for the length of tool {name[1:]}: {length}" for name, length in lengths.items()]

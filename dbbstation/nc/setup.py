@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 from dbbstation.nc.toolpath import SYSTEMS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+
+PER_SYSTEM = 20
+"""Numbered parameters from one work system to the next."""
 
 FIRST_PARAMETERS = {
     "G28": 5161,
     "G30": 5181,
     "G92": 5211,
-    **{name: 5221 + 20 * place for place, name in enumerate(SYSTEMS)},
+    **{name: 5221 + PER_SYSTEM * place for place, name in enumerate(SYSTEMS)},
 }
 """First of six numbered parameters of each place [LinuxCNC, G-code overview, Numbered Parameters]."""
 
@@ -24,6 +27,12 @@ ROTATION_BEHIND = 9
 G92_IN_FORCE = 5210
 
 ZERO = (0.0,) * 6
+
+
+def offset_text(offset: Sequence[float]) -> str:
+    """Return an offset, shape (6,) [mm, deg], as its words that are not zero."""
+    words = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", offset, strict=True) if value)
+    return words or "zero"
 
 
 @dataclass(frozen=True)

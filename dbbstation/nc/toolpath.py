@@ -48,6 +48,10 @@ class RowKind(IntEnum):
     """From here on numbers count otherwise: `G54` to `G59.3`, `G10 L2 …`, `G43 H1`, `G49`."""
 
 
+MESSAGE = "MSG, "
+"""Begin of a message that the control shows."""
+
+
 class Ending(StrEnum):
     """How a program ends."""
 

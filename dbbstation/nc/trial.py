@@ -14,7 +14,7 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.nc.mark import is_marked, marked
-from dbbstation.nc.toolpath import IN_FORCE, Ending, RowKind, ToolpathBuilder
+from dbbstation.nc.toolpath import IN_FORCE, MESSAGE, Ending, RowKind, ToolpathBuilder
 from dbbstation.nc.words import WordDialect
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 FIRST = np.array([10.0, -20.0, -1000.0, 1.0, -2.0, 3.0])
 SECOND = np.array([10.5, -20.0, -1000.0, 1.0, -2.0, 3.5])
-
-SHOWN = "MSG, "
 
 POSE_WITHIN = 1e-3
 """How far a pose may be read from where it was written: decimals are the dialect's own affair [mm, deg]."""
@@ -217,8 +215,8 @@ def _with_messages(path: Toolpath) -> dict[int, str | None]:
     told = np.flatnonzero(path.kind != RowKind.COMMENT)
     for row, after in pairwise(told.tolist()):
         said = path.text.get(row, "")
-        if path.kind[row] == RowKind.MESSAGE and said.startswith(SHOWN) and path.kind[after] == RowKind.PAUSE:
-            texts |= {row: None, after: texts.get(after) or said.removeprefix(SHOWN)}
+        if path.kind[row] == RowKind.MESSAGE and said.startswith(MESSAGE) and path.kind[after] == RowKind.PAUSE:
+            texts |= {row: None, after: texts.get(after) or said.removeprefix(MESSAGE)}
     return texts
 
 

@@ -10,7 +10,7 @@ from dbbstation.nc.dialect import plain
 from dbbstation.nc.planner import LookAhead
 from dbbstation.nc.rs274.guard import guard_lines, length_lines
 from dbbstation.nc.rs274.reader import read_program
-from dbbstation.nc.toolpath import Ending
+from dbbstation.nc.toolpath import MESSAGE, Ending
 from dbbstation.nc.words import WordDialect, digits
 
 if TYPE_CHECKING:
@@ -129,4 +129,4 @@ class LinuxCNC(WordDialect):
 
 def message_before_stop(text: str) -> str:
     """Return a pause's text as a message: one line, square brackets."""
-    return f"MSG, {plain(text).replace('(', '[').replace(')', ']')}"
+    return f"{MESSAGE}{plain(text).replace('(', '[').replace(')', ']')}"

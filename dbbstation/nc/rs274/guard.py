@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.nc.toolpath import IN_FORCE, SYSTEMS
+from dbbstation.nc.rs274.state import LENGTH, SYSTEM
+from dbbstation.nc.setup import FIRST_PARAMETERS, PER_SYSTEM, ZERO, offset_text
+from dbbstation.nc.toolpath import IN_FORCE, MESSAGE, SYSTEMS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -19,7 +21,9 @@ FIRST_LABEL, FIRST_LENGTH_LABEL = 100, 1000
 WITHIN = 5e-4
 """How far offsets may be off the declared ones, the sum of all [mm, deg]."""
 
-_SYSTEM, _PER_SYSTEM, _G92, _LENGTH = 5201, 20, 5211, 5401
+_IN_FORCE = FIRST_PARAMETERS[SYSTEMS[0]] - PER_SYSTEM
+"""Parameter of X to which the number of the work system in force is added, 20 for each."""
+
 _AXES = 9
 _TERMS = 5
 """In one line; a line of LinuxCNC has an end."""
@@ -35,12 +39,13 @@ def guard_lines(holds: Mapping[str, Sequence[float]]) -> list[str]:
     checks = []
     for name in (IN_FORCE, *SYSTEMS):
         if name in holds:
-            number = f"[{{}}+{_PER_SYSTEM}*#5220]" if name == IN_FORCE else "{}"
-            first = _SYSTEM + (0 if name == IN_FORCE else _PER_SYSTEM * (SYSTEMS.index(name) + 1))
+            number = f"[{{}}+{PER_SYSTEM}*#{SYSTEM}]" if name == IN_FORCE else "{}"
+            first = FIRST_PARAMETERS.get(name, _IN_FORCE)
             parameters = [f"#{number.format(first + k)}" for k in range(_AXES + 1)]
-            checks.append((parameters, holds[name], _WORK.format(name, _said(holds[name]))))
-    g92 = holds.get("G92", (0.0,) * 6)
-    checks.append(([f"#{_G92 + k}" for k in range(_AXES)], g92, _OTHER.format(_said(g92))))
+            checks.append((parameters, holds[name], _WORK.format(name, offset_text(holds[name]))))
+    g92 = holds.get("G92", ZERO)
+    parameters = [f"#{FIRST_PARAMETERS['G92'] + k}" for k in range(_AXES)]
+    checks.append((parameters, g92, _OTHER.format(offset_text(g92))))
     if not any(name.startswith("H") for name in holds):
         checks.append((["#<_tool_offset>"], (), _TOOL))
     return list(_stops(checks, FIRST_LABEL))
@@ -48,14 +53,9 @@ def guard_lines(holds: Mapping[str, Sequence[float]]) -> list[str]:
 
 def length_lines(tool: str, length: Sequence[float], row: int) -> Iterator[str]:
     """Yield the same for the length of a tool, `H1`, that has come in force in a row of the toolpath."""
-    parameters = [f"#{_LENGTH + k}" for k in range(_AXES)]
-    check = parameters, length, _LENGTHS.format(tool[1:], _said(length))
+    parameters = [f"#{LENGTH + k}" for k in range(_AXES)]
+    check = parameters, length, _LENGTHS.format(tool[1:], offset_text(length))
     yield from _stops([check], FIRST_LENGTH_LABEL + 2 * row)
-
-
-def _said(offset: Sequence[float]) -> str:
-    said = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", offset, strict=True) if value)
-    return said or "zero"
 
 
 def _stops(checks: Sequence[tuple[Sequence[str], Sequence[float], str]], label: int) -> Iterator[str]:
@@ -67,7 +67,7 @@ def _stops(checks: Sequence[tuple[Sequence[str], Sequence[float], str]], label: 
             condition = "+".join(off[place : place + _TERMS])
             yield from (
                 f"o{label} if [[{condition}] GT {WITHIN:g}]",
-                f"(MSG, {message})",
+                f"({MESSAGE}{message})",
                 "M0",
                 "M02",
                 f"o{label} endif",

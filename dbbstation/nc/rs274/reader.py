@@ -22,6 +22,7 @@ from dbbstation.nc.toolpath import (
     ALL_AXES,
     EXACT_STOP_MM,
     IN_FORCE,
+    MESSAGE,
     PLANES,
     Ending,
     RowKind,
@@ -37,8 +38,6 @@ if TYPE_CHECKING:
     from dbbstation.nc.rs274.tokens import Word
 
 MM_PER_INCH = 25.4
-MESSAGE = "MSG, "
-"""What a message begins with that stands before a stop, as people write it."""
 
 MOST_ROWS = 1_000_000
 """Moves and stops that a program may have once its arcs are chords: 260 full turns of 150 mm, or a path of 50 m in steps

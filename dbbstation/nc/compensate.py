@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from dbbstation.errors import StationError
 from dbbstation.nc.curve import CommandCurve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.planner import LOOKS_AHEAD, cuts
-from dbbstation.nc.splitting import Pieces, looked_at, moves_of, parts_of, rows_as_pieces, runs_of, split
+from dbbstation.nc.splitting import Pieces, looked_at, moves_of, off_chord_mm, parts_of, rows_as_pieces, runs_of, split
 from dbbstation.nc.toolpath import RowKind, rounded
 
 if TYPE_CHECKING:
@@ -121,14 +121,11 @@ def compensate_toolpath(
         at = looked_at(curve, pieces, DENSELY)
         shift_mm = felt_mm(at[:, -1] - path.between(*row_and_share(pieces.end)))
         _check_corrections(path, pieces, shift_mm, largest_mm)
-        parts.append(_Part(pieces.behind(rows.start), at[:, -1], shift_mm, _off_mm(path, pieces, at)))
+        off_mm = np.where(path.kind[pieces.row] == RowKind.FEED, off_chord_mm(at, DENSELY), 0.0)
+        parts.append(_Part(pieces.begin + rows.start, pieces.end + rows.start, at[:, -1], shift_mm, off_mm))
         before, tilt_left_mm = curve.behind, max(tilt_left_mm, curve.tilt_left_mm)
-    pieces = Pieces(
-        *(np.concatenate(each) for each in zip(*((p.pieces.begin, p.pieces.end) for p in parts), strict=True))
-    )
-    commanded, shift_mm, off_mm = (
-        np.concatenate(each) for each in zip(*((p.commanded, p.shift_mm, p.off_mm) for p in parts), strict=True)
-    )
+    begin, end, commanded, shift_mm, off_mm = (np.concatenate(each) for each in zip(*parts, strict=True))
+    pieces = Pieces(begin, end)
     corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
     written = _written(toolpath, pieces)
     done = _assembled(toolpath, pieces, written, commanded, runs, model.machine, corner_mm)
@@ -150,17 +147,19 @@ def compensate_toolpath(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
+class _Part(NamedTuple):
     """What is commanded along some rows of a toolpath.
 
     Attributes:
+        begin: of each piece, as `Pieces`.
+        end: likewise.
         commanded: pose at the end of each, shape (k, 6) [mm, deg].
         shift_mm: correction there, shape (k,) [mm].
-        off_mm: distance between curve and piece, shape (k,).
+        off_mm: distance of the curve from pieces at feed, at `DENSELY` places, shape (k,).
     """
 
-    pieces: Pieces
+    begin: NDArray[np.float64]
+    end: NDArray[np.float64]
     commanded: NDArray[np.float64]
     shift_mm: NDArray[np.float64]
     off_mm: NDArray[np.float64]
@@ -176,13 +175,6 @@ def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: NDArray[np.
         remedy="check that the model is of this machine and its values are right; a machine that is that far off needs "
         "--largest-correction-mm",
     )
-
-
-def _off_mm(toolpath: Toolpath, pieces: Pieces, at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far the curve leaves each piece at feed, at `DENSELY` places, shape (k,) [mm]."""
-    begin, end = at[:, 0], at[:, -1]
-    off = np.array([felt_mm(at[:, 1 + k] - (begin + share * (end - begin))) for k, share in enumerate(DENSELY)])
-    return np.where(toolpath.kind[pieces.row] == RowKind.FEED, off.max(axis=0, initial=0.0), 0.0)
 
 
 def _needed_mm(toolpath: Toolpath, planner: Planner) -> NDArray[np.float64]:

@@ -70,10 +70,6 @@ class Pieces:
     begin: NDArray[np.float64]
     end: NDArray[np.float64]
 
-    def behind(self, rows: int) -> Pieces:
-        """Return the places counted from so many rows before."""
-        return Pieces(self.begin + rows, self.end + rows)
-
     @property
     def row(self) -> NDArray[np.int64]:
         """Return the row in which each piece ends, shape (k,)."""
@@ -165,7 +161,7 @@ def split(
         StationError: the path has too many cells.
     """
     cells, at = _cells(curve, model, tolerance_mm, whole)
-    off_mm = cell_off_mm(at)
+    off_mm = off_chord_mm(at, LOOKED_AT)
     toolpath, row = curve.toolpath, cells.row
     # What needs no choice: what is no move at feed, and moves that are one cell near the curve.
     number = runs[row]
@@ -210,35 +206,25 @@ class _Nodes:
         self.way = np.concatenate([[first], way])
 
 
-def cell_off_mm(at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far the curve leaves the chord of each cell, shape (k,) [mm].
+def off_chord_mm(at: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far the curve leaves the chord of each piece, shape (k,) [mm].
 
     Args:
-        at: poses at the begin of each cell and at `LOOKED_AT`, shape (k, 1 + len(LOOKED_AT), 6).
+        at: poses at the begin of each piece and at shares of it, shape (k, 1 + len(shares), 6).
+        shares: the last is 1.
     """
     begin, end = at[:, 0], at[:, -1]
-    off = [felt_mm(at[:, 1 + k] - (begin + share * (end - begin))) for k, share in enumerate(LOOKED_AT[:-1])]
+    off = [felt_mm(at[:, 1 + k] - (begin + share * (end - begin))) for k, share in enumerate(shares[:-1])]
     worst: NDArray[np.float64] = np.max(off, axis=0)
     return worst
 
 
-def with_begins(at_places: NDArray[np.float64], start: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return poses of each piece, shape (k, m, 6), with its begin first, shape (k, 1 + m, 6).
-
-    Args:
-        start: before the first piece, shape (6,).
-    """
-    begins = np.vstack([start, at_places[:-1, -1]])
-    return np.concatenate([begins[:, None], at_places], axis=1)
-
-
 def looked_at(curve: CommandCurve, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return poses of the curve at begin and shares of each piece, shape (k, 1 + len(shares), 6)."""
-    first = curve.toolpath.before[:1]
-    places = np.concatenate([[0.0], _along(curve.toolpath, pieces, shares).reshape(-1)])
-    at = curve.at(places)
-    start = at[0] if len(first) else np.full(6, np.nan)
-    return with_begins(at[1:].reshape(len(pieces.end), len(shares), 6), start)
+    at = curve.at(np.concatenate([[0.0], _along(curve.toolpath, pieces, shares).reshape(-1)]))
+    inside = at[1:].reshape(len(pieces.end), len(shares), 6)
+    begins = np.vstack([at[0], inside[:-1, -1]])
+    return np.concatenate([begins[:, None], inside], axis=1)
 
 
 def _along(toolpath: Toolpath, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -271,7 +257,7 @@ def _cells(
         way_mm, turn_deg = share * toolpath.tip_mm[row], share * toolpath.turn_deg[row]
         can = (way_mm > SHORTEST_MM) | (turn_deg > SHORTEST_DEG)
         at_feed = (toolpath.kind[row] == RowKind.FEED) & curve.leads_on[row] & ~whole[row]
-        bent = at_feed & can & (cell_off_mm(at) > tolerance_mm / FINER)
+        bent = at_feed & can & (off_chord_mm(at, LOOKED_AT) > tolerance_mm / FINER)
         if not bent.any():
             return cells, at
         _check_number(toolpath, len(row) + int(bent.sum()))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -71,15 +70,13 @@ class Flow:
     def __init__(self, text: str, file: str, outer: Callable[[int | str], float | None]) -> None:
         self._lines, self._file, self._outer = text.split("\n"), file, outer
         self.percent, self._next = self._opening()
-        found = _O_LINE.finditer(text) if re.search(r"(?m)^[ \t]*(?:[nN][ \t]*[0-9]+[ \t]*)?[oO]", text) else ()
-        starts = [0]
-        for line in self._lines[:-1] if found else ():
-            starts.append(starts[-1] + len(line) + 1)
         self._o_lines: dict[int, OLine] = {}
         self._labels: dict[str, list[OLine]] = {}
-        for match in found:
-            one = self._o_line(match, bisect_right(starts, match.start()), starts)
-            self._o_lines[one.line] = one
+        line, begin = 1, 0
+        for match in _O_LINE.finditer(text):
+            line, begin = line + text.count("\n", begin, match.start()), match.start()
+            one = self._o_line(match, line)
+            self._o_lines[line] = one
             self._labels.setdefault(one.label, []).append(one)
         self._frames: list[_Frame] = []
         self._globals: dict[int | str, float] = {}
@@ -183,9 +180,9 @@ class Flow:
         return Problem(self._file, len(self._lines), 0, what, "copy it again, or add its end where it is whole")
 
     @staticmethod
-    def _o_line(match: re.Match[str], line: int, starts: list[int]) -> OLine:
+    def _o_line(match: re.Match[str], line: int) -> OLine:
         label = re.sub(r"\s", "", match["label"]).lower()
-        keyword, column = match["keyword"].lower(), match.start("rest") - starts[line - 1]
+        keyword, column = match["keyword"].lower(), match.start("rest") - match.start()
         rest = _COMMENT.sub(lambda comment: " " * len(comment[0]), match["rest"]).rstrip(BLANKS)
         return OLine(line, label if label[0] == "<" else str(int(label)), keyword, rest, column)
 

@@ -11,6 +11,10 @@ PECK_MM = 0.254
 """By how much a peck stays clear of the bottom of the one before, and G73 lifts: 0.01 inch [LinuxCNC]."""
 
 
+PECKS = frozenset({73.0, 83.0})
+"""Cycles that need Q."""
+
+
 class Step(NamedTuple):
     """A part of a cycle.
 
@@ -28,7 +32,7 @@ class Depths(NamedTuple):
 
     Attributes:
         clear: R.
-        bottom: Z.
+        bottom: Z, not above R.
         back: where it ends.
         peck: Q; 0 without pecks.
     """
@@ -41,7 +45,7 @@ class Depths(NamedTuple):
 
 def cycle_steps(code: float, depths: Depths) -> Iterator[Step]:
     """Yield the steps of a cycle from the clear plane on."""
-    if code in {73.0, 83.0}:
+    if code in PECKS:
         yield from _pecks(depths, to_clear=code == 83.0)  # noqa: PLR2004 - the code
     else:
         yield Step("feed", depths.bottom)
@@ -58,12 +62,11 @@ def cycle_steps(code: float, depths: Depths) -> Iterator[Step]:
 
 
 def _pecks(depths: Depths, *, to_clear: bool) -> Iterator[Step]:
-    down = -1.0 if depths.bottom < depths.clear else 1.0
     depth = depths.clear
-    while abs(depths.bottom - depth) > depths.peck:
-        depth += down * depths.peck
+    while depth - depths.bottom > depths.peck:
+        depth -= depths.peck
         yield Step("feed", depth)
         if to_clear:
             yield Step("rapid", depths.clear)
-        yield Step("rapid", depth - down * PECK_MM)
+        yield Step("rapid", depth + PECK_MM)
     yield Step("feed", depths.bottom)

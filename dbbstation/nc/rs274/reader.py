@@ -13,7 +13,7 @@ from dbbstation.nc.dialect import plain
 from dbbstation.nc.rs274.arcs import Arc, centre_by_radius
 from dbbstation.nc.rs274.blocks import ProgramBlock, block_of
 from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
-from dbbstation.nc.rs274.cycles import Depths, cycle_steps
+from dbbstation.nc.rs274.cycles import PECKS, Depths, cycle_steps
 from dbbstation.nc.rs274.flow import Flow
 from dbbstation.nc.rs274.state import AXES, ControlState
 from dbbstation.nc.rs274.tokens import BadLine
@@ -148,7 +148,7 @@ class _Interpreter:
             BadLine: the first one that makes no sense.
         """
         for line, place in self.flow.lines():
-            if self._is_plain(line, place.line):
+            if self._ran_plain(line, place.line):
                 continue
             block = block_of(line, place, self.flow.value_of)
             for setting in block.settings:
@@ -161,8 +161,8 @@ class _Interpreter:
         if unknown and self._moved:
             raise self._nobody_knows(block, unknown, "in this program")
 
-    def _is_plain(self, line: str, number: int) -> bool:
-        """Run a line of axes alone, with G0, G1, F and N at most; return False for any other, which a block is made of."""
+    def _ran_plain(self, line: str, number: int) -> bool:
+        """Run a line of axes with G0, G1, F and N at most, without a block; return False for any other line."""
         plain = _PLAIN.fullmatch(line)
         if (
             plain is None
@@ -722,7 +722,7 @@ _AXIS_WORD = re.compile(r"([XYZABC])([-+.0-9]+)")
 MOST_PLAIN = 200
 """Characters of a line that is read at once; LinuxCNC refuses lines of 253."""
 
-PECKS, MOST_PECKS = frozenset({73.0, 83.0}), 10_000
+MOST_PECKS = 10_000
 
 LEAST_F = 1e-3
 """A move of no way under G93 has a feed all the same."""

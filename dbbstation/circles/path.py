@@ -29,6 +29,11 @@ class Filter(IntEnum):
     UPR_50 = 50
     UPR_150 = 150
 
+    @classmethod
+    def of_word(cls, word: str) -> Filter:
+        """Return the filter of an option's word: a cut-off, or `none`."""
+        return cls(0 if word == "none" else int(word))
+
     @property
     def words(self) -> str:
         """Return the words beside a figure."""

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.circle_options import approach_of, circle_options
 from dbbstation.cli.output import echo, echo_line
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.cli.shared_options import chosen_tests_options, source_file_option
 from dbbstation.tasks.chosen import chosen_of
 
 if TYPE_CHECKING:

@@ -8,10 +8,9 @@ import click
 
 from dbbstation.cli.control_state import control_options, lengths_by_tool, named_numbers, numbers_of
 from dbbstation.cli.correction import largest_correction_option
-from dbbstation.cli.keeping import keeping_options
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.shared_options import keeping_options, source_file_option
 from dbbstation.cli.shop import shop_option
-from dbbstation.cli.source_files import source_file_option
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
 

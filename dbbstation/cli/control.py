@@ -9,7 +9,7 @@ import click
 
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.cli.shared_options import source_file_option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

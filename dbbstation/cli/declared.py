@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 import click
 
-from dbbstation.cli.figure_option import _known_format, format_of
+from dbbstation.cli.figure_option import format_of, known_format
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import ShopOption
 from dbbstation.errors import ArgumentError, OutputError
@@ -64,7 +64,7 @@ class CommandOutput:
 def figure(what: str = "Write a figure here", said: str = "") -> CommandOutput:
     """Return `--figure FILE`: what the result draws."""
     text = f"{what}, as SVG, PNG or PDF by the ending of its name."
-    return CommandOutput("figure", text, _draw, said=said, check=_known_format)
+    return CommandOutput("figure", text, _draw, said=said, check=known_format)
 
 
 def _draw(result: Any, path: Path, *, force: bool) -> None:  # noqa: ANN401 - any result
@@ -114,7 +114,7 @@ def command(
         for error in refused:
             raise error
 
-    options = [_option(one) for one in {**task.parameters, **shown}.values() if one.name != "force"]
+    options = [option_of(one) for one in {**task.parameters, **shown}.values() if one.name != "force"]
     for one in outputs:
         kind = _PATHS.get("folder" if one.folder else "file")
         options.append(
@@ -127,7 +127,7 @@ def command(
 
 
 def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any result
-    """Run a task with its bar; faults of values are told under the option's name."""
+    """Run a task beside its progress bar. An `ArgumentError` becomes a usage error that names the option."""
     from dbbstation.cli.output import say
     from dbbstation.cli.provenance import provenance
 
@@ -200,7 +200,8 @@ _PATHS = {
 }
 
 
-def _option(one: TaskParameter) -> click.Parameter:
+def option_of(one: TaskParameter) -> click.Parameter:
+    """Return a parameter as click has it."""
     option, kind = one.option, _kind_of(one)
     required = one.default is inspect.Parameter.empty
     if option.kind == "argument":

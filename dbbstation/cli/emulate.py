@@ -11,7 +11,7 @@ import click
 from dbbstation.cli.instrument_options import chosen_protocol, protocol_options
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo, json_text, say
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.cli.shared_options import source_file_option
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, interrupt_on
 from dbbstation.system.virtual_ports import marked_virtual
 

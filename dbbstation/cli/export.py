@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.output import echo_line
+from dbbstation.cli.shared_options import chosen_tests_options
 
 STATES = ("accepted", "complete", "rejected", "recording")
 

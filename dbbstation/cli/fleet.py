@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from dbbstation.cli.calibrate import names_in
-from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.cli.shared_options import chosen_tests_options, source_file_option
 
 if TYPE_CHECKING:
     from dbbstation.results.fleet import FleetResult

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.cli.shared_options import source_file_option
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from dbbstation.cli.number_options import SEPARATOR, shops_numbers
+from dbbstation.cli.number_options import shops_numbers
 from dbbstation.cli.number_types import Finite
+from dbbstation.files.formats.number_language import SEPARATORS, SIGNS, number_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
-_SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t"}
-
 AS_WRITTEN = (
     click.option(
         "--decimal",
@@ -32,7 +31,10 @@ AS_WRITTEN = (
         help="Decimal sign in the files  [default: the shop's, else found by looking].",
     ),
     click.option(
-        "--separator", type=SEPARATOR, metavar="[comma|semicolon|tab]", help="What stands between columns  [likewise]."
+        "--separator",
+        type=click.Choice([*SIGNS, *SIGNS.values()]),
+        metavar="[comma|semicolon|tab]",
+        help="What stands between columns  [likewise].",
     ),
     click.option(
         "--encoding",
@@ -136,7 +138,6 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
     """
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.formats.mapping import read_mapping
-    from dbbstation.files.formats.number_language import number_language
 
     decimal, separator = options.decimal, options.separator
     language = number_language(decimal, separator)
@@ -273,7 +274,7 @@ def _mapping(table: ForeignTable, data: Mapping[str, Any]) -> MappingFile:
 
     from dbbstation.files.formats.mapping import MappingFile
 
-    separator = next(name for name, sign in _SEPARATORS.items() if sign == table.language.separator)
+    separator = SEPARATORS[table.language.separator]
     columns = {
         name: {"means": one.means, **({"unit": one.unit} if one.unit else {})} for name, one in data["columns"].items()
     }

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.figure_option import figure_option, format_of
-from dbbstation.cli.filter_option import filter_of, filter_option
+from dbbstation.cli.shared_options import chosen_tests_options, filter_option
 
 KINDS = ("polar", "deviation", "spectrum", "map", "compare")
 
@@ -27,7 +26,7 @@ def plot(
     sessions: tuple[Path, ...],
     *,
     kind: str,
-    cut_off: str,
+    filter: str,  # noqa: A002 - the standard's word
     tests: tuple[str, ...],
     exclude: tuple[str, ...],
     out: Path,
@@ -52,6 +51,7 @@ def plot(
       dbbstation plot session --tests a,b --kind deviation --out ab.pdf
       dbbstation plot before after --tests a --kind compare --out a.png
     """
+    from dbbstation.circles.path import Filter
     from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.files.atomic import refuse_outputs, write_bytes
@@ -59,7 +59,7 @@ def plot(
     from dbbstation.tasks.circle_runs import load_circles
 
     refuse_outputs([out], force=force)
-    chosen = filter_of(cut_off)
+    chosen = Filter.of_word(filter)
     with count_bar("circles") as progress:
         found = load_circles(sessions, chosen, tests, exclude, progress=progress)
     for warning in found.warnings:

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import click
 
-from dbbstation.cli.number_options import number_options
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.cli.shared_options import number_options, source_file_option
 
 
 @click.command()

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.output import echo, echo_line
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.cli.shared_options import chosen_tests_options, source_file_option
 
 
 @click.command()

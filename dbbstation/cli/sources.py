@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.output import echo
-from dbbstation.cli.source_files import source_file_option
+from dbbstation.cli.shared_options import source_file_option
 
 if TYPE_CHECKING:
     from dbbstation.results.sources import SourceDescription

@@ -68,7 +68,7 @@ def circles(
     from dbbstation.tasks.models import model_of
 
     telling = Telling(progress, stop, say)
-    chosen = Filter(0 if filter == "none" else int(filter))
+    chosen = Filter.of_word(filter)
     found = load_circles(
         paths_of(sessions),
         chosen,
@@ -136,5 +136,5 @@ def circle(
     )
     recording = Recording("circle", times, lengths)
     entry = RunEntry("circle", planned.direction, 1, None, RunState.ACCEPTED, "", None, Path(), "", None, None)
-    analysis = analyse(cut(recording, planned), recording, Filter(0 if filter == "none" else int(filter)))
+    analysis = analyse(cut(recording, planned), recording, Filter.of_word(filter))
     return circle_figures(MeasuredCircle("", entry, analysis, "", SetUpKnowledge(), None), analysis)

@@ -56,7 +56,8 @@ class NumberLanguage:
 PLAIN = NumberLanguage()
 """That of all files that this program writes."""
 
-_BY_NAME = {name: sign for sign, name in SEPARATORS.items()}
+SIGNS = {name: sign for sign, name in SEPARATORS.items()}
+"""Separators of columns by name."""
 
 
 def number_language(decimal: str | None, separator: str | None) -> NumberLanguage | None:
@@ -69,4 +70,4 @@ def number_language(decimal: str | None, separator: str | None) -> NumberLanguag
         return None
     decimal = decimal or PLAIN.decimal
     usual = ";" if decimal == "," else PLAIN.separator
-    return NumberLanguage(decimal, usual if separator is None else _BY_NAME.get(separator, separator))
+    return NumberLanguage(decimal, usual if separator is None else SIGNS.get(separator, separator))

@@ -48,6 +48,12 @@ class ProgramBlock:
         word = self.codes.get(group)
         return None if word is None else word.value
 
+    @property
+    def first_column(self) -> int:
+        """Return the column of the first word that is neither code nor line number, else of the first code."""
+        words = [word.column for word in self.words.values()]
+        return min(words) if words else next((word.column for word in self.codes.values()), 1)
+
 
 def block_of(line: str, place: Place, value_of: Callable[[int | str], float | None] = unknown_value) -> ProgramBlock:
     """Return a line as a block.

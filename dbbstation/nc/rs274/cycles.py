@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dbbstation.nc.rs274.codes import name
+from dbbstation.nc.rs274.state import AXES, unknown_place
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from dbbstation.nc.rs274.blocks import ProgramBlock
+    from dbbstation.nc.rs274.state import ControlState
 
 PECK_MM = 0.254
 """By how much a peck stays clear of the bottom of the one before, and G73 lifts: 0.01 inch [LinuxCNC]."""
 
 
-PECKS = frozenset({73.0, 83.0})
-"""Cycles that need Q."""
+PECKS, MOST_PECKS = frozenset({73.0, 83.0}), 10_000
+"""Cycles that need Q, and how often they may peck in one hole."""
 
 
 class Step(NamedTuple):
@@ -41,6 +50,54 @@ class Depths(NamedTuple):
     bottom: float
     back: float
     peck: float = 0.0
+
+
+class ModalCycle:
+    """What cycles keep from line to line.
+
+    Attributes:
+        numbers: Z, R and Q [mm] and P [s].
+        begun_at: Z before the first of successive cycles, in machine coordinates [mm]; NaN if not known.
+        to_clear: whether they end at R (G99); None: neither G98 nor G99 was read.
+    """
+
+    def __init__(self) -> None:
+        self.numbers: dict[str, float] = {}
+        self.begun_at = math.nan
+        self.to_clear: bool | None = None
+
+    def depths(self, code: float, block: ProgramBlock, state: ControlState, column: int, *, absolute: bool) -> Depths:
+        """Return the depths of a cycle, and take its words out of the block.
+
+        Args:
+            column: of the block, for faults.
+            absolute: whether Z and R count from the origin (G90).
+
+        Raises:
+            BadLine: numbers are missing, or make no sense.
+        """
+        numbers, unit, offset = self.numbers, state.unit_mm, state.offset[2]
+        for letter, scale in (("Z", unit), ("R", unit), ("Q", unit), ("P", 1.0)):
+            if letter in block.words:
+                numbers[letter] = scale * block.words.pop(letter).value
+        lacking = {"Z", "R", *(["Q"] if code in PECKS else [])} - numbers.keys()
+        if lacking:
+            what = f"{name('G', code)} needs {' and '.join(sorted(lacking))}"
+            raise block.place.fault(column, what, "give them in its line")
+        unknown = [each for each, at in zip(AXES, state.pose, strict=True) if np.isnan(at)]
+        up = self.begun_at
+        if unknown or math.isnan(up):
+            raise unknown_place(block, unknown or ["Z"])
+        clear = numbers["R"] + (offset if absolute else up)
+        bottom = numbers["Z"] + (offset if absolute else clear)
+        if bottom > clear or (code in PECKS and numbers["Q"] <= 0.0):
+            raise block.place.fault(column, "a cycle goes down from R to Z, by a positive Q", "check R, Z and Q")
+        if code in PECKS and (clear - bottom) / numbers["Q"] > MOST_PECKS:
+            raise block.place.fault(column, f"more than {MOST_PECKS} pecks in one hole", "check Q")
+        if self.to_clear is None and up > clear:
+            what = "neither G98 nor G99 says how high a cycle ends, and controls differ in what they begin with"
+            raise block.place.fault(column, what, "write G98 or G99 before it")
+        return Depths(clear, bottom, clear if self.to_clear else max(up, clear), numbers.get("Q", 0.0))
 
 
 def cycle_steps(code: float, depths: Depths) -> Iterator[Step]:

@@ -10,12 +10,12 @@ import numpy as np
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.nc.dialect import plain
-from dbbstation.nc.rs274.arcs import Arc, centre_by_radius
+from dbbstation.nc.rs274.arc_words import CENTRES, arc_of
 from dbbstation.nc.rs274.blocks import ProgramBlock, block_of
 from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
-from dbbstation.nc.rs274.cycles import PECKS, Depths, cycle_steps
+from dbbstation.nc.rs274.cycles import ModalCycle, cycle_steps
 from dbbstation.nc.rs274.flow import Flow
-from dbbstation.nc.rs274.state import AXES, ControlState
+from dbbstation.nc.rs274.state import AXES, ControlState, unknown_place
 from dbbstation.nc.rs274.tokens import BadLine
 from dbbstation.nc.setup import ControlSetup
 from dbbstation.nc.toolpath import (
@@ -23,7 +23,6 @@ from dbbstation.nc.toolpath import (
     EXACT_STOP_MM,
     IN_FORCE,
     MESSAGE,
-    PLANES,
     Ending,
     RowKind,
     Toolpath,
@@ -60,7 +59,6 @@ TURNS = 0b111000
 """A, B and C, which no tool changer is taken to move where they were declared."""
 
 ENDS = frozenset({2.0, 30.0})
-CENTRES = "IJK"
 
 
 def read_program(
@@ -130,9 +128,7 @@ class _Interpreter:
         self._absolute = True
         self._absolute_centres = False
         self._plane = 0
-        self._back_to_clear: bool | None = None
-        self._cycle: dict[str, float] = {}
-        self._cycle_from = math.nan
+        self._cycle = ModalCycle()
         self._turning = ""
         self._upright = self._moved = False
         self._system_said = False
@@ -159,7 +155,7 @@ class _Interpreter:
                 break
         unknown = [letter for letter, value in zip(AXES, self._state.pose, strict=True) if math.isnan(value)]
         if unknown and self._moved:
-            raise self._nobody_knows(block, unknown, "in this program")
+            raise unknown_place(block, unknown, "in this program")
 
     def _ran_plain(self, line: str, number: int) -> bool:
         """Run a line of axes with G0, G1, F and N at most, without a block; return False for any other line."""
@@ -338,9 +334,9 @@ class _Interpreter:
         self._plane = self._plane if plane is None else int(plane) - 17
         self._absolute = self._absolute if distance is None else distance == 90.0  # noqa: PLR2004
         self._absolute_centres = self._absolute_centres if centres is None else centres == 90.1  # noqa: PLR2004
-        self._back_to_clear = self._back_to_clear if back is None else back == 99.0  # noqa: PLR2004
+        self._cycle.to_clear = self._cycle.to_clear if back is None else back == 99.0  # noqa: PLR2004
         if ModalGroup.CYCLE_END in block.codes:
-            self._motion, self._cycle = None, {}
+            self._motion, self._cycle.numbers = None, {}
         if ModalGroup.PATH in block.codes:
             self._path_control(block)
 
@@ -444,7 +440,7 @@ class _Interpreter:
         if once == MACHINE:
             self._check_machine(block.codes[ModalGroup.ONCE], block, named)
         if motion == LINEAR and once not in TAKES_AXES:
-            self._check_feed(block, _first_column(block))
+            self._check_feed(block, block.first_column)
         if named or self._goes_nowhere(block, motion, once):
             self._go_to(block, named, in_machine=once == MACHINE)
 
@@ -460,7 +456,14 @@ class _Interpreter:
             length = float(np.linalg.norm(way[:3])), float(np.linalg.norm(way[3:]))
             self._cut(block, target[None], length, in_machine=in_machine)
         else:
-            arc = self._arc(block, target)
+            arc = arc_of(
+                block,
+                self._state,
+                target,
+                clockwise=self._motion == CLOCKWISE,
+                plane=self._plane,
+                absolute=self._absolute_centres,
+            )
             if len(self.path) + arc.chords > MOST_ROWS:
                 raise _too_long(block)
             self._cut(block, arc.poses(), (arc.length_mm, 0.0), arc=arc.chord)
@@ -469,8 +472,9 @@ class _Interpreter:
 
     def _begin_motion(self, motion: float) -> None:
         if motion in CYCLES and self._motion not in CYCLES:
-            self._cycle_from = float(self._state.pose[2])
-        self._cycle = self._cycle if motion == self._motion else {}
+            self._cycle.begun_at = float(self._state.pose[2])
+        if motion != self._motion:
+            self._cycle.numbers = {}
         self._motion = motion
 
     def _goes_nowhere(self, block: ProgramBlock, motion: float | None, once: float | None) -> bool:
@@ -489,7 +493,7 @@ class _Interpreter:
         arc: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
         """Add a move at feed of this way [mm] and turn [deg]."""
-        self._check_feed(block, _first_column(block))
+        self._check_feed(block, block.first_column)
         self._begin_move(block, poses[-1])
         speed = self._speed
         if self._per_move:  # G93: one over the minutes of the move
@@ -506,7 +510,7 @@ class _Interpreter:
             self._moved = True
         if self._upright and self._state.length_said and np.abs(target[3:5]).max() > 0.0:
             what = "A or B turns under G43.4, which would tilt the tool length"
-            raise block.place.fault(_first_column(block), what, "post the program for the tip, without G43.4")
+            raise block.place.fault(block.first_column, what, "post the program for the tip, without G43.4")
 
     def _check_machine(self, machine: Word, block: ProgramBlock, named: list[str]) -> None:
         if self._motion not in {RAPID, LINEAR} or not named:
@@ -535,88 +539,33 @@ class _Interpreter:
             if word is not None:
                 value = word.value * (self._state.unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
                 if not self._absolute and math.isnan(target[axis]) and value != 0.0:
-                    raise self._nobody_knows(block, [letter])
+                    raise unknown_place(block, [letter])
                 target[axis] = value + offset[axis] if self._absolute else target[axis] + value
         if self._motion != RAPID and not through:
             unknown = [letter for letter, value in zip(AXES, target, strict=True) if math.isnan(value)]
             if unknown:
-                raise self._nobody_knows(block, unknown)
+                raise unknown_place(block, unknown)
         known = [value for value in target if not math.isnan(value)]
         if max(map(abs, known), default=0.0) > FARTHEST_DEG and (
             max((abs(value) for value in target[:3] if not math.isnan(value)), default=0.0) > FARTHEST_MM
             or max((abs(value) for value in target[3:] if not math.isnan(value)), default=0.0) > FARTHEST_DEG
         ):
             what = f"this move leads beyond {FARTHEST_MM:g} mm or {FARTHEST_DEG:g} degrees"
-            raise block.place.fault(_first_column(block), what, "check its numbers, and G91 and G20 before it")
+            raise block.place.fault(block.first_column, what, "check its numbers, and G91 and G20 before it")
         return np.array(target)
-
-    @staticmethod
-    def _nobody_knows(block: ProgramBlock, unknown: list[str], when: str = "before this move") -> BadLine:
-        what = f"nobody knows where {', '.join(unknown)} stand{'s' if len(unknown) == 1 else ''} {when}"
-        remedy = (
-            "--angles A,B,C states at which a program without them runs"
-            if set(unknown) <= set("ABC")
-            else "name all axes in rapids before the first cut, absolutely (G90), or say with --start where the machine stands"
-        )
-        return block.place.fault(_first_column(block), what, remedy)
-
-    def _arc(self, block: ProgramBlock, target: NDArray[np.float64]) -> Arc:
-        clockwise = self._motion == CLOCKWISE
-        column, plane = _first_column(block), PLANES[self._plane]
-        radius = block.words.pop("R", None)
-        offsets = [block.words.pop(CENTRES[axis], None) for axis in plane]
-        other = block.words.get(CENTRES[3 - int(plane.sum())])
-        if other is not None and other.value == 0.0 and not self._absolute_centres:
-            del block.words[other.letter]  # as some posts write: the centre lies in the plane
-        turns, start = self._turns(block), self._state.pose
-        if radius is not None:
-            if any(offsets):
-                raise block.place.fault(radius.column, "an arc has R, or I, J and K, not both", "remove one")
-            by_radius = centre_by_radius(
-                start[plane], target[plane], radius.value * self._state.unit_mm, clockwise=clockwise
-            )
-            if by_radius is None:
-                what = f"no arc of R{radius.value:g} leads from the point before to this one"
-                raise block.place.fault(radius.column, what, "check R, or write a full turn with its centre")
-            return Arc(start, target, by_radius, clockwise=clockwise, turns=turns, plane=self._plane)
-        if not any(offsets):
-            letters = " and ".join(CENTRES[axis] for axis in sorted(plane))
-            raise block.place.fault(
-                column, f"{name('G', self._motion or 0.0)} needs {letters}, or R", "give the centre"
-            )
-        centre = np.array([0.0 if word is None else word.value * self._state.unit_mm for word in offsets])
-        if not self._absolute_centres:
-            centre += start[plane]
-        elif not all(offsets):
-            letters = " and ".join(CENTRES[axis] for axis in sorted(plane))
-            raise block.place.fault(column, f"G90.1 needs both {letters}", "give both, or G91.1")
-        else:
-            centre += np.array(self._state.offset)[plane]
-        arc = Arc(
-            start, target, (float(centre[0]), float(centre[1])), clockwise=clockwise, turns=turns, plane=self._plane
-        )
-        if not arc.is_round():
-            first, last = arc.radii_mm()
-            what = f"start and end of the arc lie {first:.4f} and {last:.4f} mm from its centre"
-            raise block.place.fault(column, what, "check end point and centre")
-        return arc
-
-    def _turns(self, block: ProgramBlock) -> int:
-        word = block.words.pop("P", None)
-        if word is None:
-            return 1
-        if word.value < 1.0 or word.value != int(word.value):
-            raise block.place.fault(word.column, f"P{word.value:g} is no number of turns", "give a whole number from 1")
-        return int(word.value)
 
     def _run_cycle(self, block: ProgramBlock, named: list[str]) -> None:
         """Drill at the places of a block, along Z."""
-        column, code = _first_column(block), self._motion or 0.0
-        times, depths = block.words.pop("L", None), self._depths(block, named, column)
+        column, code = block.first_column, self._motion or 0.0
+        times = block.words.pop("L", None)
+        if self._plane != 0 or self._per_move or {"A", "B", "C"} & set(named):
+            what = f"{name('G', code)} with {'another plane than G17' if self._plane else 'G93, or A, B, C'}"
+            raise block.place.fault(column, what, "post cycles as single moves")
+        depths = self._cycle.depths(code, block, self._state, column, absolute=self._absolute)
         self._check_feed(block, column)
         corner, self.path.corner_mm = self.path.corner_mm, 0.0  # LinuxCNC follows the exact path there
         for _ in range(1 if times is None else int(times.value)):
-            if self._cycle_from < depths.clear:
+            if self._cycle.begun_at < depths.clear:
                 self._go(block, depth=depths.clear)
             self._rapid(block, self._target_of_cycle(block), [0, 1])
             self._go(block, depth=depths.clear)
@@ -625,33 +574,6 @@ class _Interpreter:
         self.path.corner_mm = corner
         for letter in named:
             block.words.pop(letter, None)
-
-    def _depths(self, block: ProgramBlock, named: list[str], column: int) -> Depths:
-        code, unit, offset = self._motion or 0.0, self._state.unit_mm, self._state.offset[2]
-        if self._plane != 0 or self._per_move or {"A", "B", "C"} & set(named):
-            what = f"{name('G', code)} with {'another plane than G17' if self._plane else 'G93, or A, B, C'}"
-            raise block.place.fault(column, what, "post cycles as single moves")
-        for letter, scale in (("Z", unit), ("R", unit), ("Q", unit), ("P", 1.0)):
-            if letter in block.words:
-                self._cycle[letter] = scale * block.words.pop(letter).value
-        lacking = {"Z", "R", *(["Q"] if code in PECKS else [])} - self._cycle.keys()
-        if lacking:
-            what = f"{name('G', code)} needs {' and '.join(sorted(lacking))}"
-            raise block.place.fault(column, what, "give them in its line")
-        unknown = [each for each, at in zip(AXES, self._state.pose, strict=True) if np.isnan(at)]
-        up = self._cycle_from
-        if unknown or math.isnan(up):
-            raise self._nobody_knows(block, unknown or ["Z"])
-        clear = self._cycle["R"] + (offset if self._absolute else up)
-        bottom = self._cycle["Z"] + (offset if self._absolute else clear)
-        if bottom > clear or (code in PECKS and self._cycle["Q"] <= 0.0):
-            raise block.place.fault(column, "a cycle goes down from R to Z, by a positive Q", "check R, Z and Q")
-        if code in PECKS and (clear - bottom) / self._cycle["Q"] > MOST_PECKS:
-            raise block.place.fault(column, f"more than {MOST_PECKS} pecks in one hole", "check Q")
-        if self._back_to_clear is None and up > clear:
-            what = "neither G98 nor G99 says how high a cycle ends, and controls differ in what they begin with"
-            raise block.place.fault(column, what, "write G98 or G99 before it")
-        return Depths(clear, bottom, clear if self._back_to_clear else max(up, clear), self._cycle.get("Q", 0.0))
 
     def _target_of_cycle(self, block: ProgramBlock) -> NDArray[np.float64]:
         motion, self._motion = self._motion, RAPID
@@ -662,8 +584,8 @@ class _Interpreter:
     def _cycle_step(self, block: ProgramBlock, what: str, depth: float) -> None:
         line = block.place.line
         if what == "dwell":
-            if self._cycle.get("P", 0.0) > 0.0:
-                self.path.dwell(self._cycle["P"], line=line)
+            if self._cycle.numbers.get("P", 0.0) > 0.0:
+                self.path.dwell(self._cycle.numbers["P"], line=line)
         elif what in {"stop", "turn"}:
             if self._turning:
                 self.path.say(RowKind.FUNCTION, "M5" if what == "stop" else self._turning, line=line)
@@ -722,8 +644,6 @@ _AXIS_WORD = re.compile(r"([XYZABC])([-+.0-9]+)")
 MOST_PLAIN = 200
 """Characters of a line that is read at once; LinuxCNC refuses lines of 253."""
 
-MOST_PECKS = 10_000
-
 LEAST_F = 1e-3
 """A move of no way under G93 has a feed all the same."""
 
@@ -734,12 +654,6 @@ _SHOWN = re.compile(r"#(?:(\d+)|<([^<>]*)>)")
 def _moved(block: ProgramBlock) -> int:
     """Return the number of axis words."""
     return sum(letter in AXES for letter in block.words)
-
-
-def _first_column(block: ProgramBlock) -> int:
-    """Return the column of the first word that is neither code nor line number, else of the motion code."""
-    words = [word.column for word in block.words.values()]
-    return min(words) if words else next((word.column for word in block.codes.values()), 1)
 
 
 def _too_long(block: ProgramBlock) -> BadLine:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.nc.rs274.blocks import ProgramBlock
-    from dbbstation.nc.rs274.tokens import Word
+    from dbbstation.nc.rs274.tokens import BadLine, Word
     from dbbstation.nc.setup import ControlSetup
 
 AXES = "XYZABC"
@@ -169,3 +169,14 @@ class ControlState:
             what = f"{name('G', word.value)} counts from where {AXES[axis]} stands, which nobody knows yet"
             raise block.place.fault(word.column, what, f"move {AXES[axis]} to a place before, or give --start")
         return float(self.pose[axis])
+
+
+def unknown_place(block: ProgramBlock, axes: list[str], when: str = "before this move") -> BadLine:
+    """Return the fault of a block for which the place of axes must be known."""
+    what = f"nobody knows where {', '.join(axes)} stand{'s' if len(axes) == 1 else ''} {when}"
+    remedy = (
+        "--angles A,B,C states at which a program without them runs"
+        if set(axes) <= set("ABC")
+        else "name all axes in rapids before the first cut, absolutely (G90), or say with --start where the machine stands"
+    )
+    return block.place.fault(block.first_column, what, remedy)

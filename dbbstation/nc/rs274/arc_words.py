@@ -1,0 +1,80 @@
+"""The arc of a block, by its centre or its radius."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.nc.rs274.arcs import Arc, centre_by_radius
+from dbbstation.nc.toolpath import PLANES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.rs274.blocks import ProgramBlock
+    from dbbstation.nc.rs274.state import ControlState
+
+CENTRES = "IJK"
+
+
+def arc_of(
+    block: ProgramBlock,
+    state: ControlState,
+    target: NDArray[np.float64],
+    *,
+    clockwise: bool,
+    plane: int,
+    absolute: bool,
+) -> Arc:
+    """Return the arc from where the control stands, and take its words out of the block.
+
+    Args:
+        target: pose at its end, shape (6,) [mm, deg].
+        plane: as in `PLANES`.
+        absolute: whether the centre counts from the origin (G90.1).
+
+    Raises:
+        BadLine: no such arc.
+    """
+    column, axes, code = block.first_column, PLANES[plane], "G2" if clockwise else "G3"
+    radius = block.words.pop("R", None)
+    offsets = [block.words.pop(CENTRES[axis], None) for axis in axes]
+    other = block.words.get(CENTRES[3 - int(axes.sum())])
+    if other is not None and other.value == 0.0 and not absolute:
+        del block.words[other.letter]  # as some posts write: the centre lies in the plane
+    turns, start = _turns(block), state.pose
+    if radius is not None:
+        if any(offsets):
+            raise block.place.fault(radius.column, "an arc has R, or I, J and K, not both", "remove one")
+        by_radius = centre_by_radius(start[axes], target[axes], radius.value * state.unit_mm, clockwise=clockwise)
+        if by_radius is None:
+            what = f"no arc of R{radius.value:g} leads from the point before to this one"
+            raise block.place.fault(radius.column, what, "check R, or write a full turn with its centre")
+        return Arc(start, target, by_radius, clockwise=clockwise, turns=turns, plane=plane)
+    if not any(offsets):
+        letters = " and ".join(CENTRES[axis] for axis in sorted(axes))
+        raise block.place.fault(column, f"{code} needs {letters}, or R", "give the centre")
+    centre = np.array([0.0 if word is None else word.value * state.unit_mm for word in offsets])
+    if not absolute:
+        centre += start[axes]
+    elif not all(offsets):
+        letters = " and ".join(CENTRES[axis] for axis in sorted(axes))
+        raise block.place.fault(column, f"G90.1 needs both {letters}", "give both, or G91.1")
+    else:
+        centre += np.array(state.offset)[axes]
+    arc = Arc(start, target, (float(centre[0]), float(centre[1])), clockwise=clockwise, turns=turns, plane=plane)
+    if not arc.is_round():
+        first, last = arc.radii_mm()
+        what = f"start and end of the arc lie {first:.4f} and {last:.4f} mm from its centre"
+        raise block.place.fault(column, what, "check end point and centre")
+    return arc
+
+
+def _turns(block: ProgramBlock) -> int:
+    word = block.words.pop("P", None)
+    if word is None:
+        return 1
+    if word.value < 1.0 or word.value != int(word.value):
+        raise block.place.fault(word.column, f"P{word.value:g} is no number of turns", "give a whole number from 1")
+    return int(word.value)

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
@@ -23,7 +24,7 @@ from dbbstation.quality.stated import limit_along
 from dbbstation.quality.together import expected_um, read_um
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from datetime import date
 
     from numpy.typing import NDArray
@@ -87,8 +88,7 @@ class Assigned:
         self.runs = [one for one in runs if one.analysis is not None]
         self._planned = [self._label(one.run.test, one.run.circle.direction) for one in self.runs]
         self._known: dict[tuple[int, ...], float] = {}
-        self._logs: dict[tuple[int, int], float] = {}
-        self._added: dict[tuple[int, int], tuple[NDArray[np.float64], NDArray[np.float64], float]] = {}
+        self._products: dict[tuple[int, int], NDArray[np.float64]] = {}
 
     def _label(self, test: str, direction: str) -> int:
         return next(k for k, one in enumerate(self.circles) if _key(one) == (test, direction))
@@ -151,45 +151,38 @@ class Assigned:
         while any(labels not in followed for labels in best):
             for labels in [each for each in best if each not in followed]:
                 followed.add(labels)
-                for neighbour in self._neighbours(labels):
-                    self.score(neighbour)
+                self._follow(labels)
             best = sorted(self._known, key=self._known.__getitem__, reverse=True)[:WIDE]
             # One mistake more cannot bring more than it costs where one alone lost as much.
             best = [labels for labels in best if self._known[labels] >= least]
         return self._known
 
-    def _neighbours(self, labels: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-        """Yield assignments that differ by one run, by all runs of a mounting, or by two mountings that change places."""
-        open_to = [at for at in range(len(labels)) if not self._settled(labels, [at])]
-        for at in open_to:
-            yield from (_put(labels, {at: other}) for other in self._everything if other != labels[at])
+    def _follow(self, labels: tuple[int, ...]) -> None:
+        """Score all assignments that differ by one change."""
+        whole = self._sum(labels, range(len(labels)))
+        for runs, instead in self._changes():
+            others = whole - self._sum(labels, runs)
+            for other, log in zip(instead, self._likelihoods(others, runs, instead), strict=True):
+                changed = _put(labels, dict(zip(runs, other, strict=True)))
+                self._known.setdefault(changed, float(log) - self._mistakes(changed))
+
+    def _changes(self) -> Iterator[tuple[Sequence[int], Sequence[Sequence[int]]]]:
+        """Yield runs with their other labels: one run, all runs of a mounting, or two mountings that change places."""
+        yield from (([run], [[label] for label in self._everything]) for run in range(len(self.runs)))
         groups = self._groups
-        for group in (one for one in groups if not self._settled(labels, one)):
-            for test in dict.fromkeys(one.test for one in self.circles):
-                changed = self._as_test(group, test)
-                if changed is not None:
-                    yield _put(labels, changed)
-        for k, one in enumerate(groups):
-            for other in groups[k + 1 :]:
-                first = self._as_test(one, self.runs[other[0]].run.test)
-                second = self._as_test(other, self.runs[one[0]].run.test)
-                if first is not None and second is not None:
-                    yield _put(labels, {**first, **second})
-
-    def _settled(self, labels: tuple[int, ...], runs: Sequence[int]) -> bool:
-        """Return whether no other circles of these runs can come near the planned assignment, wherever they were read.
-
-        No density of a reading is above that at its expectation, known machine errors taken for sure.
-        """
-        others = [k for k in range(len(labels)) if k not in runs]
-        most = sum(max(-0.5 * self._log_variance(k, label) for label in self._everything) for k in runs)
-        cost = self._cost if labels == tuple(self._planned) else 0.0
-        reached = self._likelihood(labels, others) + most - self._mistakes(labels) - cost
-        return reached <= self._known[tuple(self._planned)] - 2.0 * LIMIT
+        for group in groups:
+            tests = dict.fromkeys(one.test for one in self.circles)
+            yield group, [each for test in tests if (each := self._as_test(group, test)) is not None]
+        for one, other in combinations(groups, 2):
+            first = self._as_test(one, self.runs[other[0]].run.test)
+            second = self._as_test(other, self.runs[one[0]].run.test)
+            if first is not None and second is not None:
+                yield [*one, *other], [[*first, *second]]
 
     @cached_property
     def _everything(self) -> tuple[int, ...]:
-        return (*range(len(self.circles)), ELSEWHERE, BESIDE, LARGER)
+        """Return a run's labels, in the order in which they index arrays."""
+        return (*range(len(self.circles)), LARGER, BESIDE, ELSEWHERE)
 
     @cached_property
     def _groups(self) -> list[list[int]]:
@@ -198,16 +191,17 @@ class Assigned:
             found.setdefault((one.run.test, one.run.mounting), []).append(k)
         return list(found.values())
 
-    def _as_test(self, group: Sequence[int], test: str) -> dict[int, int] | None:
+    def _as_test(self, group: Sequence[int], test: str) -> list[int] | None:
         try:
-            return {k: self._label(test, self.runs[k].run.circle.direction) for k in group}
+            return [self._label(test, self.runs[k].run.circle.direction) for k in group]
         except StopIteration:
             return None
 
     def score(self, labels: tuple[int, ...]) -> float:
         """Return the log likelihood of an assignment with its mistakes."""
         if labels not in self._known:
-            self._known[labels] = self._likelihood(labels) - self._mistakes(labels)
+            others = self._sum(labels, range(1, len(labels)))
+            self._known[labels] = float(self._likelihoods(others, [0], [labels[:1]])[0]) - self._mistakes(labels)
         return self._known[labels]
 
     def _mistakes(self, labels: Sequence[int]) -> float:
@@ -226,62 +220,76 @@ class Assigned:
     def _same_way(self, run: int, label: int) -> bool:
         return label >= 0 and self.circles[label].circle.direction is self.runs[run].run.circle.direction
 
-    def _likelihood(self, labels: Sequence[int], runs: Sequence[int] | None = None) -> float:
-        """Return the log density of readings, machine errors of all sizes alike probable.
+    def _likelihoods(
+        self, others: NDArray[np.float64], runs: Sequence[int], instead: Sequence[Sequence[int]]
+    ) -> NDArray[np.float64]:
+        """Return the log density of all readings by labels of some runs, machine errors of all sizes alike probable.
+
+        Given the other runs, readings are normal [Rasmussen and Williams (2006), eq. 2.9]: one factor serves all labels.
 
         Args:
-            runs: whose readings; None: of all.
+            others: sum of the other runs.
+            instead: sets of labels, one for each of `runs`.
         """
-        of_machine = self._of_machine.shape[2]
-        wide = of_machine + self._of_session.shape[2]
-        square, pull, apart = np.zeros((wide, wide)), np.zeros(wide), 0.0
-        for run in range(len(labels)) if runs is None else runs:
-            gram, along, own = self._part(run, labels[run])
-            square, pull, apart = square + gram, pull + along, apart + own
-        scale = np.ones((len(SIZES), wide))
-        scale[:, :of_machine] = SIZES[:, None]
-        precision = np.eye(wide) + scale[:, :, None] * square * scale[:, None, :]
-        logs = np.zeros(len(SIZES))
-        for k, (each, pulls) in enumerate(zip(precision, scale * pull, strict=True)):
-            root, lower = cho_factor(each, lower=True, overwrite_a=True, check_finite=False)
-            logs[k] = 0.5 * float(pulls @ cho_solve((root, lower), pulls, check_finite=False))
-            logs[k] -= float(np.sum(np.log(np.diagonal(root))))
-        return float(logsumexp(logs)) - float(np.log(len(SIZES))) - 0.5 * apart
+        chosen = list(zip(runs, np.array(instead).T, strict=True))
+        joined = np.concatenate([self._read[run][labels] for run, labels in chosen], axis=1)
+        columns, off = joined[:, :, :-1], joined[:, :, -1]
+        alone = np.zeros((*off.shape, off.shape[1]))
+        for k, (run, labels) in enumerate(chosen):
+            rows = slice(COEFFICIENTS * k, COEFFICIENTS * (k + 1))
+            alone[:, rows, rows] = self._scatter[run][labels]
+        logs = np.zeros((len(SIZES), len(instead)))
+        for k, size in enumerate(SIZES):
+            scale = np.ones(columns.shape[2])
+            scale[: self._of_machine.shape[2]] = size
+            root = np.linalg.cholesky(np.eye(len(scale)) + scale[:, None] * others[:-1, :-1] * scale)
+            right = np.vstack([others[-1:, :-1], columns.reshape(-1, len(scale))]) * scale
+            white = solve_triangular(root, right.T, lower=True, overwrite_b=True, check_finite=False).T
+            pull, known = white[0], white[1:].reshape(columns.shape)
+            inner = np.linalg.cholesky(alone + known @ known.transpose(0, 2, 1))
+            apart = np.linalg.solve(inner, (off - known @ pull)[:, :, None])[:, :, 0]
+            logs[k] = 0.5 * (pull @ pull - np.sum(apart**2, axis=1)) - _log_diagonal(root) - _log_diagonal(inner)
+        return np.asarray(logsumexp(logs, axis=0) - np.log(len(SIZES)) - 0.5 * others[-1, -1])
 
-    def _part(self, run: int, label: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Return what a run adds to the squares, to the pulls, and its own distance."""
-        if (run, label) in self._added:
-            return self._added[run, label]
-        one = self.runs[run]
-        if label == ELSEWHERE:
-            off = read_um(one) - expected_um(self.circles[self._planned[run]])
-            wide = self._of_machine.shape[2] + self._of_session.shape[2]
-            apart = float(off @ off) / ELSEWHERE_UM**2 + self._log_variance(run, label)
-            found = np.zeros((wide, wide)), np.zeros(wide), apart
-        else:
-            shown = self._planned[run] if label < 0 else label
-            columns = np.hstack([self._of_machine[shown], self._of_session[shown]])
-            off = read_um(one) - expected_um(self.circles[shown])
-            root = self._root(run, label)
-            white, apart_by = np.linalg.solve(root, columns), np.linalg.solve(root, off)
-            apart = float(apart_by @ apart_by) + self._log_variance(run, label)
-            found = white.T @ white, white.T @ apart_by, apart
-        self._added[run, label] = found
+    def _sum(self, labels: Sequence[int], runs: Iterable[int]) -> NDArray[np.float64]:
+        """Return products of whitened effects and readings, summed over runs, shape (p + 1, p + 1).
+
+        The readings are the last row and column; their own product has the log determinant of the scatter added.
+        """
+        wide = self._of_machine.shape[2] + self._of_session.shape[2] + 1
+        return sum((self._product(run, labels[run]) for run in runs), np.zeros((wide, wide)))
+
+    def _product(self, run: int, label: int) -> NDArray[np.float64]:
+        if (run, label) not in self._products:
+            root = np.linalg.cholesky(self._scatter[run][label])
+            white = np.linalg.solve(root, self._read[run][label])
+            self._products[run, label] = white.T @ white
+            self._products[run, label][-1, -1] += 2.0 * _log_diagonal(root)
+        return self._products[run, label]
+
+    @cached_property
+    def _read(self) -> list[NDArray[np.float64]]:
+        """Return effects of shared causes, and last the reading less expectation, by label, shape (l + 3, 7, p + 1) each [µm]."""
+        columns = np.concatenate([self._of_machine, self._of_session], axis=2)
+        columns = np.concatenate([columns, np.zeros_like(columns[:1])])
+        expected, every, found = np.array([expected_um(one) for one in self.circles]), range(len(self.circles)), []
+        for one, own in zip(self.runs, self._planned, strict=True):
+            off = read_um(one) - expected[[*every, own, own, own]]
+            found.append(np.concatenate([columns[[*every, own, own, -1]], off[:, :, None]], axis=2))
         return found
 
-    def _root(self, run: int, label: int) -> NDArray[np.float64]:
-        """Return the Cholesky factor of what a reading scatters by beside all others, shape (7, 7) [µm]."""
-        own = self._own[self._planned[run] if label < 0 else label] + self.runs[run].u_um ** 2 * np.eye(COEFFICIENTS)
-        for k in {BESIDE: (FIRST_COSINE, FIRST_SINE), LARGER: (0,)}.get(label, ()):
-            own[k, k] += ELSEWHERE_UM**2
-        return np.asarray(np.linalg.cholesky(own), dtype=np.float64)
-
-    def _log_variance(self, run: int, label: int) -> float:
-        if label == ELSEWHERE:
-            return 2.0 * COEFFICIENTS * float(np.log(ELSEWHERE_UM))
-        if (run, label) not in self._logs:
-            self._logs[run, label] = 2.0 * float(np.sum(np.log(np.diagonal(self._root(run, label)))))
-        return self._logs[run, label]
+    @cached_property
+    def _scatter(self) -> list[NDArray[np.float64]]:
+        """Return the covariance of what a reading shares with no other by label, shape (l + 3, 7, 7) each [µm²]."""
+        found = []
+        for one, own in zip(self.runs, self._planned, strict=True):
+            by_label = np.array([*self._own, *[self._own[own]] * 3]) + one.u_um**2 * np.eye(COEFFICIENTS)
+            by_label[ELSEWHERE] = ELSEWHERE_UM**2 * np.eye(COEFFICIENTS)
+            for k in (FIRST_COSINE, FIRST_SINE):
+                by_label[BESIDE, k, k] += ELSEWHERE_UM**2
+            by_label[LARGER, 0, 0] += ELSEWHERE_UM**2
+            found.append(by_label)
+        return found
 
     @cached_property
     def _of_machine(self) -> NDArray[np.float64]:
@@ -358,6 +366,11 @@ _OTHERWISE = {
 
 def _put(labels: tuple[int, ...], changed: Mapping[int, int]) -> tuple[int, ...]:
     return tuple(changed.get(k, label) for k, label in enumerate(labels))
+
+
+def _log_diagonal(roots: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return half the logarithm of the determinants whose Cholesky factors these are."""
+    return np.asarray(np.sum(np.log(np.diagonal(roots, axis1=-2, axis2=-1)), axis=-1))
 
 
 def _key(one: Planned) -> tuple[str, str]:

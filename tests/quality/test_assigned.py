@@ -17,8 +17,9 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
-from dbbstation.quality.assigned import Assigned, FormerSitting
+from dbbstation.quality.assigned import BESIDE, ELSEWHERE, ELSEWHERE_UM, LARGER, Assigned, FormerSitting
 from dbbstation.quality.finding import FindingVerdict, Name, undecided
+from dbbstation.quality.forms import SIZES
 from dbbstation.quality.knowledge import Run, seen
 from dbbstation.quality.together import read_um
 from dbbstation.trace.recording import Recording
@@ -138,8 +139,6 @@ def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
     from scipy.special import logsumexp  # noqa: PLC0415
     from scipy.stats import multivariate_normal  # noqa: PLC0415
 
-    from dbbstation.quality.forms import SIZES  # noqa: PLC0415 - of this test
-
     machine = np.vstack([assigned._of_machine[k] for k in labels])
     session = np.vstack([assigned._of_session[k] for k in labels])
     off = np.concatenate([read_um(one) - read_um_expected(c) for one, c in zip(assigned.runs, circles, strict=True)])
@@ -151,6 +150,43 @@ def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
         logs.append(multivariate_normal(np.zeros(len(off)), whole, allow_singular=True).logpdf(off))
     wanted = logsumexp(logs) - np.log(len(SIZES)) + 0.5 * len(off) * np.log(2.0 * np.pi)
     assert assigned.score(labels) == pytest.approx(wanted, abs=1e-3)
+
+
+def test_all_labels_at_once_score_as_each_under_the_whole_covariance(sitting) -> None:
+    """Every assignment that was looked up, among them swaps and runs of no circle, against the density of all readings."""
+    for instead in ({}, {PLANNED[0]: ("side", CCW)}):
+        assigned = shown(sitting, instead, 4)
+        scores = assigned._looked_up
+        assert {BESIDE, LARGER, ELSEWHERE} < {label for labels in scores for label in labels}
+        changed = [sum(a != b for a, b in zip(labels, assigned._planned, strict=True)) for labels in scores]
+        assert set(changed) >= {0, 1, 2, 4}
+        for labels, score in scores.items():
+            assert score + assigned._mistakes(labels) == pytest.approx(
+                log_density(assigned, labels), rel=1e-7, abs=1e-3
+            )
+
+
+def log_density(assigned: Assigned, labels: tuple[int, ...]) -> float:
+    """Log density of all readings with all covariances written out."""
+    count = len(assigned.runs)
+    machine = np.zeros((count, 7, assigned._of_machine.shape[2]))
+    session = np.zeros((count, 7, assigned._of_session.shape[2]))
+    own, off = np.zeros((7 * count, 7 * count)), np.zeros((count, 7))
+    for k, (one, label) in enumerate(zip(assigned.runs, labels, strict=True)):
+        circle = assigned._planned[k] if label < 0 else label
+        off[k] = read_um(one) - read_um_expected(assigned.circles[circle])
+        rows = slice(7 * k, 7 * k + 7)
+        own[rows, rows] = ELSEWHERE_UM**2 * np.eye(7)
+        if label != ELSEWHERE:
+            machine[k], session[k] = assigned._of_machine[circle], assigned._of_session[circle]
+            more = {BESIDE: [0, 1, 0, 0, 1, 0, 0], LARGER: [1, 0, 0, 0, 0, 0, 0]}.get(label, [0] * 7)
+            own[rows, rows] = assigned._own[circle] + one.u_um**2 * np.eye(7) + ELSEWHERE_UM**2 * np.diag(more)
+    machine, session, off = machine.reshape(7 * count, -1), session.reshape(7 * count, -1), off.ravel()
+    logs = []
+    for size in SIZES:
+        whole = own + size**2 * machine @ machine.T + session @ session.T
+        logs.append(-0.5 * (off @ np.linalg.solve(whole, off) + np.linalg.slogdet(whole)[1]))
+    return float(np.logaddexp.reduce(logs) - np.log(len(SIZES)))
 
 
 def read_um_expected(circle: Planned) -> np.ndarray:

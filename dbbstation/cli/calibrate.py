@@ -14,11 +14,6 @@ if TYPE_CHECKING:
     from dbbstation.results.calibration import CalibrationResult
 
 
-def names_in(text: str | None) -> list[str] | None:
-    """Return names separated by commas; None without a text."""
-    return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
-
-
 IN_A_TABLE_OF_THEIR_OWN = frozenset({"drive-friction"})
 """Sources with a row for each motor in place of one for each parameter."""
 

@@ -214,7 +214,7 @@ def option_of(one: TaskParameter) -> click.Parameter:
         )
     make: Any = click.Option
     if option.setting:
-        make = partial(ShopOption, setting=option.setting, factor=option.factor, goes_with=option.goes_with)
+        make = partial(ShopOption, setting=option.setting)
     if one.default not in (None, (), inspect.Parameter.empty):
         make = partial(make, default=one.default, show_default=True)
     found: click.Option = make(

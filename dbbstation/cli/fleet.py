@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from dbbstation.cli.calibrate import names_in
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
 from dbbstation.cli.shared_options import chosen_tests_options, source_file_option
@@ -121,9 +120,8 @@ def fleet(
         if out_table.suffix.lower() not in FORMATS:
             raise click.UsageError(f"--table {out_table}: name a file that ends in {' or '.join(FORMATS)}")
         refuse_outputs([out_table], force=force)
-    names = names_in(sources)
     options = FleetOptions(
-        sources=None if names is None else tuple(names),
+        sources=None if sources is None else tuple(name.strip() for name in sources.split(",") if name.strip()),
         method=method,
         law_over_time=law_over_time,
         findings=findings,

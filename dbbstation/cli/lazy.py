@@ -16,6 +16,13 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
+def made_ready(command: click.Command) -> click.Command:
+    """Let a command keep the log, refuse texts that are no UTF-8, and show its examples unwrapped."""
+    # Docstrings are raw, so that they may hold backslashes; click wants its "do not wrap" as the one character.
+    command.help = (command.help or "").replace(r"\b", "\b")
+    return attended(in_utf8(command))
+
+
 class LazyGroup(click.Group):
     """Loads a command's module on demand.
 
@@ -52,10 +59,7 @@ class LazyGroup(click.Group):
         name = self._modules.get(cmd_name, cmd_name).replace("-", "_")
         name += "_" if keyword.iskeyword(name) else ""
         module = importlib.import_module(f"{self._package}.{name}")
-        command: click.Command = getattr(module, name)
-        # Docstrings are raw, so that they may hold backslashes; click wants its "do not wrap" as the one character.
-        command.help = (command.help or "").replace(r"\b", "\b")
-        return attended(in_utf8(command))
+        return made_ready(getattr(module, name))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

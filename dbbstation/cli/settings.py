@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.log import attended
+from dbbstation.cli.lazy import made_ready
 from dbbstation.cli.output import echo, echo_line
 
 if TYPE_CHECKING:
@@ -30,8 +30,7 @@ class _WithShipped(click.Command):
         if args[:1] == [SHIPPED]:
             from dbbstation.cli.shipped import shipped
 
-            shipped.help = (shipped.help or "").replace(r"\b", "\b")
-            return attended(shipped).make_context(f"{info_name} {SHIPPED}", args[1:], parent, **extra)
+            return made_ready(shipped).make_context(f"{info_name} {SHIPPED}", args[1:], parent, **extra)
         return super().make_context(info_name, args, parent, **extra)
 
 

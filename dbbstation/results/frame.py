@@ -16,6 +16,7 @@ from dbbstation.files.recordings.table_csv import table_csv
 from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
     from os import PathLike
 
 
@@ -109,7 +110,7 @@ class Framed:
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
         rows = self.rows()
-        names = list(dict.fromkeys(name for row in rows for name in row))
+        names = _columns(rows)
         columns = [["" if row.get(name) is None else row[name] for row in rows] for name in names]
         write_table(path, table_csv(names, columns), provenance, force=force)
 
@@ -125,7 +126,7 @@ class Framed:
     def summary(self) -> str:
         """Return the answer in sentences and its table as text."""
         rows = self.rows()
-        names = list(dict.fromkeys(name for row in rows for name in row))
+        names = _columns(rows)
         cells = [names, *([_shown(row.get(name)) for name in names] for row in rows)]
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in cells]
@@ -140,7 +141,7 @@ class Framed:
 
     def _repr_html_(self) -> str:
         rows = self.rows()
-        names = list(dict.fromkeys(name for row in rows for name in row))
+        names = _columns(rows)
         head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
         body = "".join(
             f"<tr>{''.join(f'<td>{html.escape(_shown(row.get(name)))}</td>' for name in names)}</tr>"
@@ -149,6 +150,11 @@ class Framed:
         more = f"<p>and {len(rows) - MOST_SHOWN} more rows</p>" if len(rows) > MOST_SHOWN else ""
         said = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in self.sentences() or [self.headline()])
         return f"{said}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
+
+
+def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:
+    """Return the names of all columns in the order of their first row."""
+    return list(dict.fromkeys(name for row in rows for name in row))
 
 
 def _shown(value: object) -> str:

@@ -48,8 +48,7 @@ class Option:
     Attributes:
         help: one or two sentences, the unit in brackets; of a flag that is True by default what its absence means.
         kind: `argument` has no flag; `path`, `file` or `folder`; empty: by the type.
-        flag: if it is not the name with hyphens.
-        setting: key in the shop's settings; `factor` converts to this unit, `goes_with` as of `ShopOption`.
+        setting: key in the shop's settings.
         least: `most`, `above`: range of a number.
         only_with: parameter that it needs.
         not_with: parameters that it excludes.
@@ -58,11 +57,8 @@ class Option:
 
     help: str = field(kw_only=False)
     kind: str = ""
-    flag: str = ""
     metavar: str | None = None
     setting: str = ""
-    factor: float = 1.0
-    goes_with: str = ""
     least: float | None = None
     most: float | None = None
     above: float | None = None
@@ -90,7 +86,7 @@ class TaskParameter:
         """Its name on the command line."""
         if self.option.kind == "argument":
             return self.option.metavar or self.name
-        return self.option.flag or f"--{'no-' if self.default is True else ''}{self.name.replace('_', '-')}"
+        return f"--{'no-' if self.default is True else ''}{self.name.replace('_', '-')}"
 
     def says(self, value: Any) -> bool:  # noqa: ANN401 - of any parameter
         """Return whether a value differs from the default."""

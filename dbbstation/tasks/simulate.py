@@ -14,9 +14,11 @@ from dbbstation.tasks.telling import Telling, never, silent
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from dbbstation.files.recordings.new_session import FinishedRun
     from dbbstation.results.sessions import SimulatedSession
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.telling import Progress
+    from dbbstation.trace.recording import Recording
 
 BEGUN = datetime(2000, 1, 1, tzinfo=UTC)
 """A date that nobody takes for a measurement's."""
@@ -73,7 +75,6 @@ def simulate(
     from dbbstation.tasks.chosen import chosen_of
     from dbbstation.tasks.load import paths_of
     from dbbstation.tasks.models import model_of
-    from dbbstation.trace.recording import Recording
     from dbbstation.virtual.under_spindle import SetUp, put_up
 
     telling = Telling(progress, stop, say)
@@ -104,10 +105,15 @@ def simulate(
     return SimulatedSession(
         runs=len(runs),
         tests=tuple(chosen),
-        recordings={
-            label: Recording(label, run.columns["t_s"], run.columns["length_mm"], run.columns["theta_deg"])
-            for run in runs
-            if (label := f"{run.test} {run.direction} {run.repeat}")
-        },
+        recordings={one.name: one for one in map(_recording, runs)},
         writing=lambda folder: write_session(folder, machine_model.machine, inline, runs, details),
+    )
+
+
+def _recording(run: FinishedRun) -> Recording:
+    from dbbstation.trace.recording import Recording
+
+    columns = run.columns
+    return Recording(
+        f"{run.test} {run.direction} {run.repeat}", columns["t_s"], columns["length_mm"], columns["theta_deg"]
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.control_state import numbers_of
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
 from dbbstation.cli.shared_options import source_file_option
@@ -130,7 +131,7 @@ def parameters(
     """Write values and joint tables for LinuxCNC's own genhexkins, refitted over a volume.
 
     A weaker way than `control kinematics`: refitted values imitate what genhexkins lacks. They are numbers for a control, never
-    the machine. The table says what is left over the volume.
+    the machine. The table states the remaining errors of the tool in the volume.
 
     \b
     Examples:
@@ -149,7 +150,7 @@ def parameters(
         date=datetime.now(UTC).date().isoformat(),
         known=every_source(source_files),
         machine=machine,
-        volume_mm=None if volume is None else _six(volume),
+        volume_mm=None if volume is None else numbers_of(volume, {6}, "--volume"),
         tilt_deg=tilt_deg,
         ini=ini,
         force=force,
@@ -161,13 +162,13 @@ def parameters(
         return
     echo(f"{result.folder}: {', '.join(result.files)}")
     spans = ", ".join(f"{axis} {a:g} to {b:g}" for axis, a, b in zip("XYZAB", result.low, result.high, strict=False))
-    echo(f"\nleft over the volume {spans} [µm, deg]:")
+    echo(f"\nremaining errors in the volume {spans} [µm, deg]:")
     rows = [[o.way, o.rms_um, o.largest_um, o.tilt_rms_deg, o.tilt_largest_deg] for o in result.left]
     print_table(
         ["control", "rms", "largest", "tilt rms", "tilt largest"],
         [[way, f"{rms:.2f}", f"{most:.2f}", f"{tilt:.5f}", f"{tilted:.5f}"] for way, rms, most, tilt, tilted in rows],
     )
-    echo("\neach source alone, and what parameters and tables leave of it [µm rms]:")
+    echo("\neach source alone, without and with parameters and tables [µm rms]:")
     print_table(
         ["source", "alone", "left", "held by"],
         [[o.name, _um(o.rms_um), _um(o.left_rms_um), o.held_by] for o in result.sources],
@@ -182,16 +183,6 @@ def _each(texts: tuple[str, ...]) -> list[str]:
 
 def _um(value: float | None) -> str:
     return "-" if value is None else f"{value:.2f}"
-
-
-def _six(text: str) -> list[float]:
-    try:
-        numbers = [float(word) for word in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != 6:  # noqa: PLR2004 - two of each axis
-        raise click.UsageError(f"--volume {text}: give XMIN,XMAX,YMIN,YMAX,ZMIN,ZMAX, six numbers [mm]")
-    return numbers
 
 
 def _print(title: str, lines: Sequence[str]) -> None:

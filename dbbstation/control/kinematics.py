@@ -40,54 +40,11 @@ HELD_BY_BACKLASH = "backlash"
 """Source with a history that a control has an entry for: `[JOINT_n]BACKLASH`."""
 
 _KEYWORDS = frozenset(
-    [
-        "auto",
-        "break",
-        "case",
-        "char",
-        "const",
-        "continue",
-        "default",
-        "do",
-        "double",
-        "else",
-        "enum",
-        "extern",
-        "float",
-        "for",
-        "goto",
-        "if",
-        "inline",
-        "int",
-        "long",
-        "register",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "struct",
-        "switch",
-        "typedef",
-        "union",
-        "unsigned",
-        "void",
-        "volatile",
-        "while",
-        "component",
-        "pin",
-        "param",
-        "function",
-        "option",
-        "license",
-        "author",
-        "variable",
-        "description",
-        "include",
-        "main",
-    ]
+    """auto break case char const continue default do double else enum extern float for goto if inline int long register
+    restrict return short signed sizeof static struct switch typedef union unsigned void volatile
+    while component pin param function option license author variable description include main""".split()  # noqa: SIM905 - words
 )
+"""Of C, and of halcompile."""
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ class LeftByWay:
 
 @dataclass(frozen=True, kw_only=True)
 class SourceLeftOver:
-    """What a source does alone, and what is left of it by parameters and tables.
+    """Errors of the tool by one source alone, without and with parameters and tables.
 
     Attributes:
         rms_um: None if it depends on more than the pose.

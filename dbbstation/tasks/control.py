@@ -41,7 +41,7 @@ SUFFIX = ".comp"
 
 TILT_DEG = 15.0
 SIZE_MM = 200.0
-"""Volume where nobody says another: what parts on a machine of this kind take."""
+"""Default volume: the size of parts on a machine of this kind."""
 
 MACHINE_SUFFIX = ".machine.yaml"
 """End of the machine file that says what the control corrects."""

@@ -72,7 +72,7 @@ def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
 
 
 NOTHING = 1e-3
-"""Share of the noise up to which the rms of an effect is none."""
+"""An effect whose rms is below this share of the noise is left out: a million rows would show it by one standard deviation."""
 
 
 def _family(bank: Bank, name: str) -> Family | None:

@@ -94,7 +94,7 @@ def _doubts(settled: Settled, left: LeftOver, sizes: tuple[Detectable, ...], mat
         found.append("the search ended at its limit of work")
     if not left.is_noise:
         found.append(
-            f"what is left is not noise: {per * left.worst.rms:.2g} {unit} in {left.worst.name}".replace("  ", " ")
+            f"the residual is not noise: {per * left.worst.rms:.2g} {unit} in {left.worst.name}".replace("  ", " ")
         )
     for one in sizes:
         if one.size is None:

@@ -28,7 +28,7 @@ DRAWS = 20
 """Draws: a frequency of one half is known to a tenth."""
 
 AT_ONCE = 128
-"""Columns that are laid out at once."""
+"""Columns that are laid out at once: all of them would take as much memory as columns and blocks once more."""
 
 
 def selection_frequency(
@@ -67,7 +67,6 @@ def selection_frequency(
     rows = spread_over(blocks, np.arange(base))
     every, target = CauseColumns(rows[:, :-1].copy(), room=columns - base), rows[:, -1].copy()
     for first in range(base, columns, AT_ONCE):
-        # All at once would take as much memory as the columns and the blocks once more.
         every.add(spread_over(blocks, np.arange(first, min(first + AT_ONCE, columns)))[:, :-1])
     del rows, blocks  # these fill as much memory as all causes
     parts = {name: every.part(group_of == name) for name in names.tolist()}

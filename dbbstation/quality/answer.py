@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
-from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
+from dbbstation.quality.limits import LOG_ODDS_LIMIT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,7 +67,7 @@ def answer(findings: Sequence[Finding], problem: str = "", to_come: int = 0) -> 
 
 def _doubted(finding: Finding) -> bool:
     """Return whether a fault that one sound sitting in a thousand has is likelier than not, and not decided."""
-    return (finding.value or 0.0) > -math.log(FALSE_ALARMS_PER_RUN) and finding.verdict is FindingVerdict.CANNOT_TELL
+    return (finding.value or 0.0) > LOG_ODDS_LIMIT and finding.verdict is FindingVerdict.CANNOT_TELL
 
 
 def cause_of(finding: Finding) -> str:
@@ -118,17 +117,18 @@ CLEARLY = 2.0
 """Times its limit from which a disturbance explains a circle of another form; below, the other form brings it about."""
 
 
+_TEST, _DIRECTION = "whether it is the circle of another test", "whether it ran the wrong way round"
+_BALL, _PROGRAMS = "whether the ball stands where it stood", "whether all programs ran as the plan has them"
+
 SHOWN_BY = {
     "whether something moved during the circle": frozenset({Name.CLOSURE, Name.DRIFT}),
-    "whether it is the circle of another test": frozenset({Name.TEST}),
-    "whether it ran the wrong way round": frozenset({Name.DIRECTION}),
-    "whether the ball stands where it stood": frozenset({Name.OTHER_DIRECTION, Name.REPEAT, Name.SINCE}),
+    _TEST: frozenset({Name.TEST}),
+    _DIRECTION: frozenset({Name.DIRECTION}),
+    _BALL: frozenset({Name.OTHER_DIRECTION, Name.REPEAT, Name.SINCE}),
 }
 """Faults that leave a circle as smooth as a good one, and the findings of which each one shows the fault. Other faults show in every run.
 The finding `bore` is none of them: in the first test of a machine without a model its limit is the machine's own errors, millimetres,
 and would show neither."""
-
-_PROGRAMS = "whether all programs ran as the plan has them"
 
 DOUBTED = {
     Name.PROGRAMS: _PROGRAMS,
@@ -139,9 +139,9 @@ DOUBTED = {
 BY_PLAN = "an overlap in the plan"
 
 SHOWN_LATER = {
-    "whether it is the circle of another test": "two other tests, a model or a session before",
-    "whether it ran the wrong way round": "the other direction and another test",
-    "whether the ball stands where it stood": "the other direction or a repeat",
+    _TEST: "two other tests, a model or a session before",
+    _DIRECTION: "the other direction and another test",
+    _BALL: "the other direction or a repeat",
     _PROGRAMS: "further tests in both directions, or a model",
 }
 """Faults that later circles of the plan show, judged back on this one, and what shows them where the plan has no circle left."""

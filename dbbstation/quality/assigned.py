@@ -19,7 +19,7 @@ from scipy.special import logsumexp
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
 from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE, SIZES
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
-from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
+from dbbstation.quality.limits import LOG_ODDS_LIMIT
 from dbbstation.quality.stated import limit_along
 from dbbstation.quality.together import expected_um, read_um
 
@@ -31,10 +31,7 @@ if TYPE_CHECKING:
 
     from dbbstation.quality.knowledge import Planned, Seen
 
-LIMIT = -float(np.log(FALSE_ALARMS_PER_RUN))
-"""Logarithm of the odds that decide: one sound run in a thousand is taken for another circle."""
-
-MISTAKE = LIMIT
+MISTAKE = LOG_ODDS_LIMIT
 """What a mistake costs, as a logarithm: an operator makes one in a thousand circles."""
 
 WIDE = 3
@@ -103,7 +100,7 @@ class Assigned:
     def finding(self, one: Seen, undecided: Finding) -> Finding:
         """Return a finding on which circle a run shows, decided where all runs together decide it."""
         against = self.odds(one) + self._cost
-        if against > self._cost - 2.0 * LIMIT:
+        if against > self._cost - 2.0 * LOG_ODDS_LIMIT:
             return undecided
         limit, text = self._cost, f"all {len(self.runs)} circles together show it"
         return Finding(undecided.name, max(against, 0.0), limit, "", FindingVerdict.GOOD, text)
@@ -113,7 +110,7 @@ class Assigned:
         known = self._looked_up
         floor = known[tuple(self._planned)]
         top = max(known.values())
-        likely = [labels for labels, score in known.items() if score > floor and score >= top - LIMIT]
+        likely = [labels for labels, score in known.items() if score > floor and score >= top - LOG_ODDS_LIMIT]
         likely.sort(key=known.__getitem__, reverse=True)
         found = {}
         for at, one in enumerate(self.runs):

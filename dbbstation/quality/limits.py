@@ -16,6 +16,9 @@ FALSE_ALARMS_PER_RUN = 1e-3
 """Probability that a sound run has any finding: one in a thousand runs, which is one in thirty-three sessions of thirty. A
 false alarm costs a repeated circle, two minutes; one that is missed may cost the calibration."""
 
+LOG_ODDS_LIMIT = -float(np.log(FALSE_ALARMS_PER_RUN))
+"""Logarithm of the odds that outweigh a mistake which one sound run in a thousand has."""
+
 TESTED = len(Name) - 6
 """Findings that share it: all but a recording without a circle and lost samples, which are counted and not estimated, readings of
 another run, all programs and the bar of all runs, which have probabilities of their own, and the session before, which is never wrong."""

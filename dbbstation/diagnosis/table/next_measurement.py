@@ -104,10 +104,10 @@ def _apart(found: Mismatch) -> Iterator[Next]:
     for a, one in enumerate(variables):
         for b, other in enumerate(variables[:a]):
             if alike[a, b] > ALIKE and led & {one.name, other.name}:
-                clock, body = (one, other) if one.kind is Kind.TIME else (other, one)
-                how = f"Measure with {clock.name} held while {body.name} moves"
-                if clock.kind is Kind.TIME:  # nobody can hold it
-                    how = f"Measure with another course of {body.name} over {clock.name}"
+                held, moving = (one, other) if one.kind is Kind.TIME else (other, one)
+                how = f"Measure with {held.name} held while {moving.name} moves"
+                if held.kind is Kind.TIME:  # which cannot be held
+                    how = f"Measure with another course of {moving.name} over {held.name}"
                 text = (
                     f"{how}: they move together here (correlation {alike[a, b]:.3f}), and which of them the mismatch "
                     f"follows is not known."

@@ -31,6 +31,9 @@ KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 
 OVER_TIME = ("thermal-struts", "thermal-frame", "spindle-growth", "bar-drift", "bar-scale", "jig-thermal", "backlash")
 """What a wander could be taken for, and what it could hide."""
+FEW = ("backlash", "gravity", "servo-lag", "reversal-spike")
+EIGHT = tuple("abdfhjkn")
+"""Of what is interrupted: the rounds of a comparison are the same for few causes and for all."""
 
 
 @pytest.mark.slow
@@ -154,7 +157,7 @@ def test_a_curve_that_all_struts_follow_has_the_points_of_one_variable(tmp_path)
 def backlash(tmp_path_factory):
     """A session with hard backlash of 4 µm in all struts."""
     folder = tmp_path_factory.mktemp("limits") / "s"
-    record(folder, seed=3, mechanisms=[KINEMATICS, Backlash((4.0,) * 6)], rate_hz=5.0)
+    record(folder, seed=3, mechanisms=[KINEMATICS, Backlash((4.0,) * 6)], rate_hz=2.0)
     return folder
 
 
@@ -171,7 +174,7 @@ def test_who_interrupts_the_comparison_gets_what_it_had_found(backlash, monkeypa
         return search(comparison, causes, seeds, **options)
 
     monkeypatch.setattr(explain, "search", interrupted)
-    found = diagnose([backlash], until_interrupted=True)
+    found = diagnose([backlash], sources=FEW, tests=EIGHT, until_interrupted=True)
     assert found.limits[0].what == "stopped"
     assert found.held_out == "not-tested"
     (best,) = [source for source in found.sources if source.name == "backlash"]
@@ -188,7 +191,7 @@ def test_who_interrupts_the_tests_of_an_answer_gets_the_answer(backlash, monkeyp
         raise KeyboardInterrupt
 
     monkeypatch.setattr(finished, stage, interrupted)
-    found = diagnose([backlash], until_interrupted=True)
+    found = diagnose([backlash], sources=FEW, tests=EIGHT, until_interrupted=True)
     assert found.limits[0].what == "stopped"
     (best,) = [source for source in found.sources if source.name == "backlash"]
     assert best.probability > 0.95
@@ -204,13 +207,13 @@ def test_who_interrupts_before_anything_is_found_gets_nothing(backlash, monkeypa
 
     monkeypatch.setattr(explain, "search", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        diagnose([backlash], until_interrupted=True)
+        diagnose([backlash], sources=FEW, tests=EIGHT, until_interrupted=True)
 
 
 @pytest.mark.slow
 def test_a_search_at_its_limit_says_what_its_sets_leave(backlash, monkeypatch):
     monkeypatch.setattr(explain, "MOST_MEMBERS", 0)
-    found = diagnose_sessions([backlash], None, (), lambda _: None).diagnosis
+    found = diagnose_sessions([backlash], FEW, EIGHT, lambda _: None).diagnosis
     (limit,) = found.limits
     assert limit.what == "search"
     assert f"{1e3 * found.left.rms:.2g} µm rms" in limit.text

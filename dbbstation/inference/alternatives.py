@@ -69,7 +69,8 @@ class Alternatives:
     def probability(self, names: Iterable[str]) -> float:
         """Return the probability that at least one is present."""
         columns = [self._place[name] for name in names if name in self._place]
-        return float(self._weights @ self._inside[:, columns].any(axis=1)) if columns else 0.0
+        # A part of a sum can round to more than the whole.
+        return min(1.0, float(self._weights @ self._inside[:, columns].any(axis=1))) if columns else 0.0
 
     def ambiguity(self, name: str) -> tuple[str, ...]:
         """Return causes of which one is present if this is not, most probable first."""

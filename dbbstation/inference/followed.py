@@ -117,7 +117,7 @@ def weighted(settled: Settled) -> list[tuple[Settled, float]]:
 def probability_of_any(settled: Settled) -> float:
     """Return the probability of any cause."""
     none = (share * one.posterior.probability_of(lambda names: not names) for one, share in weighted(settled))
-    return 1.0 - float(sum(none))
+    return max(0.0, 1.0 - float(sum(none)))  # the sum can round to more than one
 
 
 class VariableProbabilities:
@@ -378,9 +378,8 @@ def way_probability(settled: Settled, wanted: Collection[str], way: str) -> floa
     def inside(cause: Cause, one: Settled) -> bool:
         return bool(followed_by(one.bank, cause.name) & set(wanted)) and way_of(one.bank, cause.name) == way
 
-    return float(
-        sum(
-            share * one.posterior.probability([cause.name for cause in one.causes if inside(cause, one)])
-            for one, share in weighted(settled)
-        )
+    each = (
+        share * one.posterior.probability([cause.name for cause in one.causes if inside(cause, one)])
+        for one, share in weighted(settled)
     )
+    return min(1.0, float(sum(each)))  # it can round to more

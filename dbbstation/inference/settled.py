@@ -99,4 +99,4 @@ class Settled:
             every.append(other.posterior.probability(alike | set(names)))
         weights = np.array([self.log_probability, *(other.log_probability for other in self.others)])
         weights = np.exp(weights - weights.max())
-        return float(weights @ np.array(every) / weights.sum())
+        return min(1.0, float(weights @ np.array(every) / weights.sum()))  # it can round to more

@@ -50,7 +50,9 @@ def test_no_probability_is_above_one(rng) -> None:
     for _ in range(1000):
         outside = {frozenset({name}): float(rng.normal(-45.0, 5.0)) for name in "bcd"}
         inside = {frozenset({"a", str(k)}): float(rng.normal(0.0, 5.0)) for k in range(20)}
-        assert Posterior((Hypothesis((), 0.0),), {**outside, **inside}).probability(("a",)) <= 1.0
+        posterior = Posterior((Hypothesis((), 0.0),), {**outside, **inside})
+        assert posterior.probability(("a",)) <= 1.0
+        assert alternatives(posterior).probability(("a",)) <= 1.0
 
 
 def test_one_of_two_is_there_and_what_is_beside_them_is_no_alternative() -> None:

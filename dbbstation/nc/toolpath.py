@@ -299,6 +299,7 @@ class ToolpathBuilder:
     Attributes:
         corner_mm: rounding allowed in the moves that follow; None: not stated.
         unknown: axes of which nobody knows where they stand, a bit each; a move that names or feeds them makes them known.
+        fed: rows up to the last move at feed.
     """
 
     def __init__(self, name: str, start: NDArray[np.float64] | None = None) -> None:
@@ -315,7 +316,7 @@ class ToolpathBuilder:
         self._offset = 0
         self._rows: list[_Rows] = []
         self._text: dict[int, str] = {}
-        self._count = 0
+        self._count = self.fed = 0
 
     def count_from(self, offset: Sequence[float]) -> None:
         """Set by how much numbers of the moves that follow are less than their poses, shape (6,) [mm, deg]."""
@@ -352,6 +353,7 @@ class ToolpathBuilder:
         self.unknown = 0
         feed = (mm_min, mm_min if deg_min is None else deg_min)
         self._add(RowKind.FEED, poses, feed, line=line, in_machine=in_machine, arc=arc)
+        self.fed = self._count
 
     def dwell(self, seconds: float, *, line: int = 0) -> None:
         """Add a stop of known duration."""

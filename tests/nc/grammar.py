@@ -96,6 +96,8 @@ class _Author:
         target = self.axes(self.some("XYZ"), 50) if draw.random() < 0.7 else ""
         turn = self.axes(self.some("ABC"), 15) if draw.random() < 0.4 else ""
         words = " ".join(part for part in (target, turn) if part) or "X1"
+        if draw.random() < 0.05:
+            words = f"{draw.choice(['@', '^', '^', '@5 ^'])}{self.number(30)} {turn}".rstrip()
         return f"{draw.choice(['G0', 'G1', 'G1', 'G01', 'G00'])} {words}{self.feed()}"
 
     def modal(self) -> str:

@@ -1,4 +1,4 @@
-"""Programs of our own writing in the habits of eight posts: how they begin, change tools, write arcs and holes, and end."""
+"""Programs of our own writing in the habits of thirteen posts: how they begin, change tools, write arcs and holes, and end."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ class Post:
     planes: bool = True
     inches: bool = False
     percent: bool = True
+    subprograms: bool = False
 
 
 POSTS = (
@@ -109,6 +110,46 @@ POSTS = (
         "G0 Z#<safe>\nM5 M9\nM2",
         percent=False,
     ),
+    Post(
+        "fanuc-subprograms",
+        "O2000({name})\nG21\nG17 G40 G49 G80 G90\nG91 G28 Z0.",
+        "T{t} M6\nG90 G0 G54 X{x} Y{y} S{s} M3\nG43 H{t} Z30. M8",
+        "M9\nG91 G28 Z0. M5\nG90\nM30",
+        zeros=False,
+        radius=True,
+        subprograms=True,
+    ),
+    Post(
+        "estlcam",
+        "(Project {name})\n(Created by Estlcam)\n(Required tools:)\n(Fräser 3mm)\nG21\nG90\nG94",
+        "M03 S{s}\nG00 Z15.0000\n(No. {t}: contour)\nG00 X{x} Y{y}",
+        "G00 Z15.0000\nM05\nM30",
+        decimals=4,
+        modal=False,
+        cycles=False,
+        planes=False,
+        percent=False,
+    ),
+    Post(
+        "vectric",
+        "( {name} )\n( Material size )\nG17\nG21\nG90\nG0Z20.320\nG0X0.000Y0.000",
+        "T{t}M6\nS{s}M3\nG0Z20.320\nG0X{x}Y{y}",
+        "G0Z20.320\nG0X0.000Y0.000\nM9\nM30",
+        spaces=False,
+        cycles=False,
+        planes=False,
+        percent=False,
+    ),
+    Post(
+        "bcnc",
+        "(Block-name: Header)\n(Units: mm)\nG17 G90 G21\nG54",
+        "(Block-name: {name} [cut,tool{t}])\nM3 S{s}\nG4 P3\nG0 Z15\nG0 X{x} Y{y}",
+        "(Block-name: Footer)\nG0 Z15\nM5",
+        decimals=4,
+        zeros=False,
+        cycles=False,
+        percent=False,
+    ),
 )
 
 
@@ -123,6 +164,7 @@ class _Author:
         self.lines: list[str] = []
         self.unit = 25.4 if post.inches else 1.0
         self.last = ""
+        self.called: list[list[str]] = []
 
     def program(self) -> str:
         draw, post = self.draw, self.post
@@ -131,9 +173,14 @@ class _Author:
             x, y = (round(draw.uniform(-30, 30), 1) for _ in range(2))
             self.say(post.tool, tool=tool, x=x, y=y)
             for part in draw.sample([self.contour, self.pocket, self.helix, self.holes, self.entry, self.peck], 3):
+                before = len(self.lines)
                 part(x, y)
+                if post.subprograms:
+                    self.called.append([f"O{7001 + len(self.called)}", *self.lines[before:], "M99"])
+                    self.lines[before:] = [f"M98 P{7000 + len(self.called)}"]
+                    self.last = ""
         self.say(post.end)
-        lines = self.lines
+        lines = self.lines + [line for lines in self.called for line in lines]
         if post.numbers:
             numbered = (line and line[0] not in "O(;" for line in lines)
             lines = [

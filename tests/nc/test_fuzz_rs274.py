@@ -36,7 +36,7 @@ ONLY_BY_US = {
     "word that is not read": "words with the letter|is not read",
     "P wanted twice": "both take P",
     "nothing to compensate": "moves nothing",
-    "polar coordinates": "polar coordinates",
+    "polar coordinates": "polar coordinates|the origin has no angle",
     "skipped line": "can be skipped",
     "word that does nothing": "nothing in this line uses",
     "number with a second sign": "has no number",
@@ -134,9 +134,8 @@ def moving(they: list[Event], before: np.ndarray | None = None) -> list[Event]:
 def grouped(path: Toolpath) -> list[tuple[str, np.ndarray]]:
     """Rows of moves, dwells and pauses, the chords of an arc together, without rapids that lead nowhere."""
     told = [row for row, kind in enumerate(path.kind) if RowKind(kind).name in MOTION]
-    first = next((row for row in told if path.kind[row] == RowKind.RAPID), -1)
     still = (path.kind == RowKind.RAPID) & (np.abs(path.poses - path.before).max(axis=1) < 1e-3)
-    told = [row for row in told if not still[row] or row == first]
+    told = [row for place, row in enumerate(told) if place == 0 or not still[row]]
     groups: list[list[int]] = []
     for row in told:
         arc = path.arc[row]
@@ -160,8 +159,10 @@ def off_arc_mm(start: np.ndarray, poses: np.ndarray, event: Event) -> float:
     first, last = start[plane] - centre, event.pose[plane] - centre
     sign = math.copysign(1.0, event.turns)
     swept = (sign * (math.atan2(last[1], last[0]) - math.atan2(first[1], first[0]))) % math.tau
-    if swept < 1e-4 or math.tau - swept < 1e-4:  # four decimals are printed
-        swept = math.tau
+    unsure = 4.0 * 0.51e-4 * event.unit_mm / min(np.hypot(*first), np.hypot(*last))  # four decimals are printed
+    if swept < unsure or math.tau - swept < unsure:  # a full turn or next to none: as many chords as ours
+        step_mm = np.linalg.norm(poses[0, plane] - start[plane])
+        swept = math.tau if step_mm * len(poses) > math.pi * np.hypot(*first) else swept % math.pi
     swept += (abs(event.turns) - 1) * math.tau
     nodes = np.vstack([start, poses])
     share = np.linspace(0.0, 1.0, len(nodes))

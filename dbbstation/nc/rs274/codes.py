@@ -44,7 +44,7 @@ G_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((43, 43.4, 49), ModalGroup.TOOL_LENGTH),
     **{float(name[1:]): ModalGroup.OFFSET for name in SYSTEMS},
     **dict.fromkeys((61, 61.1, 64), ModalGroup.PATH),
-    **dict.fromkeys((15, 69), ModalGroup.NOTHING),
+    **dict.fromkeys((8, 15, 69), ModalGroup.NOTHING),
     80: ModalGroup.CYCLE_END,
     **dict.fromkeys((90, 91), ModalGroup.DISTANCE),
     **dict.fromkeys((90.1, 91.1), ModalGroup.ARC_DISTANCE),
@@ -56,13 +56,13 @@ G_CODES: dict[float, ModalGroup] = {
 M_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((0, 1, 2, 30), ModalGroup.STOP),
     **dict.fromkeys((3, 4, 5), ModalGroup.SPINDLE),
-    6: ModalGroup.TOOL,
+    **dict.fromkeys((6, 61), ModalGroup.TOOL),
     **dict.fromkeys((7, 8, 9), ModalGroup.COOLANT),
     **dict.fromkeys((48, 49), ModalGroup.OVERRIDE),
     **dict.fromkeys((98, 99), ModalGroup.CALL),
 }
 
-LETTERS = frozenset("ABCFGHIJKLMNPQRSTXYZ")
+LETTERS = frozenset("ABCFGHIJKLMNPQRSTXYZ@^")
 
 _TOOL = "post the program for the centre of the tool, without compensation of its radius in the control"
 _TURNED = "post the program without rotation: the model is not turned with it"
@@ -77,6 +77,7 @@ _REMEDIES: dict[float, str] = {
     ),
     **dict.fromkeys((28.1, 30.1), "set reference points by hand, not in the program"),
     **dict.fromkeys((51, 51.1, 68, 68.2), _TURNED),
+    7: "post the program with radii (G8)",
     **dict.fromkeys((87, 88), "post this cycle as single moves"),
 }
 

@@ -81,7 +81,7 @@ class Flow:
         self._frames: list[_Frame] = []
         self._globals: dict[int | str, float] = {}
         self._counts: dict[tuple[int, int], int] = {}
-        self._begun = False
+        self._begun = self.closed = False
 
     def lines(self) -> Iterator[tuple[str, Place]]:
         """Yield lines without O-words in the order in which they run.
@@ -89,7 +89,7 @@ class Flow:
         Raises:
             BadLine: an O-word that makes no sense, or the program does not end.
         """
-        ran = 0
+        ran, last = 0, max((index for index, line in enumerate(self._lines) if line.strip(BLANKS)), default=0)
         while self._next < len(self._lines):
             ran += 1
             place = Place(self._file, self._next + 1)
@@ -101,12 +101,12 @@ class Flow:
             word = self._o_lines.get(self._next)
             if word is not None:
                 self._run(word, place)
-            elif self.percent and is_percent(line):
+            elif is_percent(line) and (self.percent or self._next > last):
+                self.closed = True
                 return
             else:
                 self._begun |= bool(_COMMENT.sub("", line).strip(BLANKS))
                 yield line, place
-        raise BadLine(self._cut_short(percent=self.percent))
 
     def ended(self) -> None:
         """Check behind M2 and M30 that nothing of the program is lacking.
@@ -115,7 +115,7 @@ class Flow:
             BadLine: the percent sign that closes it.
         """
         if self.percent and not any(is_percent(line) for line in self._lines[self._next :]):
-            raise BadLine(self._cut_short(percent=True))
+            raise BadLine(self.cut_short())
 
     def all_lines(self) -> Iterator[tuple[str, Place]]:
         """Yield all lines without O-words as they stand in the file, up to the percent sign that ends it."""
@@ -174,8 +174,9 @@ class Flow:
         start = next((index for index, line in enumerate(self._lines) if line.strip(BLANKS)), 0)
         return (True, start + 1) if is_percent(self._lines[start]) else (False, 0)
 
-    def _cut_short(self, *, percent: bool) -> Problem:
-        end = "the % that closes it" if percent else "M2 or M30"
+    def cut_short(self) -> Problem:
+        """Return the fault of a program without an end."""
+        end = "the % that closes it" if self.percent else "M2 or M30"
         what = f"the program ends without {end}: it may have been cut short"
         return Problem(self._file, len(self._lines), 0, what, "copy it again, or add its end where it is whole")
 

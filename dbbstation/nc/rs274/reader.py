@@ -22,6 +22,7 @@ from dbbstation.nc.toolpath import (
     ALL_AXES,
     EXACT_STOP_MM,
     IN_FORCE,
+    LEAST_MM,
     MESSAGE,
     Ending,
     RowKind,
@@ -54,7 +55,10 @@ DWELL, MACHINE = 4.0, 53.0
 TAKES_AXES = frozenset({10.0, 28.0, 30.0, 52.0, 92.0})
 """Codes of one line that take its axis words for themselves."""
 
-PAUSE, OPTIONAL_STOP = 0.0, 1.0
+PAUSE, OPTIONAL_STOP, SET_TOOL = 0.0, 1.0, 61.0
+POLAR = "@^"
+"""Letters of a radius and an angle in degrees, in place of X and Y."""
+
 TURNS = 0b111000
 """A, B and C, which no tool changer is taken to move where they were declared."""
 
@@ -129,7 +133,7 @@ class _Interpreter:
         self._absolute_centres = False
         self._plane = 0
         self._cycle = ModalCycle()
-        self._turning = ""
+        self._turning, self._stopped = "", 0
         self._upright = self._moved = False
         self._system_said = False
         self.path.holds = {}
@@ -153,6 +157,10 @@ class _Interpreter:
             if block.code(ModalGroup.STOP) in ENDS:
                 self.flow.ended()
                 break
+        else:
+            # A spindle that stops behind the last cut ends programs that have no other end, as for GRBL.
+            if not (self.flow.closed or (not self.flow.percent and 0 < self.path.fed <= self._stopped)):
+                raise BadLine(self.flow.cut_short())
         unknown = [letter for letter, value in zip(AXES, self._state.pose, strict=True) if math.isnan(value)]
         if unknown and self._moved:
             raise unknown_place(block, unknown, "in this program")
@@ -277,7 +285,12 @@ class _Interpreter:
             raise block.place.fault(speed.column, f"the spindle's speed is negative (S{speed.value:g})", "use M3 or M4")
         if tool is not None and (tool.value < 0.0 or tool.value != int(tool.value)):
             raise block.place.fault(tool.column, f"T{tool.value:g} is no tool", "give a whole number")
-        said = [block.words.pop("T", None), block.codes.get(ModalGroup.TOOL)]
+        change, number_set = block.codes.get(ModalGroup.TOOL), None
+        if change is not None and change.value == SET_TOOL:
+            number_set = block.words.pop("Q", None)
+            if number_set is None or number_set.value < 0.0 or number_set.value != int(number_set.value):
+                raise block.place.fault(change.column, "M61 needs Q", "give the number of the tool")
+        said = [block.words.pop("T", None), change, number_set]
         said += [block.codes.get(ModalGroup.SPEED), block.words.pop("S", None)]
         said += [block.codes.get(group) for group in (ModalGroup.SPINDLE, ModalGroup.COOLANT, ModalGroup.OVERRIDE)]
         text = " ".join(f"{word.letter}{number(word.value)}" for word in said if word is not None)
@@ -285,10 +298,13 @@ class _Interpreter:
             self.path.say(RowKind.FUNCTION, text, line=block.place.line)
         if ModalGroup.SPINDLE in block.codes:
             turning = name("M", block.codes[ModalGroup.SPINDLE].value)
+            self._stopped = len(self.path) if self._turning and turning == "M5" else self._stopped
             self._turning = "" if turning == "M5" else turning
         if tool is not None:
             self._state.tool_selected = int(tool.value)
-        if ModalGroup.TOOL in block.codes:
+        if number_set is not None:
+            self._state.tool = int(number_set.value)
+        elif change is not None:
             self._state.tool = self._state.tool_selected
             self._turning = ""
             # A tool changer may move the machine: what no line names again before the next cut is not to be named either.
@@ -319,7 +335,7 @@ class _Interpreter:
     def _modal_arc(self, block: ProgramBlock) -> str:
         """Return the arc of a line without its own code; empty if it makes none."""
         is_arc = self._motion in ARCS and ModalGroup.MOTION not in block.codes
-        return name("G", self._motion or 0.0) if is_arc and block.words.keys() & set(AXES + CENTRES) else ""
+        return name("G", self._motion or 0.0) if is_arc and block.words.keys() & set(AXES + CENTRES + POLAR) else ""
 
     def _dwell_s(self, block: ProgramBlock) -> float:
         word = block.words.pop("P", None)
@@ -431,7 +447,7 @@ class _Interpreter:
         motion = block.code(ModalGroup.MOTION) if block.codes else None
         if motion is not None:
             self._begin_motion(motion)
-        named = [letter for letter in AXES if letter in block.words]
+        named = _named(block)
         if self._motion in CYCLES:
             if named or motion is not None:
                 self._run_cycle(block, named)
@@ -446,8 +462,8 @@ class _Interpreter:
 
     def _go_to(self, block: ProgramBlock, named: list[str], *, in_machine: bool) -> None:
         if self._motion is None:
-            word = block.words[named[0]]
-            raise block.place.fault(word.column, f"{word.letter} without a motion code", "write G0 or G1 before it")
+            what = f"{named[0]} without a motion code"
+            raise block.place.fault(block.first_column, what, "write G0 or G1 before it")
         target = self._target(block, in_machine=in_machine)
         if self._motion == RAPID:
             self._rapid(block, target, [AXES.index(letter) for letter in named], in_machine=in_machine)
@@ -467,8 +483,8 @@ class _Interpreter:
             if len(self.path) + arc.chords > MOST_ROWS:
                 raise _too_long(block)
             self._cut(block, arc.poses(), (arc.length_mm, 0.0), arc=arc.chord)
-        for letter in named:
-            del block.words[letter]
+        for letter in (*named, *POLAR):
+            block.words.pop(letter, None)
 
     def _begin_motion(self, motion: float) -> None:
         if motion in CYCLES and self._motion not in CYCLES:
@@ -541,6 +557,8 @@ class _Interpreter:
                 if not self._absolute and math.isnan(target[axis]) and value != 0.0:
                     raise unknown_place(block, [letter])
                 target[axis] = value + offset[axis] if self._absolute else target[axis] + value
+        if not block.words.keys().isdisjoint(POLAR):
+            target[:2] = self._by_angle(block, target, offset)
         if self._motion != RAPID and not through:
             unknown = [letter for letter, value in zip(AXES, target, strict=True) if math.isnan(value)]
             if unknown:
@@ -553,6 +571,28 @@ class _Interpreter:
             what = f"this move leads beyond {FARTHEST_MM:g} mm or {FARTHEST_DEG:g} degrees"
             raise block.place.fault(block.first_column, what, "check its numbers, and G91 and G20 before it")
         return np.array(target)
+
+    def _by_angle(self, block: ProgramBlock, pose: list[float], offset: tuple[float, ...]) -> list[float]:
+        """Return X and Y of polar coordinates about the origin, in machine coordinates [mm] [LinuxCNC, Polar Coordinates]."""
+        radius_word, angle_word = (block.words.get(letter) for letter in POLAR)
+        once = block.code(ModalGroup.ONCE)
+        other = self._plane != 0 or ModalGroup.PLANE in block.codes or once in {*TAKES_AXES, MACHINE}
+        if other or block.words.keys() & {"X", "Y"} or any(self._state.length[:2]):
+            what = "polar coordinates (@, ^) go with moves in G17, without G53, X, Y and a tool length in these"
+            raise block.place.fault(block.first_column, what, "write X and Y")
+        x, y = (at - zero for at, zero in zip(pose[:2], offset, strict=False))
+        radius, angle_deg = math.hypot(x, y), math.degrees(math.atan2(y, x))
+        partly = not self._absolute or radius_word is None or angle_word is None
+        if partly and math.isnan(radius):
+            raise unknown_place(block, ["X", "Y"])
+        if partly and radius < LEAST_MM and (radius_word is not None or not self._absolute):
+            raise block.place.fault(block.first_column, "the origin has no angle (@, ^)", "write X and Y")
+        if radius_word is not None:
+            radius = radius_word.value * self._state.unit_mm + (0.0 if self._absolute else radius)
+        if angle_word is not None:
+            angle_deg = angle_word.value + (0.0 if self._absolute else angle_deg)
+        angle = math.radians(angle_deg)
+        return [radius * math.cos(angle) + offset[0], radius * math.sin(angle) + offset[1]]
 
     def _run_cycle(self, block: ProgramBlock, named: list[str]) -> None:
         """Drill at the places of a block, along Z."""
@@ -572,7 +612,7 @@ class _Interpreter:
             for step in cycle_steps(code, depths):
                 self._cycle_step(block, step.what, step.depth)
         self.path.corner_mm = corner
-        for letter in named:
+        for letter in (*named, *POLAR):
             block.words.pop(letter, None)
 
     def _target_of_cycle(self, block: ProgramBlock) -> NDArray[np.float64]:
@@ -649,6 +689,12 @@ LEAST_F = 1e-3
 
 _SHOWS_VALUES = re.compile(r"(?:debug|print|log),", re.IGNORECASE)
 _SHOWN = re.compile(r"#(?:(\d+)|<([^<>]*)>)")
+
+
+def _named(block: ProgramBlock) -> list[str]:
+    """Return the axes that a block names, X and Y by polar coordinates too."""
+    polar = "" if block.words.keys().isdisjoint(POLAR) else "XY"
+    return [letter for letter in AXES if letter in block.words or letter in polar]
 
 
 def _moved(block: ProgramBlock) -> int:

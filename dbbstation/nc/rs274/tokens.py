@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 _TOKEN = re.compile(
     rf"""[ \t]*+(?:
-        (?P<letter>[A-Za-z])[ \t]*+(?P<number>{NUMBER.pattern})
-      | (?P<word>[A-Za-z])(?=[ \t]*+[-+]?[ \t]*+(?:[\[#]|[A-Za-z]{{2,6}}[ \t]*+\[))
+        (?P<letter>[A-Za-z@^])[ \t]*+(?P<number>{NUMBER.pattern})
+      | (?P<word>[A-Za-z@^])(?=[ \t]*+[-+]?[ \t]*+(?:[\[#]|[A-Za-z]{{2,6}}[ \t]*+\[))
       | (?P<setting>\#)
       | \((?P<comment>[^()]*+)\)
       | ;(?P<rest>.*+)
@@ -33,8 +33,6 @@ slip of the pen, and would be drawn out into millions of points before any limit
 _NOT_READ = {
     "[": ("an expression ([ ]) without its letter", "write the letter before it"),
     "/": ("a line that can be skipped (/) is not read", "decide: remove the line, or the slash"),
-    "@": ("polar coordinates (@, ^) are not read", "write X and Y"),
-    "^": ("polar coordinates (@, ^) are not read", "write X and Y"),
     "(": ("a comment without its end, or inside another", "close it with ) before the line ends"),
     "%": ("% stands alone on the first and the last line", "remove it"),
 }

@@ -276,7 +276,7 @@ ALL_AXES = 0b111111
 
 
 class _Rows(NamedTuple):
-    """Rows that were added together; a single value holds for all."""
+    """Rows that were added together; a single value holds for all. Lines rise by `step` from one to the next."""
 
     kind: RowKind
     poses: NDArray[np.float64]
@@ -288,6 +288,7 @@ class _Rows(NamedTuple):
     unknown: int
     in_machine: bool
     arc: tuple[float, float, float, float]
+    step: int
 
 
 class ToolpathBuilder:
@@ -321,6 +322,12 @@ class ToolpathBuilder:
     def count_from(self, offset: Sequence[float]) -> None:
         """Set by how much numbers of the moves that follow are less than their poses, shape (6,) [mm, deg]."""
         self._offset = self._offsets.setdefault(tuple(float(each) for each in offset), len(self._offsets))
+
+    def lines(self, poses: NDArray[np.float64], feed: tuple[float, float] | None, *, line: int) -> None:
+        """Add a move of each of successive lines, poses of shape (k, 6) [mm, deg], at F by way and by angle; None: rapids."""
+        kind = RowKind.RAPID if feed is None else RowKind.FEED
+        self._add(kind, poses, feed or _NO_FEED, line=line, step=1)
+        self.fed = self.fed if feed is None else self._count
 
     def rapid(self, pose: NDArray[np.float64], *, line: int = 0, in_machine: bool = False, unknown: int = 0) -> None:
         """Add a move as fast as the machine can.
@@ -399,7 +406,8 @@ class ToolpathBuilder:
             feed_mm_min=each([rows.feed[0] for rows in self._rows], np.float64),
             feed_deg_min=each([rows.feed[1] for rows in self._rows], np.float64),
             dwell_s=each([rows.dwell_s for rows in self._rows], np.float64),
-            line=each([rows.line for rows in self._rows], np.int64),
+            line=each([rows.line for rows in self._rows], np.int64)
+            + each([rows.step for rows in self._rows], np.int64) * self._within(count),
             corners_mm=self._corners_mm(count),
             offset=each([rows.offset for rows in self._rows], np.int32),
             offsets=np.array(list(self._offsets)),
@@ -417,10 +425,17 @@ class ToolpathBuilder:
     def __len__(self) -> int:
         return self._count
 
+    @staticmethod
+    def _within(count: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the number of each row among those that were added together, from 0, shape (n,)."""
+        behind = np.cumsum(count)
+        numbers: NDArray[np.int64] = np.arange(behind[-1] if len(count) else 0) - np.repeat(behind - count, count)
+        return numbers
+
     def _corners_mm(self, count: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the rounding of each row; an arc as chords stops only at its own ends."""
         corners = np.repeat(np.array([rows.corner_mm for rows in self._rows], dtype=np.float64), count)
-        last = np.zeros(len(corners), dtype=np.bool_)
+        last = np.repeat(np.array([rows.step > 0 for rows in self._rows], dtype=np.bool_), count)
         last[np.cumsum(count) - 1] = True
         inner: NDArray[np.float64] = np.where((corners <= 0.0) & ~last, PIECE_CORNER_MM, corners)
         return inner
@@ -435,11 +450,13 @@ class ToolpathBuilder:
         line: int,
         in_machine: bool = False,
         arc: tuple[float, float, float, float] = _STRAIGHT,
+        step: int = 0,
     ) -> None:
         corner_mm = np.nan if self.corner_mm is None else self.corner_mm
         poses = np.array(poses, dtype=np.float64)
         offset = 0 if in_machine else self._offset
-        self._rows.append(_Rows(kind, poses, feed, dwell_s, line, corner_mm, offset, self.unknown, in_machine, arc))
+        rows = _Rows(kind, poses, feed, dwell_s, line, corner_mm, offset, self.unknown, in_machine, arc, step)
+        self._rows.append(rows)
         self._count += len(poses)
         self._pose = poses[-1]
 

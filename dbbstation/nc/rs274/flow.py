@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import TYPE_CHECKING, NamedTuple
 
 from dbbstation.errors import Problem
@@ -82,6 +83,7 @@ class Flow:
         self._globals: dict[int | str, float] = {}
         self._counts: dict[tuple[int, int], int] = {}
         self._begun = self.closed = False
+        self._text, self._begins, self._ran = text, list[int](), 0
 
     def lines(self) -> Iterator[tuple[str, Place]]:
         """Yield lines without O-words in the order in which they run.
@@ -89,11 +91,11 @@ class Flow:
         Raises:
             BadLine: an O-word that makes no sense, or the program does not end.
         """
-        ran, last = 0, max((index for index, line in enumerate(self._lines) if line.strip(BLANKS)), default=0)
+        last = self._text.rstrip(BLANKS + "\n").count("\n")
         while self._next < len(self._lines):
-            ran += 1
+            self._ran += 1
             place = Place(self._file, self._next + 1)
-            if ran > len(self._lines) + MOST_AGAIN:
+            if self._ran > len(self._lines) + MOST_AGAIN:
                 what = f"its loops and subprograms run more than {MOST_AGAIN} lines: they may never end"
                 raise place.fault(1, what, "check the conditions of its loops")
             line = self._lines[self._next]
@@ -107,6 +109,21 @@ class Flow:
             else:
                 self._begun |= bool(_COMMENT.sub("", line).strip(BLANKS))
                 yield line, place
+
+    def lines_like(self, pattern: re.Pattern[str]) -> str:
+        """Return the text from the line yielded last that a pattern of whole lines matches; empty if none."""
+        match = pattern.match(self._text, self._begin_of_line(self._next - 1))
+        return "" if match is None else match[0]
+
+    def skip(self, lines: int) -> None:
+        """Take the next lines as ran."""
+        self._next += lines
+        self._ran += lines
+
+    def _begin_of_line(self, index: int) -> int:
+        if not self._begins:
+            self._begins = [0, *accumulate(len(line) + 1 for line in self._lines)]
+        return self._begins[index]
 
     def ended(self) -> None:
         """Check behind M2 and M30 that nothing of the program is lacking.

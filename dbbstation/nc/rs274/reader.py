@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from dbbstation.nc.rs274.blocks import ProgramBlock, block_of
 from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
 from dbbstation.nc.rs274.cycles import ModalCycle, cycle_steps
 from dbbstation.nc.rs274.flow import Flow
+from dbbstation.nc.rs274.plain import LINES, going_on, plain_lines
 from dbbstation.nc.rs274.state import AXES, ControlState, unknown_place
 from dbbstation.nc.rs274.tokens import BadLine
 from dbbstation.nc.setup import ControlSetup
@@ -148,7 +150,7 @@ class _Interpreter:
             BadLine: the first one that makes no sense.
         """
         for line, place in self.flow.lines():
-            if self._ran_plain(line, place.line):
+            if self._ran_lines(place.line):
                 continue
             block = block_of(line, place, self.flow.value_of)
             for setting in block.settings:
@@ -165,43 +167,39 @@ class _Interpreter:
         if unknown and self._moved:
             raise unknown_place(block, unknown, "in this program")
 
-    def _ran_plain(self, line: str, number: int) -> bool:
-        """Run a line of axes with G0, G1, F and N at most, without a block; return False for any other line."""
-        plain = _PLAIN.fullmatch(line)
-        if (
-            plain is None
-            or not self._moved
-            or self._per_move
-            or self._upright
-            or self.path.unknown
-            or len(line) > MOST_PLAIN
-        ):
+    def _ran_lines(self, first: int) -> bool:
+        """Run lines of axes together, this one and those that follow it; return False if it is to run by itself."""
+        ready = self._moved and self._absolute and self._motion in {RAPID, LINEAR}
+        if not ready or self._per_move or self._upright or self.path.unknown:
             return False
-        code, words = plain["code"], _AXIS_WORD.findall(plain["axes"])
-        motion = self._motion if code is None else float(code)
-        speed = (
-            self._speed
-            if plain["feed"] is None
-            else Feed(float(plain["feed"]) * self._state.unit_mm, float(plain["feed"]))
-        )
-        if motion not in {RAPID, LINEAR} or (motion == LINEAR and speed.mm_min <= 0.0) or len(dict(words)) < len(words):
+        text = self.flow.lines_like(LINES)
+        if not text:
             return False
-        target, unit_mm, offset = self._state.pose.tolist(), self._state.unit_mm, self._state.offset
-        for letter, text in words:
-            axis = AXES.index(letter)
-            value = float(text) * (unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
-            target[axis] = value + (offset[axis] if self._absolute else target[axis])
-        if not max(map(abs, target)) < FARTHEST_DEG:
+        lines, unit_mm = plain_lines(text), self._state.unit_mm
+        modal = np.column_stack([lines.motion, lines.feed])
+        motion, feed = going_on(modal, np.array([self._motion, self._speed.deg_min])).T
+        scale = np.array([unit_mm] * 3 + [1.0] * 3)
+        poses = going_on(lines.axes * scale + np.array(self._state.offset), self._state.pose)
+        bad = ((motion == LINEAR) & (feed <= 0.0)) | (np.abs(poses).max(axis=1) >= FARTHEST_DEG)
+        bad[max(MOST_ROWS - len(self.path), 0) :] = True
+        end = int(np.argmax(bad)) if bad.any() else len(bad)
+        if end == 0:
             return False
-        if plain["number"] is not None:
-            self.path.numbers = (*self.path.numbers[:1], int(plain["number"]))
-        self._begin_motion(motion or 0.0)
-        self._speed, self._state.pose = speed, np.array(target)
-        if motion == RAPID:
-            self.path.rapid(self._state.pose, line=number)
-        else:
-            self.path.feed(self._state.pose[None], *speed, line=number)
-        return len(self.path) <= MOST_ROWS
+        # An F from before counts in the units that were in force there.
+        old = np.logical_and.accumulate(np.isnan(lines.feed))
+        state = np.column_stack([motion, feed, old])[:end]
+        new = np.flatnonzero((state[1:] != state[:-1]).any(axis=1)) + 1
+        for begin, until in pairwise([0, *new.tolist(), end]):
+            self._begin_motion(float(motion[begin]))
+            if not old[begin]:
+                self._speed = Feed(float(feed[begin]) * unit_mm, float(feed[begin]))
+            speed = None if self._motion == RAPID else self._speed
+            self.path.lines(poses[begin:until], speed, line=first + begin)
+        self._state.pose = poses[end - 1].copy()
+        if lines.number is not None and end == len(bad):
+            self.path.numbers = (*self.path.numbers[:1], lines.number)
+        self.flow.skip(end - 1)
+        return True
 
     def run(self, block: ProgramBlock) -> None:
         """Execute one block in the order of [RS274/NGC 3.8]."""
@@ -675,14 +673,6 @@ class _Interpreter:
 
 LAST_OWN = 5000
 """Parameters behind this are the control's own."""
-
-_PLAIN = re.compile(
-    r"(?:N(?P<number>[0-9]{1,8})[ ]*)?(?:G0?(?P<code>[01])(?![0-9.])[ ]*)?(?P<axes>(?:[XYZABC][+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[ ]*)+)"
-    r"(?:F(?P<feed>[0-9]{1,8}(?:\.[0-9]*)?)[ ]*)?\r?"
-)
-_AXIS_WORD = re.compile(r"([XYZABC])([-+.0-9]+)")
-MOST_PLAIN = 200
-"""Characters of a line that is read at once; LinuxCNC refuses lines of 253."""
 
 LEAST_F = 1e-3
 """A move of no way under G93 has a feed all the same."""

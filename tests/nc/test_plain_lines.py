@@ -18,15 +18,15 @@ AXES = "XYZABC"
 def lines(seed: int) -> str:
     """Mostly lines of axes; modes, stops, arcs and increments between them."""
     draw = random.Random(seed)  # noqa: S311 - the same lines each time, nothing secret
-    text = ["G21 G90 G94 G10 L2 P2 X3 Y-4 Z1", "G0 X0 Y0 Z0 A0 B0 C0", "F20 G20", "G1 X0.5"]
+    text = ["G21 G90 G94 G10 L2 P2 X3 Y-4 Z1", "G0 X0 Y0 Z0 A0 B0 C0", "F20 G1 X0.5", "G20"]
     for _ in range(60):
         axes = sorted(draw.sample(AXES, draw.randint(1, 4)), key=AXES.index)
         words = " ".join(f"{axis}{draw.uniform(-9, 9):.{draw.randint(0, 4)}f}" for axis in axes)
         code, feed = draw.choice(["", "", "", "G1 ", "G0", "N7 ", "N8G01 "]), draw.choice(["", "", "", " F90", "F1.5"])
         text.append(code + words + feed + draw.choice(["", "", "", "\r", " "]))
-        if draw.random() < 0.12:
+        if draw.random() < 0.1:
             text.append(
-                draw.choice(["G91", "G90", "G20", "G21", "G55", "G4 P1", "G3 I1 F5", "M1", "(MSG, x)", "G1 F0"])
+                draw.choice(["G91", "G90", "G20", "G21", "G55", "G4 P1", "M1", "(MSG, x)"])
             )
     return "\n".join([*text, "M2"]) + "\n"
 

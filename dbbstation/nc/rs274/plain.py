@@ -30,13 +30,13 @@ class PlainLines(NamedTuple):
     """What successive lines say, row by row.
 
     Attributes:
-        number: the last line number; None if none has one.
+        numbers: line numbers, of the lines that have one.
         motion: 0 or 1, NaN if not said, shape (n,).
         feed: F, NaN if not said, shape (n,).
         axes: X, Y, Z, A, B, C as written, NaN if not named, shape (n, 6).
     """
 
-    number: int | None
+    numbers: list[int]
     motion: NDArray[np.float64]
     feed: NDArray[np.float64]
     axes: NDArray[np.float64]
@@ -46,8 +46,7 @@ def plain_lines(text: str) -> PlainLines:
     """Return what lines say that `LINES` matches."""
     numbers, *columns = zip(*_ONE.findall(text), strict=True)
     motion, *axes, feed = (np.array([float(one) if one else math.nan for one in each]) for each in columns)
-    last = next((int(one) for one in reversed(numbers) if one), None)
-    return PlainLines(last, motion, feed, np.column_stack(axes))
+    return PlainLines([int(one) for one in numbers if one], motion, feed, np.column_stack(axes))
 
 
 def going_on(values: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np.float64]:

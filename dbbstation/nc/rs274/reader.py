@@ -196,8 +196,8 @@ class _Interpreter:
             speed = None if self._motion == RAPID else self._speed
             self.path.lines(poses[begin:until], speed, line=first + begin)
         self._state.pose = poses[end - 1].copy()
-        if lines.number is not None and end == len(bad):
-            self.path.numbers = (*self.path.numbers[:1], lines.number)
+        numbers = (*self.path.numbers, *lines.numbers)
+        self.path.numbers = (*numbers[:1], *numbers[1:][-1:])
         self.flow.skip(end - 1)
         return True
 

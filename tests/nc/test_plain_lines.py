@@ -25,9 +25,7 @@ def lines(seed: int) -> str:
         code, feed = draw.choice(["", "", "", "G1 ", "G0", "N7 ", "N8G01 "]), draw.choice(["", "", "", " F90", "F1.5"])
         text.append(code + words + feed + draw.choice(["", "", "", "\r", " "]))
         if draw.random() < 0.1:
-            text.append(
-                draw.choice(["G91", "G90", "G20", "G21", "G55", "G4 P1", "M1", "(MSG, x)"])
-            )
+            text.append(draw.choice(["G91", "G90", "G20", "G21", "G55", "G4 P1", "M1", "(MSG, x)"]))
     return "\n".join([*text, "M2"]) + "\n"
 
 

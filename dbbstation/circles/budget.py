@@ -69,7 +69,6 @@ class Budget:
         u_um: standard uncertainty; None if a cause of unknown size counts.
         terms_um: known standard uncertainties by cause.
         missing: unstated causes.
-        why_not: may be empty.
         value_um: without noise's contribution.
     """
 

@@ -77,11 +77,8 @@ class SessionOptions:
     """Stated facts of machine, shop and bar.
 
     Attributes:
-        operator: may be empty.
-        job: may be empty.
         serial_number: of the machine; may be empty.
         ambient_temp_c: of the shop; None if unknown.
-        bar_serial_number: may be empty.
         bar_length_mm: distance of its balls; None if unknown.
         bar_uncertainty_um: standard; None if unknown.
         bar_temp_c: at calibration; None if unknown.

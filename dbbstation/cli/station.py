@@ -275,9 +275,6 @@ def _line(
 def _given(line: Line, spy: Path | None, sequence: tuple[str, str], noted: SessionOptions) -> Choice:
     """Return what options and settings state for a chosen session.
 
-    Args:
-        sequence: order and repeats of tests.
-
     Raises:
         click.UsageError: an option that the start screen has no place for.
     """

@@ -253,11 +253,7 @@ def _effects(machine: Machine, values: Values, frames: Frames) -> tuple[NDArray[
 
 
 def _fit(machine: Machine, start: Values, frames: Frames, wanted: NDArray[np.float64], *, platform: bool) -> Values:
-    """Return the values with the least squares of position and lever times tilt, by Gauss-Newton.
-
-    Args:
-        wanted: exact lengths at the frames, shape (n, 6) [mm].
-    """
+    """Return the values with the least squares of position and lever times tilt, by Gauss-Newton."""
     values, used = start, slice(None if platform else STRUTS + JOINTS)
     for _ in range(ROUNDS):
         by_values, tool = _effects(machine, values, frames)
@@ -282,11 +278,7 @@ def _by_source(
     driven: NDArray[np.float64],
     values: Values,
 ) -> tuple[SourceLeft, ...]:
-    """Return the tool's errors by each source alone, without and with the correction, to first order.
-
-    Args:
-        driven: exact lengths at the frames, shape (n, 6) [mm].
-    """
+    """Return the tool's errors by each source alone, without and with the correction, to first order."""
     machine = own.as_found
     frames = Frames.from_poses(poses, machine.hexapod.rotation)
     by_values, tool = _effects(machine, values, frames)

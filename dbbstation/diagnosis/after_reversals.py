@@ -50,12 +50,7 @@ class AfterReversals:
 
 
 def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[NDArray[np.float64]]) -> AfterReversals | None:
-    """Return the strut whose reversals the residual follows most, or None for too few.
-
-    Args:
-        runs: paths.
-        residual_mm: shape (n,) each.
-    """
+    """Return the strut whose reversals the residual follows most, or None for too few."""
     if not all({"time", "strut-speed-sign"} <= run.values.keys() for run in runs):
         return None
     apart_s = float(np.median(np.concatenate([np.diff(run.values["time"]) for run in runs])))
@@ -74,6 +69,5 @@ def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[NDArray[np.fl
 
 
 def _reversals(sign: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return rows in which a strut first moves back, shape (k,)."""
     moving = np.flatnonzero(sign)
     return moving[1:][np.diff(sign[moving]) != 0.0]

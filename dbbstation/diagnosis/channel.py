@@ -59,10 +59,6 @@ DRAWS = 4
 class CircleChannel:
     """All that a diagnosis compares.
 
-    Args:
-        calibration: base fit with thinned runs.
-        sources: candidates, laws of one cause under one name; runs must give their needs.
-
     Attributes:
         calibration: base fit with thinned runs.
         readings: predicted by the base fit.
@@ -160,19 +156,15 @@ class CircleChannel:
         but_for: NDArray[np.bool_] | None = None,
         only: NDArray[np.int64] | None = None,
     ) -> BesideBase:
-        """Return causes beside the base at a sample's noise [mm], balls scattering `scatter` times as stated.
+        """Return causes beside the base; ball scatter is `scatter` times as stated.
 
-        Held-back rows, shape (n,), need zero targets; `only` are needed columns, None: all.
+        Held-back rows, shape (n,), need zero targets; `only` are the needed columns, None: all.
         """
         columns = self.columns if but_for is None else self.columns.but_for(but_for, only)
         return BesideBase(columns, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM))
 
     def target(self, fit: Calibration) -> NDArray[np.float64]:
-        """Return the target of base and causes about a fit, (n,).
-
-        Args:
-            fit: base or joint; base columns come first.
-        """
+        """Return the target of base and causes about a fit, (n,)."""
         base = len(self.base.prior)
         known = fit.x[:base] - fit.layout.nominal[:base]
         # What the fitted columns make of the target is projected out; leaving it out keeps digits.
@@ -185,12 +177,7 @@ class CircleChannel:
         return np.asarray(target, dtype=np.float64)
 
     def noise(self, target: NDArray[np.float64], others: Sequence[Cause], noise_mm: float) -> Spectrum:
-        """Return noise from the residual of base and all causes.
-
-        Args:
-            target: shape (n,) [mm].
-            others: unnamed causes.
-        """
+        """Return noise from the residual of base and all causes."""
         sd = np.zeros(self.columns.count)
         for cause in (*self.named, *self.set_up, *others):
             for variant in cause.variants:
@@ -214,11 +201,7 @@ class CircleChannel:
         return found
 
     def refine(self, name: str, law: str, values: Mapping[str, NDArray[np.float64]], fit: Calibration) -> None:
-        """Lay out a cause at parameter values, with tangents and slack.
-
-        Args:
-            values: by set, shape (p,).
-        """
+        """Lay out a cause at parameter values, with tangents and slack."""
         source = self.sources[name, law]
         readings = self._readings_about(fit)
         parameters = source.parameters(self.machine)
@@ -262,7 +245,6 @@ class CircleChannel:
 
     @cached_property
     def _variables(self) -> list[dict[str, NDArray[np.float64]]]:
-        """Return each run's variables for all rows, cached."""
         return [variables(motion, self.machine) for motion in self.motions]
 
     def give_back(self) -> None:
@@ -273,7 +255,6 @@ class CircleChannel:
             self.columns.give_back(np.unique(np.concatenate(columns)))
 
     def _readings_about(self, fit: Calibration) -> list[BarReading]:
-        """Return readings by a fit, cached for one fit."""
         if fit is self.calibration:
             return self.readings
         if fit is not self._last[0]:
@@ -281,7 +262,6 @@ class CircleChannel:
         return self._last[1]
 
     def _amplitudes_in(self, fit: Calibration, key: tuple[str, str]) -> NDArray[np.float64] | None:
-        """Return a cause's amplitudes in a fit, or None."""
         terms = [t for t in fit.layout.terms if (t.source.name, t.source.law) == key]
         base = {term.source.name for term in self.calibration.layout.terms}
         if not terms or key[0] in base:
@@ -313,7 +293,7 @@ class CircleChannel:
     def _outsize(self) -> tuple[Cause, ...]:
         """Return random effects that may exceed their stated size, with visible parameters.
 
-        Level bars miss ball heights. A ball mounted once is its mounting; a freed one is free already.
+        Level bars cannot measure ball heights. A ball mounted once equals its mounting; a freed ball is already free.
         """
         setups = [observation.setup for observation in self.observations]
         put_up = {ball: {s.mounting for s in setups if s.ball == ball} for ball in {s.ball for s in setups}}
@@ -361,11 +341,7 @@ class CircleChannel:
         shared: Sequence[str],
         nonlinear: tuple[float, ...],
     ) -> list[Variant]:
-        """Return a source's forms at one point, by parts.
-
-        Args:
-            derivatives: per run, shape (n, p).
-        """
+        """Return a source's forms at one point, by parts."""
         amplitudes = [p for p in source.parameters(self.machine) if not p.grid]
         sets = list(dict.fromkeys(shared))
         count = len(amplitudes)

@@ -62,11 +62,9 @@ def diagnose(
     """Find what a kinematic calibration leaves out; see docs/decisions.md, 19.
 
     Args:
-        machine: nominal.
-        observations: raw.
         sources: candidates with their needs, forms of one cause under one name.
         hold_out: choose anew without each group of tests.
-        until_interrupted: an interruption ends the work, and what was found is answered.
+        until_interrupted: an interruption ends the work; findings so far are returned.
 
     Raises:
         CalibrationError: the base model cannot be fitted.
@@ -85,7 +83,6 @@ def diagnose(
 
 
 def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out: bool) -> Diagnosis:
-    """Judge what was found, and test it unless interrupted."""
     progress("verdicts")
     explained, findings = judged(explained)
     progress("held-out tests")
@@ -160,8 +157,8 @@ def judged(explained: Explained) -> tuple[Explained, tuple[SourceFinding, ...]]:
 def doubtful(explained: Explained, findings: Sequence[SourceFinding]) -> set[str]:
     """Return improbable named causes of the best set.
 
-    The median probability model predicts best [Barbieri and Berger, Annals of Statistics 32 (2004) 870]. Ambiguous causes
-    stay.
+    The median probability model predicts best [Barbieri and Berger, Annals of Statistics 32 (2004) 870]. Ambiguous
+    causes remain.
     """
     members = {member.cause.name for member in explained.settled.members}
     doubted = {f.name for f in findings if f.probability < EVEN and not (f.ambiguous_with or f.equivalent)}
@@ -169,7 +166,6 @@ def doubtful(explained: Explained, findings: Sequence[SourceFinding]) -> set[str
 
 
 def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
-    """Return the most valuable sure unmodelled effect, else the residual."""
     settled = explained.settled
     posterior, unmodelled = settled.posterior, settled.unmodelled
     effects = [m for m in settled.best.members if unmodelled.of(m)]
@@ -198,7 +194,7 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
 
 
 def _quick(settled: SettledCircles) -> Unexplained:
-    """Return the residual above modelled harmonics: nothing, or after reversals."""
+    """Return the residual above modelled harmonics: none, or after reversals."""
     found = after_reversals(settled.unmodelled.runs, settled.after.residual_mm)
     if found is None or found.probability >= SIGNIFICANT:
         return Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise.")
@@ -206,7 +202,7 @@ def _quick(settled: SettledCircles) -> Unexplained:
 
 
 def rough_formulas(settled: SettledCircles) -> list[str]:
-    """Return named causes whose slack is needed, which the joint fit lacks."""
+    """Return named causes whose slack is needed, but absent from the joint fit."""
     evidence = settled.comparison.log_evidence(settled.best.members)
     found = []
     for member in settled.members:
@@ -237,7 +233,6 @@ def usable_sources(
 
 
 def _missing(source: ErrorSource, machine: Machine, motions: Sequence[Motion]) -> str:
-    """Return why a source is no candidate, or an empty text."""
     try:
         source.parameters(machine)
     except ModelError as error:

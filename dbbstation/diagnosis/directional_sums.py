@@ -14,14 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class DirectionalSums:
-    """Sums over one variable for d directions.
-
-    Attributes:
-        at: piece means, shape (b,) or (b, c).
-        rest: gain times residual, shape (b, d).
-        gains: gain times gain, shape (b, d, d).
-        base: gain times base directions, shape (b, d, k).
-    """
+    """Sums over one variable for d directions."""
 
     at: NDArray[np.float64]
     rest: NDArray[np.float64]
@@ -44,10 +37,6 @@ class NearbyWaves:
 
     For place x in -1..1, exp(i a x) = J_0(a) + 2 sum i^n J_n(a) T_n(x) [Jacobi and Anger; Abramowitz and Stegun, eqs
     9.1.44 and 9.1.45]; `TERMS` suffice within `REACH` waves.
-
-    Args:
-        sums: of a scalar variable.
-        frequency: [1 / unit].
     """
 
     def __init__(self, sums: DirectionalSums, frequency: float) -> None:
@@ -64,11 +53,7 @@ class NearbyWaves:
         self._twice = _moments(wave**2, x, sums.gains.reshape(pieces, -1), TERMS_OF_SQUARES)
 
     def explained(self, frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return squares explained by waves, shape (m,), from (m,).
-
-        Args:
-            frequencies: within `REACH` waves of the given one [1 / unit].
-        """
+        """Return squares explained by waves, shape (m,), from (m,)."""
         many, d = len(frequencies), self._directions
         turned = 2.0 * np.pi * (frequencies - self._frequency) * self._half
         once, twice = _weights(turned, TERMS), _weights(2.0 * turned, TERMS_OF_SQUARES)

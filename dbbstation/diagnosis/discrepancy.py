@@ -1,7 +1,7 @@
 """Formula slack of causes: the effect modulated along its variable.
 
-Struts' effects may vary with length or direction, growth with another law; smooth modulations stand for it [Kennedy and
-O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
+Effects may vary with strut length or direction, and growth may follow another law. Smooth modulations represent this
+[Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
 """
 
 from __future__ import annotations
@@ -44,9 +44,7 @@ class Effects:
     """What a source does to one run.
 
     Attributes:
-        values: shape (p,).
         derivative: of the reading, shape (n, p).
-        known: variables, as `variables`.
     """
 
     motion: Motion
@@ -87,7 +85,7 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
 
 
 def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
-    """Return changes by other constants, shape (n, q), with share one relative to others."""
+    """Return changes by other constants, shape (n, q), with share one relative to the others."""
     changes = [run.reading.by_parameters(source.left_open(run.motion, machine, run.values)) for run in runs]
     return np.vstack(changes) / source.form_uncertainty
 
@@ -113,7 +111,7 @@ def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]
 def _strut_contributions(
     source: ErrorSource, motion: Motion, machine: Machine, values: NDArray[np.float64], reading: BarReading
 ) -> NDArray[np.float64] | None:
-    """Return a source's reading through each strut, shape (n, 6) [mm]; None if it acts otherwise too."""
+    """Return a source's reading through each strut, shape (n, 6) [mm]; None if it also acts elsewhere."""
     model = MachineModel(machine, (Fitted(source, values, source.shared_by(motion)),))
     effect = model.effect(motion, reading.actual)
     others = (
@@ -132,7 +130,7 @@ def _strut_contributions(
 def _followed_by_strut(
     source: ErrorSource, known: Mapping[str, NDArray[np.float64]], motion: Motion, machine: Machine
 ) -> list[NDArray[np.float64]]:
-    """Return variables of a strut source's slack: place and own, shape (n, 6) each."""
+    """Return variables of a strut source's slack, shape (n, 6) each."""
     if source.varies_with in {"time", "temperature"}:
         return [np.broadcast_to(known["time"][:, None], (len(motion), STRUTS))]
     found = [known["strut-length"]]
@@ -158,7 +156,7 @@ def _swing_rad(motion: Motion, machine: Machine) -> NDArray[np.float64]:
 
 
 def _followed(source: ErrorSource, known: Mapping[str, NDArray[np.float64]], motion: Motion) -> NDArray[np.float64]:
-    """Return variables of another source's slack: own or place, (n, q)."""
+    """Return variables of another source's slack, shape (n, q)."""
     name = "time" if source.varies_with in {"temperature", "speed"} else source.varies_with
     if name in known and known[name].ndim == 1:
         return known[name][:, None]

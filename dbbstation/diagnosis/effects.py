@@ -40,7 +40,6 @@ class CuredCircle:
     Attributes:
         g_um: circular deviation of the cause alone, up to 30 undulations per revolution.
         centre_um: shift, X and Y, shape (2,).
-        measured_g_um: by the same figure.
         measured_centre_um: less commanded, shape (2,).
         cured_centre_um: without the cause, shape (2,).
         effect_mm: on readings, shape (n,).
@@ -66,9 +65,7 @@ class CauseEffect:
     Attributes:
         name: source, or `geometry` for all kinematic parameters.
         sources: removed with it.
-        g_um: mean circular deviation of the cause alone.
         g_u_um: standard uncertainty; None if unknown.
-        centre_um: mean shift.
         centre_u_um: standard uncertainty; None if unknown.
         workspace_um: rms tool shift over the workspace about a common shift; None if it follows more than the pose.
         workspace_u_um: standard uncertainty; None if unknown.
@@ -104,13 +101,12 @@ def effects_of(
 ) -> tuple[CauseEffect, ...]:
     """Return causes' contributions, the greatest circular deviation first.
 
-    An effect is the reading with less without the cause. Effects add to first order, circular deviations need not.
+    An effect is the reading with minus without the cause. Effects add to first order; circular deviations need not.
 
     Args:
-        model: with measurement sources.
-        rows: source, set and parameter.
         covariance: in products of units, shape (k, k); None if unknown.
-        unseen: undetermined combinations at plausible size, shape (h, k); workspace uncertainty is unknown if they dominate.
+        unseen: undetermined combinations at plausible size, shape (h, k). If they dominate, the workspace uncertainty
+            is unknown.
         formula_variance: part by formulas, common to a source's amplitudes, shape (k,); or None.
 
     Raises:
@@ -162,7 +158,7 @@ ROUNDING_MM = 1e-9
 
 
 def _groups(model: MachineModel) -> Iterator[tuple[str, tuple[Fitted, ...]]]:
-    """Return causes with sources: geometry as one, a source's sets as one, no random effects."""
+    """Return causes with sources: geometry as one, each source with all its sets, no random effects."""
     geometry = tuple(f for f in model.sources if f.source.name in KINEMATIC_SOURCES)
     if geometry:
         yield GEOMETRY, geometry
@@ -189,7 +185,6 @@ def _places(group: Sequence[Fitted], model: MachineModel, rows: Sequence[Row]) -
 
 
 def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a covariance's root, shape (p, r)."""
     values, vectors = np.linalg.eigh(covariance)
     kept = values > 0.0
     root: NDArray[np.float64] = vectors[:, kept] * np.sqrt(values[kept])
@@ -293,7 +288,6 @@ def _u_of_centres(
 
 
 def _norm_of_mean(changes: NDArray[np.float64]) -> float:
-    """Return the norm over directions of means over runs, shape (runs, r)."""
     return float(np.linalg.norm(changes.mean(axis=0))) if changes.size else 0.0
 
 
@@ -337,5 +331,5 @@ def _over_the_workspace(
 
 
 def _rms_about_mean_um(moved_mm: NDArray[np.float64]) -> float:
-    """Return vectors' rms length, shape (3, n) [mm], about their mean [µm]."""
+    """Return the rms length of vectors, shape (3, n) [mm], about their mean [µm]."""
     return 1e3 * float(np.sqrt(np.mean(np.sum((moved_mm - moved_mm.mean(axis=1, keepdims=True)) ** 2, axis=0))))

@@ -65,8 +65,8 @@ def explain(
 ) -> Explained:
     """Compare sets of causes, freeing balls and bars that are certainly off.
 
-    Foreign runs are omitted first and reinstated if explained. With `until_interrupted` an interruption ends the comparison with what
-    was found.
+    Foreign runs are omitted first and reinstated if explained. With `until_interrupted`, an interruption ends the
+    comparison and returns the findings so far.
     """
     progress("kinematic calibration")
     fit = partial(calibrate, machine)
@@ -119,8 +119,8 @@ def _with_set_up(
 class _Settling:
     """Compare, refine likely causes, fit jointly, until stable.
 
-    The best hypothesis and rivals get tangents and slack before anything is added, lest grid errors call for false
-    causes.
+    The best hypothesis and its rivals get tangents and slack before anything is added, because grid errors would call
+    for false causes.
     """
 
     def __init__(self, channel: CircleChannel, progress: Callable[[str], None]) -> None:
@@ -207,7 +207,6 @@ class _Settling:
         return False
 
     def _is_laid_out_better(self, settled: SettledCircles) -> bool:
-        """Refine members and rivals, and scale ball scatter; False if nothing is needed."""
         usual = _usual_scatter(self._fit) if any(m.cause.setup for m in settled.best.members) else self._scatter
         rough = [(m, r) for m, r in _with_rivals(settled) if (r.cause.name, r.variant.law) not in self._laid_out]
         if rough:
@@ -238,7 +237,7 @@ def _listed(
     refused: Collection[str],
     given_up: Collection[tuple[str, str]],
 ) -> tuple[Cause, ...]:
-    """Return the compared causes: named causes, faults of the set-up and effects without a name. Abandoned laws are left out."""
+    """Return the compared causes: named causes, set-up faults and unnamed effects. Abandoned laws are left out."""
     forms = [variant for cause in unmodelled.causes for variant in cause.variants]
     known = dict(zip(map(id, forms), named_already(comparison, forms, channel.forms(but_for=refused)), strict=True))
     nameless = [cause for cause in map(partial(_but_for, known=known), unmodelled.causes) if cause.variants]
@@ -251,7 +250,6 @@ def _listed(
 
 
 def _but_for(cause: Cause, known: Mapping[int, bool]) -> Cause:
-    """Return the unmodelled effect without named forms."""
     kept = [v for v in cause.variants if not known[id(v)]]
     if [v.label for v in kept] == [EACH]:
         kept = []
@@ -259,7 +257,7 @@ def _but_for(cause: Cause, known: Mapping[int, bool]) -> Cause:
 
 
 def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:
-    """Return significantly negative causes of a joint fit, with words."""
+    """Return significantly negative causes of a joint fit, with reasons."""
     base = {term.source.name for term in channel.calibration.layout.terms}
     found = {}
     for term in fit.layout.terms:
@@ -276,9 +274,10 @@ def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:
 
 
 def _idle_laws(fit: Calibration, channel: CircleChannel) -> set[tuple[str, str]]:
-    """Return laws with undetermined nonlinear parameters that have a simpler law.
+    """Return laws with undetermined nonlinear parameters and a simpler alternative.
 
-    Such a parameter is at its end or as uncertain as before. In an unsettled fit without such, all laws are simplified.
+    Undetermined means at the range end or as uncertain as before. If no parameter of an unsettled fit is, all laws are
+    simplified.
     """
     sigma, prior = np.sqrt(fit.solution.variance), fit.layout.known.prior
     idle, all_of_them = set(), set()
@@ -295,7 +294,7 @@ def _idle_laws(fit: Calibration, channel: CircleChannel) -> set[tuple[str, str]]
 
 
 def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> SettledCircles:
-    """Return it with a joint fit of its own named causes, if rounds alternated."""
+    """Return the result with a joint fit of its own named causes, if rounds alternated."""
     base = {term.source.name for term in channel.calibration.layout.terms}
     fitted = {term.source.name for term in settled.after.layout.terms} - base
     if fitted == {m.cause.name for m in settled.members}:
@@ -362,7 +361,6 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
 def _estimated(
     channel: CircleChannel, comparison: ModelComparison, hypothesis: Hypothesis
 ) -> list[NDArray[np.float64] | None]:
-    """Return named members' parameter values, of the first set."""
     values = comparison.estimates(hypothesis.members).values
     found: list[NDArray[np.float64] | None] = []
     for member in hypothesis.members:

@@ -26,15 +26,13 @@ MOST_MEMBERS = 12
 
 @dataclass(frozen=True, eq=False)
 class SettledCircles:
-    """What the comparison came to.
+    """The outcome of the comparison.
 
     Attributes:
         after: joint fit of base and named causes.
         posterior: about that fit.
-        best: most probable, or equal and fitted.
         unmodelled: unnamed members.
         noise: beside all causes.
-        left: misfit of the joint fit.
         refused: impossible causes with reasons.
         scatter: of balls in stated sizes.
         stopped: interrupted.
@@ -70,12 +68,7 @@ class SettledCircles:
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """Everything that the comparison needs and found.
-
-    Attributes:
-        before: base fit.
-        outliers: kept from the fit.
-    """
+    """Everything that the comparison needs and found."""
 
     before: Calibration
     outliers: tuple[Outlier, ...]

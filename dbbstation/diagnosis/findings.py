@@ -40,16 +40,14 @@ class SourceFinding:
 
     Attributes:
         ambiguous_with: sources of about equal explanation.
-        gain: in log evidence.
         concealed: share of squares absorbed by machine parameters.
         whole_um: signature's rms over runs.
-        rest_um: beyond fitted parameters.
-        parameters: fitted, or best amplitudes, whose uncertainty bounds what could hide.
+        parameters: fitted; of an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
         probability: given the catalogue; of its class if any.
         stability: selection frequency over seven tenths of tests; None if not tried.
         equivalent: with itself; may be empty.
         acts: always or once.
-        sigmas: norm over standard deviation; 0 if not in the best set.
+        sigmas: norm over standard deviation; 0 if outside the best set.
         gains: held-out; None if not tested.
     """
 
@@ -82,9 +80,7 @@ class Location:
     Attributes:
         direction: `ccw` or `cw`.
         theta_deg: from, to: from +X towards +Y.
-        strut: 1 to 6, or None.
-        variable: may be empty.
-        share: of squares.
+        strut: 1 to 6.
         peak_um: greatest smoothed deviation.
     """
 
@@ -112,10 +108,9 @@ class Curve:
 
     Attributes:
         strut: 1 to 6; None for all struts or none.
-        form: in words; may be empty.
         period: of a wave, in the variable's unit; else None.
         direction: of strongest motion, 3 to 6 numbers by `convention`; empty for a scalar.
-        convention: removed part that fitted parameters make; may be empty.
+        convention: removed part that fitted parameters can make.
         readings_um: rms effect on readings.
         unconcealed_um: beyond fitted machine parameters.
         points: rising; straight or a wave between.
@@ -153,10 +148,6 @@ class Unexplained:
 
     Attributes:
         rms_um: beyond noise, low harmonics.
-        strut: 1 to 6, or None.
-        follows: or None.
-        gain: log evidence.
-        curve: or None.
     """
 
     rms_um: float
@@ -215,17 +206,14 @@ class Diagnosis:
 
     Attributes:
         mismatch: beyond noise.
-        misfit: of the base.
         left: of the joint model.
         before: base fit.
-        after: joint fit, or `before`.
-        held_out: predictions before and after [mm].
+        held_out: prediction errors before and after [mm].
         chosen_anew: without each group; None without causes or for few tests.
         levels: existence, variables and cause of a difference [µm].
-        workspace: the calibration's error elsewhere; None without findings.
+        workspace: the calibration's error away from the tests; None without findings.
         locations: largest share first.
         second_start_agrees: None if interrupted.
-        next_tests: best first, each beside earlier ones; may be empty.
         cancelling: [mm], or None.
         limits: of search, parameters, joint fit.
     """

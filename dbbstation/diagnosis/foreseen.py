@@ -71,7 +71,6 @@ class _Run:
     Attributes:
         ball: orthonormal effects of ball shifts, shape (n, 3).
         weight: of samples represented.
-        touched: base columns, shape (t,).
         base: their rows, shape (n, t).
         of_sources: amplitude rows by form and wait, shape (n, p).
     """
@@ -94,11 +93,7 @@ class ForeseenTests:
         self._runs: dict[tuple[Circle, float, str], _Run] = {}
 
     def that_show(self, needs: Collection[Need]) -> list[Proposal]:
-        """Return circles about the plan's balls within reach.
-
-        Args:
-            needs: time adds later tests, time and path other feeds.
-        """
+        """Return circles about the plan's balls within reach."""
         seen: dict[str, Observation] = {}
         for observation in self.channel.observations:
             seen.setdefault(observation.setup.ball, observation)
@@ -133,11 +128,7 @@ class ForeseenTests:
         direction: Direction,
         asked: Sequence[tuple[ErrorSource, Variant]],
     ) -> NDArray[np.float64]:
-        """Return a run's compressed rows on base and sources, shape (r, k), its new mounting removed.
-
-        Args:
-            asked: sources, behind the base, in all sets.
-        """
+        """Return a run's compressed rows on base and sources, shape (r, k), its new mounting removed."""
         run = self._run(proposal, direction, asked)
         place = len(self.channel.base.prior)
         touched, parts = [run.touched], [run.base]
@@ -200,7 +191,6 @@ def _form(proposal: Proposal, source: ErrorSource, variant: Variant) -> _Form:
 
 
 def _without(ball: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return rows orthogonal to directions."""
     return np.asarray(rows - ball @ (ball.T @ rows), dtype=np.float64)
 
 
@@ -213,7 +203,6 @@ def _reachable(machine: Machine, circle: Circle) -> bool:
 
 
 def _ends_s(channel: CircleChannel) -> float:
-    """Return the last run's end on the session's clock [s]; zero if unknown."""
     clocks = [o.started_s + float(o.raw.t_s[-1]) for o in channel.observations if o.started_s is not None]
     return max(clocks, default=0.0)
 

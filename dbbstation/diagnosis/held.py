@@ -1,4 +1,4 @@
-"""Possible errors along held directions."""
+"""Errors along directions that the fit keeps at nominal."""
 
 from __future__ import annotations
 
@@ -21,11 +21,8 @@ def uncertainties(calibration: Calibration, held: NDArray[np.float64]) -> NDArra
 def held_variance(calibration: Calibration, held: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return every column's variance along held directions, shape (k,).
 
-    Along them a source is as large as found or plausible, whichever is more: a ball 70 µm off in visible directions may
-    be 20 µm off in others.
-
-    Args:
-        held: orthonormal rows in scales, shape (h, f).
+    A source there may be as large as found or plausible, whichever is greater: a ball 70 µm off in visible directions
+    may be 20 µm off in others.
     """
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
@@ -51,11 +48,7 @@ def unseen(calibration: Calibration) -> NDArray[np.float64]:
 
 
 def held_beside(before: Calibration, after: Calibration) -> NDArray[np.float64]:
-    """Return directions held by the joint fit only, shape (h, f); the base's own are convention.
-
-    Args:
-        after: base columns first.
-    """
+    """Return directions held by the joint fit only, shape (h, f); the base's own are convention."""
     wide = np.zeros((len(before.solution.held), after.solution.held.shape[1]))
     wide[:, : before.solution.held.shape[1]] = before.solution.held
     beyond = after.solution.held - (after.solution.held @ wide.T) @ wide

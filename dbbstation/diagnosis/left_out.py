@@ -45,7 +45,7 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
 
 
 def predicted_without(explained: Explained, left_out: Sequence[Collection[str]]) -> list[float]:
-    """Return rms errors of held-out tests by base and causes, each time without some [mm]; a ball that is off settles in its test."""
+    """Return rms errors of held-out tests by base and causes, each time without some [mm]; a ball that is off stays so in its test."""
     channel, settled = explained.channel, explained.settled
     members = [m for m in settled.best.members if not m.cause.setup]
     variants = [member.variant for member in members]
@@ -67,11 +67,7 @@ def predicted_without(explained: Explained, left_out: Sequence[Collection[str]])
 
 
 def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
-    """Return causes' shares of selections in seven tenths of tests; may be empty.
-
-    Args:
-        names: causes competing in each draw.
-    """
+    """Return causes' shares of selections in seven tenths of tests; may be empty."""
     channel, settled = explained.channel, explained.settled
     if not settled.members:
         return {}
@@ -93,8 +89,8 @@ def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
 def widened_by_tests(calibration: Calibration) -> Calibration:
     """Return the fit with the larger of own and jackknife uncertainty by tests.
 
-    Nothing is chosen anew; correlations stay [`widening`], random effects keep stated sizes. Below `LEAST_PARTS` groups
-    nothing changes.
+    Nothing is chosen anew; correlations [`widening`] and stated sizes of random effects are kept. Below `LEAST_PARTS`
+    groups nothing changes.
     """
     groups = groups_of(calibration.observations)
     if groups is None:

@@ -1,4 +1,4 @@
-"""Size and place of the largest part of what a fit leaves."""
+"""Size and place of the largest residual of a fit."""
 
 from __future__ import annotations
 

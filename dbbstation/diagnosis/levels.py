@@ -1,4 +1,4 @@
-"""Circles as an outcome like any other: levels and verdicts are read off it."""
+"""Circles as an outcome of the generic channel, for levels and verdicts."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ UM = 1e3
 
 
 class CircleBank(Bank):
-    """Columns of circles, which are laid out already, in white noise."""
+    """Columns of circles in white noise, already laid out."""
 
     def __init__(self, rows: Channel, circles: CircleChannel, settled: SettledCircles) -> None:
         self.channel, self.patterns, self.laws = rows, {}, {law.name: law for law in rows.laws}
@@ -49,12 +49,12 @@ class CircleBank(Bank):
         return self._columns.of(columns)
 
     def beside(self, but_for: NDArray[np.bool_] | None = None, only: NDArray[np.int64] | None = None) -> BesideBase:
-        """Return causes beside the base, as of any bank."""
+        """Return causes beside the base."""
         return self._circles.beside_base(self.noise.sigma, self._scatter, but_for, only)
 
 
 def outcome_of(explained: Explained) -> Settled:
-    """Return what the comparison of circles came to, as of any channel, in mm."""
+    """Return the outcome of the circle comparison [mm]."""
     circles, settled = explained.channel, explained.settled
     base = circles.base
     rows = Channel(
@@ -84,7 +84,7 @@ def outcome_of(explained: Explained) -> Settled:
 
 
 def _law(explained: Explained, cause: Cause) -> Law:
-    """A cause with what it follows; its columns are those that were laid out."""
+    """Return a cause with its variables and existing columns."""
     settled, circles, variant = explained.settled, explained.channel, cause.variants[0]
     member = next((m for m in settled.best.members if m.cause.name == cause.name), None)
     variant = variant if member is None else member.variant
@@ -118,11 +118,7 @@ def _law(explained: Explained, cause: Cause) -> Law:
 
 
 def circle_levels(explained: Explained, outcome: Settled, gains: GainsOfTests | None) -> Levels:
-    """Return the three levels of circles [µm].
-
-    Args:
-        gains: None: not tested.
-    """
+    """Return the three levels of circles [µm]."""
     found = levels_by_tests(outcome, _left(explained), gains).times(UM)
     unmodelled = explained.settled.unmodelled.follows
     # Of what moves no strut, all amplitudes together are no place.
@@ -136,7 +132,7 @@ def circle_levels(explained: Explained, outcome: Settled, gains: GainsOfTests | 
 
 
 def _happened(outlier: Outlier) -> Followed:
-    """Class of a ball, bar or run that is kept out of the fit [µm]."""
+    """Return the class of a ball, bar or run kept out of the fit [µm]."""
     variable = {OutlierKind.RUN: RUN, OutlierKind.BAR: BAR}.get(outlier.kind, BALL)
     return Followed(
         ((variable,),), (), FollowsAnswer.HAPPENED, 1.0, {}, outlier.size_um, (), where=outlier.runs or outlier.test
@@ -144,7 +140,7 @@ def _happened(outlier: Outlier) -> Followed:
 
 
 def _left(explained: Explained) -> LeftOver:
-    """What joint model and unmodelled effects leave, as of any channel [mm]."""
+    """Return the residual of joint model and unmodelled effects [mm]."""
     settled = explained.settled
     if any(settled.unmodelled.of(member) for member in settled.best.members):
         return LeftOver(True, 1.0, ())  # noqa: FBT003 - its first field

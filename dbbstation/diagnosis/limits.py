@@ -43,7 +43,6 @@ def limits_of_fit(fit: Calibration) -> tuple[LimitReached, ...]:
 
 
 def _at_end(fit: Calibration, column: int) -> LimitReached:
-    """Return a parameter at its range end."""
     term = next(one for one in fit.layout.terms if one.columns.start <= column < one.columns.stop)
     parameter = term.parameters[column - term.columns.start]
     value = float(fit.x[column])

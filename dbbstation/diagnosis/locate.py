@@ -29,7 +29,7 @@ COUNTS_SIGMA = 4.0
 
 
 def locations_of(before: Calibration, settled: SettledCircles, first: Misfit, levels: Levels) -> tuple[Location, ...]:
-    """Return the largest base misfits, the variable that the largest class follows, and the struts of all classes."""
+    """Return the largest base misfits, the largest class's variable, and the struts of all classes."""
     names = {member.cause.name for member in settled.members}
     fitted = [f for f in settled.after.model.sources if f.source.name in names]
     largest = max(levels.follows, key=lambda one: one.rms, default=None)
@@ -43,7 +43,7 @@ def locations_of(before: Calibration, settled: SettledCircles, first: Misfit, le
 def _with_unmodelled(
     settled: SettledCircles, struts: list[NDArray[np.float64] | None]
 ) -> list[NDArray[np.float64] | None]:
-    """Add what unmodelled effects of struts contribute to readings, per run, shape (n, 6) [mm]."""
+    """Add struts' unmodelled contributions to readings, shape (n, 6) [mm] per run."""
     unmodelled, members = settled.unmodelled, settled.best.members
     values = settled.comparison.estimates(members).values if members else np.zeros(0)
     for member in members:
@@ -65,13 +65,7 @@ def locate(
     struts: Sequence[NDArray[np.float64] | None],
     variable: str,
 ) -> tuple[Location, ...]:
-    """Return stretches beyond noise, largest share first.
-
-    Args:
-        residual_mm: of the base, shape (n,) each.
-        noise_mm: per sample, for smooth effects.
-        struts: contributions per run, shape (n, 6) [mm]; or None.
-    """
+    """Return stretches beyond noise, largest share first."""
     smoothed = [smooth(r, np.radians(o.raw.phi_deg)) for o, r in zip(observations, residual_mm, strict=True)]
     total = sum(float(s @ s) for s in smoothed)
     found: list[Location] = []

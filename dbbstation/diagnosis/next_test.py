@@ -47,10 +47,6 @@ def next_tests(
     """Return the best tests for the first open cause, against its rivals.
 
     An identified cause is open if the workspace remains more uncertain than corrected.
-
-    Args:
-        findings: per named cause, most probable first.
-        elsewhere: workspace change; None without findings.
     """
     channel, settled = explained.channel, explained.settled
     could_be = ForeseenTests(channel)
@@ -81,12 +77,11 @@ def propose(
 ) -> tuple[NextTest, ...]:
     """Return the fewest tests that change a source's verdict or halve its uncertainty.
 
-    Tests are added greedily by rms amplitude uncertainty. A verdict changes if half of the plausible combinations stand
-    out by five standard deviations; an uncertainty is the best combination's. Empty if so many tests fail, none is within
-    reach, or the need cannot be foreseen.
+    Tests are added greedily by rms amplitude uncertainty. A verdict changes if half of the plausible combinations reach
+    five standard deviations; the uncertainty is the best combination's. Empty if the limit of tests does not suffice,
+    none is within reach, or the need cannot be predicted.
 
     Args:
-        could_be: possible tests.
         asked: the source with columns, then its rivals.
     """
     if not all(source.needs <= PROPOSED for source, _ in asked):
@@ -136,7 +131,6 @@ def propose(
 def _told(
     covariance: NDArray[np.float64], rows: NDArray[np.float64], noise_mm: float, own: slice
 ) -> NDArray[np.float64]:
-    """Return the covariance after further rows."""
     seen = np.flatnonzero(rows.any(axis=0))
     gain = rows[:, seen] @ covariance[seen, own]
     answer = rows[:, seen] @ covariance[np.ix_(seen, seen)] @ rows[:, seen].T + noise_mm**2 * np.eye(len(rows))
@@ -144,7 +138,6 @@ def _told(
 
 
 def _size(covariance: NDArray[np.float64], variant: Variant) -> float:
-    """Return the rms uncertainty in plausible sizes."""
     return float(np.sqrt(np.mean(np.maximum(np.diag(covariance), 0.0) / variant.plausible**2)))
 
 
@@ -155,7 +148,6 @@ def _sigmas(covariance: NDArray[np.float64], variant: Variant) -> NDArray[np.flo
 
 
 def _worth_it(now: NDArray[np.float64], then: NDArray[np.float64]) -> bool:
-    """Return whether a source becomes testable or half as uncertain."""
     testable = [bool(np.mean(sigmas <= 1.0 / OUT) >= TESTABLE_SHARE) for sigmas in (now, then)]
     return testable == [False, True] or bool(np.any(then <= HALVED * now))
 

@@ -28,7 +28,6 @@ class Trace:
 
     Attributes:
         theta_deg: from +X towards +Y.
-        measured_um: less nominal bar length.
         before_um: by the base.
         after_um: by the joint model.
     """
@@ -42,11 +41,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class GainOfTest:
-    """One test, all its runs together.
-
-    Attributes:
-        residual_um: rms within the mounting, before and after.
-    """
+    """One test, all its runs together."""
 
     name: str
     residual_um: tuple[float, float]

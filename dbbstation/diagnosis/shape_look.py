@@ -1,7 +1,7 @@
-"""First look for waves, bumps and steps beside a refitted base.
+"""Search for waves, bumps and steps beside a refitted base.
 
-Sums over narrow pieces, of residual and base, make curves cheap and exact within a piece. The best of each kind compete
-as unmodelled effects.
+Sums of residual and base over narrow bins make curves cheap and exact within a bin. The best of each kind compete as
+unmodelled effects.
 """
 
 from __future__ import annotations
@@ -98,8 +98,6 @@ class TemplateScan:
     """A fit's residual and base directions, in noise.
 
     Args:
-        runs: for shapes.
-        residual: shape (n,) each.
         jacobian: shape (n, k) each, used once.
         held: at nominal.
     """
@@ -209,7 +207,7 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
 
 
 def _shared(found: Sequence[Shape], extent: Ranges) -> list[Shape]:
-    """Return waves and ringing of one strut on all struts, since forms of two may be indistinguishable."""
+    """Return one strut's waves and ringing on all struts, since forms of two may be indistinguishable."""
     kept: list[Shape] = []
     for shape in sorted(found, key=lambda one: -one.explained):
         if shape.strut is None or shape.kind not in {"wave", "ringing"}:
@@ -262,7 +260,6 @@ def _bumps(low: float, high: float) -> list[Form]:
 
 
 def _steps(low: float, high: float, count: int = _STEPS) -> list[Form]:
-    """Return sharp steps away from the ends."""
     wide = (high - low) / count
     return [StepForm(float(at), wide / 4.0) for at in np.linspace(low, high, count + 1)[2:-2]] if wide > 0.0 else []
 
@@ -280,7 +277,6 @@ def _lines(places: NDArray[np.float64]) -> list[Form]:
 def _best(
     variable: str, kind: str, strut: int | None, moves: str, sums: DirectionalSums, forms: Sequence[Form], apart: float
 ) -> list[Shape]:
-    """Return local maxima of explanation."""
     if not forms:
         return []
     curves = np.stack([form.columns(sums.at) for form in forms], axis=1)
@@ -292,7 +288,6 @@ def _best(
 
 
 def _peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
-    """Return local maxima, best first."""
     padded = np.concatenate([[-np.inf], explained, [-np.inf]])
     peaks = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
     return np.asarray(peaks[np.argsort(-explained[peaks])][:most])
@@ -301,7 +296,6 @@ def _peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
 def _waves(
     variable: str, strut: int | None, moves: str, sums: DirectionalSums, grid: NDArray[np.float64]
 ) -> list[Shape]:
-    """Return waves of a frequency grid, refined."""
     if len(grid) == 0:
         return []
     explained = sums.explained(_cosines(sums.at, grid))
@@ -332,7 +326,6 @@ def _finer(
 
 
 def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return cosines and sines, shape (b, m, 2)."""
     phase = 2.0 * np.pi * np.outer(at, frequencies)
     return np.stack([np.cos(phase), np.sin(phase)], axis=2)
 

@@ -1,6 +1,6 @@
 """Unmodelled effects of struts, readings or balls over variables.
 
-They compete with named sources; if one wins, its cause is unknown and strut and variable describe it.
+They compete with named sources. A winner has an unknown cause, but a known strut and variable.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ THERMOMETERS = ("machine", "jig", "bar")
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """One run for shapes, kept rows.
+    """One run's kept rows, for shapes.
 
     Attributes:
         values: by variable, shape (n,), (n, 6) by strut, or (n, c).
@@ -121,7 +121,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Follows:
-    """What an unmodelled error follows and moves.
+    """The variable of an unmodelled error and the part that it moves.
 
     Attributes:
         kind: such as `wave`; empty for the usual one.
@@ -152,7 +152,6 @@ class Shape:
         strut: 1 to 6; None for all or none.
         moves: what moves; a given strut restricts it.
         tried: independent forms of the choice.
-        explained: squares alone, in noise.
     """
 
     variable: str
@@ -182,7 +181,7 @@ class Shape:
         return np.einsum("ni,nip->np", samples.gain[self.moves], self.form.columns(values))
 
     def by_strut(self, samples: Samples, amplitudes: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
-        """Return what each strut contributes to readings, shape (n, 6), and how many amplitudes that takes."""
+        """Return each strut's contribution to readings, shape (n, 6), and its number of amplitudes."""
         gain, values = samples.gain[self.moves], self.followed(samples.values[self.variable])
         columns = self.form.columns(values)
         count = columns.shape[-1]
@@ -290,7 +289,6 @@ def samples_of(
     """Return variables and gains of a run.
 
     Args:
-        reading: predicted.
         pivot_mm: of table rotation, shape (3,); None: none.
     """
     known = {name: values[motion.kept] for name, values in variables(motion, machine).items()}
@@ -333,7 +331,8 @@ def _hoses(frames: Frames, machine: Machine) -> NDArray[np.float64]:
 def _pulled_towards(motion: Motion, machine: Machine) -> NDArray[np.float64]:
     """Return struts' stretch by a unit pull, shape (n, 6, 60): five numbers per place.
 
-    Pull at the platform's middle, moments at `LEVER_MM` along its axes, and a force down for unknown height.
+    The numbers are the pull at the platform's middle, moments at `LEVER_MM` along its axes, and a downward force for
+    unknown height.
     """
     struts, frames = motion.struts(machine), motion.frames(machine)
     count = len(motion)
@@ -358,11 +357,7 @@ def ranges(runs: Sequence[Samples]) -> Ranges:
 
 
 def shapes(extent: Ranges) -> list[Shape]:
-    """Return families without look, in column order.
-
-    Args:
-        extent: over all runs.
-    """
+    """Return families that need no search, in column order."""
     found: list[Shape] = []
     warmed = [n for n in extent.low if n in TEMPERATURES and np.max(extent.high[n] - extent.low[n]) > FOLLOWED_K]
     usual = ("strut-length", "strut-force", "strut-speed-sign", "strut-speed", "strut-acceleration", "time")

@@ -1,4 +1,4 @@
-"""How far machine parameters had been pulled by physics that the earlier calibration lacked."""
+"""Bias of machine parameters by physics missing from the earlier calibration."""
 
 from __future__ import annotations
 

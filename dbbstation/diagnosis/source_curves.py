@@ -1,7 +1,7 @@
 """Found sources over their variable, beside readings.
 
 Readings are partial residuals: the model's strut error plus the residual on that strut alone [Larsen and McCleary,
-Technometrics 14 (1972) 781]; a wrong form departs from its curve.
+Technometrics 14 (1972) 781]. A wrong form departs from its curve.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ class Branch:
     Attributes:
         sense: `lengthening` or `shortening`, or empty.
         model_um: mean error by the source.
-        before_um: explaining the base residual; NaN if hardly seen.
-        after_um: the model's plus the joint residual's; NaN if hardly seen.
+        before_um: strut error that explains the base residual; NaN if hardly measured.
+        after_um: the model's plus the joint residual's; NaN if hardly measured.
         sigma_um: by noise beside fitted parameters.
     """
 
@@ -79,7 +79,6 @@ class SourceCurves:
     Attributes:
         source: empty for the unmodelled residual.
         fine: may change between pieces, as a wave.
-        struts: by 1 to 6; may be empty.
         reading: if no strut moves.
     """
 
@@ -155,7 +154,6 @@ def _wanted(diagnosis: Diagnosis, name: str) -> Follows:
 
 
 def _drawn_over(wanted: Follows, observations: Sequence[Observation], *, moves_struts: bool) -> str:
-    """Return the variable if common, else strut length or angle."""
     variable = wanted.variable
     if variable in {"temperature", *TEMPERATURES}:
         return variable
@@ -223,7 +221,6 @@ def _branch(
     *,
     fine: bool,
 ) -> Branch:
-    """Return a column averaged over pieces, without empty ones."""
     over, gain = samples.variable[:, column], samples.gain[:, column]
     pieces = int(np.ceil(np.ptp(over) / WAVE_PIECE_MM)) if fine else BINS
     edges = np.linspace(over.min(), over.max(), pieces + 1)

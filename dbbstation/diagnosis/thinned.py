@@ -31,11 +31,7 @@ def sectors_for(runs: int) -> int:
 
 
 def thinned(observation: Observation, most: int = SECTORS) -> Observation:
-    """Return the run averaged over sectors, with its command; short runs as they are.
-
-    Args:
-        most: samples per turn.
-    """
+    """Return the run averaged over sectors, with its command; short runs as they are."""
     raw = observation.raw
     if len(raw) <= most:
         return observation

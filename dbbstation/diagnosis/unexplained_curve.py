@@ -1,7 +1,7 @@
 """An unmodelled effect's curve with uncertainty.
 
-Amplitudes are of the best set with kinematics and set-up refitted. What these can make is removed by convention: a
-constant, and over length a slope. Motions in several directions are printed along the strongest.
+Amplitudes are of the best set with kinematics and set-up refitted. By convention, parts that kinematics can make are
+removed: a constant, and over length a slope. Motions in several directions are printed along the strongest.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ AXES = {
 
 
 def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) -> Curve:
-    """Return an effect's curve, summed with others that follow the same."""
+    """Return an effect's curve, summed with others over the same variable."""
     unmodelled, runs, comparison = settled.unmodelled, settled.unmodelled.runs, settled.comparison
     shape = _largest(settled, member)
     together = [m for m in settled.best.members if m is member or any(_adds(shape, s) for s in unmodelled.of(m))]
@@ -100,7 +100,6 @@ def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) ->
 
 
 def _largest(settled: SettledCircles, member: Member) -> Shape:
-    """Return a member's shape, of the strut with the largest curve."""
     shapes = settled.unmodelled.of(member)
     found = settled.comparison.estimates([member, *settled.best.without(member.cause.name)])
     parts = _parts(shapes, found.values[: len(member.variant.columns)])
@@ -108,12 +107,11 @@ def _largest(settled: SettledCircles, member: Member) -> Shape:
 
 
 def _parts(shapes: Sequence[Shape], values: NDArray[Number]) -> list[NDArray[Number]]:
-    """Return amplitudes or columns by shape."""
     return np.split(values, len(shapes))
 
 
 def _adds(one: Shape, other: Shape) -> bool:
-    """Return whether two effects are of one thing over one variable."""
+    """Return whether two effects move the same part over one variable."""
     if one.variable not in OF_STRUTS or one.strut is None:
         return False
     return (one.variable, one.strut, one.moves) == (other.variable, other.strut, other.moves)
@@ -130,7 +128,7 @@ def _summed(
 
 
 def _not_followed(settled: SettledCircles, together: Sequence[Member]) -> float:
-    """Return structure left by the curve over its own explanation, as the points' relative uncertainty."""
+    """Return the relative uncertainty of the points: structure left by the curve over its explanation."""
     unmodelled, comparison = settled.unmodelled, settled.comparison
     names = {m.cause.name for m in together}
     others = settled.best.without(*names)
@@ -156,8 +154,6 @@ class _Piece:
     Attributes:
         amplitudes: less convention, shape (p,).
         to_points: shape (n, p).
-        at: shape (n,).
-        direction: may be empty.
     """
 
     amplitudes: NDArray[np.float64]
@@ -196,12 +192,7 @@ def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[NDArray[np.float
 def _over(
     runs: Sequence[Samples], shape: Shape, line: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
-    """Return points, the matrix from amplitudes of one direction, and their axis.
-
-    Args:
-        runs: for shapes.
-        line: amplitudes of the strongest direction, shape (p,).
-    """
+    """Return points, the matrix from amplitudes of one direction, and their axis."""
     form = shape.form
     if isinstance(form, Plane | PlaneStep):
         flat = form.across if isinstance(form, PlaneStep) else line[: form.coordinates]
@@ -230,7 +221,6 @@ def _values(shape: Shape, run: Samples) -> NDArray[np.float64]:
 
 
 def _weights(runs: Sequence[Samples], shape: Shape) -> NDArray[np.float64]:
-    """Return readings about each point, shape (p,)."""
     return np.asarray(
         sum(shape.form.columns(_values(shape, run)).reshape(-1, shape.form.count).sum(axis=0) for run in runs)
     )

@@ -50,12 +50,7 @@ class JointFitWithCurve:
     curve: Curve
 
     def identified(self, report: Mapping[str, Any], sessions: Mapping[str, str]) -> IdentifiedModel:
-        """Return the model to keep; unfitted parameters are zero.
-
-        Args:
-            report: numbers by name.
-            sessions: SHA-256 by name.
-        """
+        """Return the model to keep; unfitted parameters are zero."""
         found = identified_model(self.fit, {**report, "unexplained": self.curve.plain()}, sessions)
         machine, name = found.model.machine, self.source.name
         names = [parameter.name for parameter in self.source.parameters(machine)]
@@ -107,7 +102,8 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCur
 def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
     """Return the finding with an exactly fitted wave.
 
-    Joints make part of a long wave, which biases the scan by some per cent. An unsettled fit changes nothing.
+    Joints absorb part of a long wave, which biases the scan by some per cent. A fit without convergence changes
+    nothing.
     """
     curve = rest.curve
     if curve is None or curve.period_mm is None or curve.strut is None:
@@ -154,11 +150,11 @@ def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) ->
             return own if strut else tuple(replace(p, name=p.name.replace("strut_1", "every_strut")) for p in own)
 
         def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-            """What the whole does with these values."""
+            """Return the effect of all parts with these values."""
             return whole.effect(motion, machine, to_all @ values)
 
         def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-            """Derivative of that."""
+            """Return the derivative of this effect."""
             return whole.derivative(motion, machine, to_all @ values).times(to_all)
 
     return TiedSource()

@@ -36,8 +36,6 @@ class Unmodelled:
     One cause per effect: for all struts, one, or each.
 
     Attributes:
-        runs: for shapes.
-        follows: by cause.
         shapes: by cause and form; per strut if each has its own.
     """
 
@@ -57,7 +55,7 @@ class Unmodelled:
         self._add([*shapes(ranges(self.runs)), *wander(self.runs)])
 
     def look(self, fit: Calibration, members: Sequence[Member], noise_mm: float) -> None:
-        """Look for waves, bumps, steps and pulses beside base and causes, and add them."""
+        """Search for waves, bumps, steps and pulses beside base and causes, and add them."""
         channel = self.channel
         taken = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
         known = with_random(channel.base, np.concatenate([np.zeros(0), *(member.sd for member in members)]))
@@ -72,7 +70,6 @@ class Unmodelled:
         return self.shapes.get((member.cause.name, member.variant.label), ())
 
     def _add(self, more: Sequence[Shape]) -> None:
-        """Add shapes, one cause for those that differ in strut only."""
         families: dict[str, list[Shape]] = {}
         for shape in more:
             families.setdefault(_name(shape), []).append(shape)

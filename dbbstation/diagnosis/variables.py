@@ -12,5 +12,5 @@ SESSION_TIME = "the time of the session"
 
 
 def variable_of(source: ErrorSource) -> str:
-    """Return what a named cause follows: its own name where it is no single variable."""
+    """Return a named cause's variable; its own name if there is no single one."""
     return SESSION_TIME if source.varies_with == "time" else source.varies_with or source.name

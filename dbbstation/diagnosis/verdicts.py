@@ -1,4 +1,4 @@
-"""Findings on named causes of circles, read off as those of any channel; nothing rewrites them afterwards."""
+"""Findings on named causes of circles, from the generic channel."""
 
 from __future__ import annotations
 
@@ -35,13 +35,11 @@ TESTABLE_SHARE = 0.5
 def judge(
     explained: Explained, outcome: Settled, anew: ChosenAnew | None = None, levels: Levels | None = None
 ) -> tuple[SourceFinding, ...]:
-    """One finding per named cause, those that are there first.
+    """Return a finding per named cause, present ones first.
 
     Args:
-        explained: what the comparison came to.
-        outcome: the same, as of any channel.
-        anew: what held-out tests say; None: they were not asked, and what is identified is so without them.
-        levels: verdicts are read off these; None: before they are known.
+        anew: results of held-out tests; None: not tested.
+        levels: source of the verdicts; None: before they are known.
     """
     return _CircleJudge(explained, outcome, anew, levels).findings()
 
@@ -58,7 +56,7 @@ class _CircleJudge(CauseJudge):
         self._blocks = self._circles.blocks(self._columns, np.zeros(self._circles.runs[-1].stop))
 
     def findings(self) -> tuple[SourceFinding, ...]:
-        """All of them."""
+        """Return all findings."""
         found = [self._source_finding(cause) for cause in self._named.values()]
         found += [
             SourceFinding(name, Verdict.RULED_OUT, (), 0.0, 0.0, 0.0, 0.0, {}, why, probability=0.0)
@@ -93,7 +91,7 @@ class _CircleJudge(CauseJudge):
         )
 
     def _in_words(self, names: Iterable[str]) -> tuple[str, ...]:
-        """Names of causes; of an unmodelled effect the variable that it follows."""
+        """Return names of causes; for an unmodelled effect, its variable."""
         follows = self._joint.unmodelled.follows
         return tuple(f"an unmodelled effect over {follows[n]}" if n in follows else n for n in names)
 
@@ -112,12 +110,12 @@ class _CircleJudge(CauseJudge):
         return Verdict.NOT_TESTABLE, (), "These tests leave it open: they neither show nor exclude it."
 
     def _alike(self, name: str) -> str:
-        """As of any channel; of causes that all sets together hold for absent, only what nothing tells from a member."""
+        """Return an equivalent, as for any channel; for absent causes only one identical to a member."""
         equal = any(name in names for names in self._classes.values())
         return super()._alike(name) if equal or self._alternatives.probability((name,)) > ABSENT else ""
 
     def _group_of(self, name: str) -> tuple[str, ...]:
-        """All causes of which one is there, where this is one of them."""
+        """Return the group of causes of which one is present."""
         follows = () if self._found is None else self._found.follows
         groups = [(*one.form.names, *one.form.not_worse) for one in follows if one.form is not None]
         groups += [equal for equal in self._classes.values() if len(equal) > 1]
@@ -125,14 +123,14 @@ class _CircleJudge(CauseJudge):
         return next((tuple(n for n in group if JOINED not in n) for group in groups if name in group), ())
 
     def _instead_of(self, name: str) -> frozenset[str]:
-        """None: the joint model has members alone."""
+        """Return none, because the joint model has members alone."""
         del name
         return frozenset()
 
     def _concealed(
         self, shown: Member, effect: NDArray[np.float64], values: NDArray[np.float64]
     ) -> tuple[float, float, float]:
-        """Root mean square of an effect, as found or as plausible, that of what is not concealed [mm], and the concealed share."""
+        """Return an effect's rms, as found or plausible, its unconcealed rms [mm], and the concealed share."""
         del effect
         columns = shown.variant.columns
         found = shown.cause.name in self._members
@@ -159,9 +157,9 @@ class _CircleJudge(CauseJudge):
         return bool(np.mean(standing_out(products, variant.plausible) >= OUT) >= TESTABLE_SHARE)
 
     def _unseen_points(self, cause: Cause) -> list[float]:
-        """Values of a listed parameter, such as the run that a bump came before, at which these tests would not show a cause.
+        """Return values of a listed parameter, such as a bump's run, at which these tests would not show a cause.
 
-        Values of a list are cases of their own: to see one of them says nothing of another.
+        Each value of a list is a separate case.
         """
         found = set()
         for variant in cause.variants:
@@ -176,7 +174,7 @@ class _CircleJudge(CauseJudge):
     def _values_of(
         self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
     ) -> dict[str, Value]:
-        """Values in the joint fit; of what is not there, amplitudes whose uncertainty says how much could hide."""
+        """Return values in the joint fit; for an absent cause, amplitudes whose uncertainty bounds an undetected effect."""
         if member.cause.name in self._members:
             return self._fitted(member.cause.name)
         source = self._circles.source_of(member.cause.name, member.variant)
@@ -189,7 +187,7 @@ class _CircleJudge(CauseJudge):
         }
 
     def _fitted(self, name: str) -> dict[str, Value]:
-        """Values of a cause in the joint fit; what its formula may be off by is part of their uncertainty."""
+        """Return a cause's values in the joint fit, with its formula's inaccuracy in their uncertainty."""
         after = self._joint.after
         variance = uncertainties(after, unseen(after)) ** 2 + after.layout.formula_variance(after.x)
         values: dict[str, Value] = {}
@@ -204,6 +202,6 @@ class _CircleJudge(CauseJudge):
 
 
 def _form_uncertainty(sources: Mapping[tuple[str, str], ErrorSource], member: Member) -> float:
-    """By how much the formula of a cause may be off, as a share of its effect; one without a name has none."""
+    """Return the relative inaccuracy of a cause's formula; zero for an unnamed cause."""
     source = sources.get((member.cause.name, member.variant.law))
     return 0.0 if source is None else source.form_uncertainty

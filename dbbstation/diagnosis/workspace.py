@@ -1,4 +1,4 @@
-"""What a missing effect cost away from the tests: how far two models put the tool apart over the workspace."""
+"""Error of a missing effect over the workspace: distance between two models' tool positions."""
 
 from __future__ import annotations
 
@@ -30,15 +30,14 @@ STEPS = 5
 
 @dataclass(frozen=True)
 class WorkspaceError:
-    """How far the earlier calibration put the tool from where the joint model puts it, over the workspace.
+    """Difference of tool position between the earlier calibration and the joint model, over the workspace.
 
     Attributes:
-        shift_um: mean of that along X, Y and Z: a common shift, which a program's zero on the part takes away [µm].
-        with_shift_rms_um: root mean square length of it all [µm].
+        shift_um: mean along X, Y and Z [µm]; a program's zero on the part removes it.
+        with_shift_rms_um: rms length including the shift [µm].
         greatest_um: greatest length about the common shift [µm].
-        at_pose: where that is, X, Y, Z, A, B, C [mm, deg].
-        uncertainty_um: root mean square of the joint model's own standard uncertainty about a common shift [µm]; None where it is
-            not known.
+        at_pose: place of the greatest, X, Y, Z, A, B, C [mm, deg].
+        uncertainty_um: rms standard uncertainty of the joint model about a common shift [µm]; None if unknown.
     """
 
     shift_um: tuple[float, ...]
@@ -51,9 +50,9 @@ class WorkspaceError:
 
 
 def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError | None:
-    """Compare two calibrations of one machine over the workspace; None where no place is within travel.
+    """Compare two calibrations of one machine over the workspace; None if no pose is within travel.
 
-    Only sources that need no more than the pose are looked at: drift and backlash have no place of their own.
+    Only sources that need no more than the pose are compared; drift and backlash have no fixed place.
     """
     machine = before.layout.machine
     poses = workspace(machine)
@@ -82,7 +81,7 @@ def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError |
 
 
 def workspace(machine: Machine) -> NDArray[np.float64]:
-    """Poses over the inner part of the travel that the machine can take, shape (n, 6) [mm, deg]."""
+    """Return poses over the inner travel that the machine can reach, shape (n, 6) [mm, deg]."""
     travel = machine.travel
     middle = sum(travel.z_mm) / 2.0
     across = np.linspace(-REACH, REACH, STEPS) * travel.xy_radius_mm

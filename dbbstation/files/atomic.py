@@ -1,6 +1,6 @@
 """Write whole or not at all: a temporary file beside the target, synced, renamed, folder synced.
 
-A power cut leaves the old file, the new one or a temporary one with `.new` in its name.
+A power cut leaves the old file, the new one, or a temporary one with `.new` in its name.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
     """Write a file.
 
     Args:
-        rewrites: the file is the program's own and was read to be changed.
+        rewrites: the file belongs to the program and was read to be changed.
 
     Raises:
         OutputError: the file exists without `force`, lies in a session, was read by this command, or cannot be written; the old
@@ -70,9 +70,6 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
 @contextlib.contextmanager
 def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
     """Yield a file to write piece by piece; it takes its place when all is written.
-
-    Yields:
-        The file to write to.
 
     Raises:
         OutputError: as `write_bytes`; the old file stays after any error.
@@ -107,7 +104,6 @@ def write_folder(
 
     Args:
         files: content by path; a path that ends with a slash is an empty folder.
-        force: replace files that exist; others stay.
         own: the files are part of this session folder.
 
     Raises:
@@ -180,7 +176,7 @@ def refuse_outputs(paths: Iterable[Path | None], *, force: bool) -> None:
 
 
 def _refuse_input(path: Path) -> None:
-    """Refuse to overwrite what this command has read."""
+    """Refuse to overwrite an input of this command."""
     if was_read(path):
         what = "this file was read just now: the result would take its place"
         raise OutputError(what, where=str(path), remedy="name another file")
@@ -213,7 +209,6 @@ def remove_leftovers(folder: Path) -> None:
 
 
 def _make_parents(folder: Path) -> None:
-    """Make a folder and its parents, synced to disk."""
     missing = [one for one in (folder, *folder.parents) if not one.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     for made in missing:
@@ -248,7 +243,6 @@ def _fill(folder: Path, files: Mapping[str, str | bytes], read_only: Callable[[s
 
 
 def _replace_all(folder: Path, files: Mapping[str, str | bytes], read_only: Callable[[str], bool]) -> None:
-    """Write all beside their targets first, so that errors come before the first target changes."""
     written: list[tuple[Path, Path]] = []
     try:
         for name, content in files.items():
@@ -299,7 +293,6 @@ def _write_synced(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def _told(path: Path) -> Iterator[None]:
-    """Turn a refusal of the system into an OutputError."""
     try:
         yield
     except OSError as error:

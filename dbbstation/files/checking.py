@@ -47,7 +47,7 @@ FEWEST_SAMPLES = 8
 
 @dataclass
 class Checked:
-    """What was found in one file or session.
+    """Result for one file or session.
 
     Attributes:
         kind: format; `run`, `drive`, or empty if unknown.
@@ -194,7 +194,6 @@ def _run(checked: Checked) -> None:
 
 
 def _implausible(path: Path, recording: Recording) -> list[Problem]:
-    """Return what no recording of a bar can be, whatever its plan."""
     faults = []
     usable = np.arange(len(recording)) if recording.usable is None else np.flatnonzero(recording.usable)
     if len(usable) < FEWEST_SAMPLES:
@@ -273,7 +272,6 @@ NO_SEAL = "it carries no seal (`dbbstation session seal` writes one)"
 
 
 def _judge(checked: Checked, session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]]) -> None:
-    """Judge readable runs; lost samples are reported already."""
     checked.judgements = judge_session(session, wanted)
     for (run, _), judgement in zip(wanted, checked.judgements, strict=True):
         lossy = any(finding.name is Name.LOST for finding in judgement.wrong)

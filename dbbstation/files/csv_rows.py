@@ -26,9 +26,9 @@ _NONE = "-"
 
 
 def csv_text(rows: Iterable[Iterable[object]], *, exact: bool = False) -> str:
-    """Return rows as CSV text for spreadsheets.
+    """Return rows as CSV text for spreadsheets, numbers with `DIGITS` digits.
 
-    A text that looks like a formula gets `'` before it. Numbers keep `DIGITS` digits.
+    A text that resembles a formula gets `'` before it.
 
     Args:
         exact: write as many digits as read back the same bits.
@@ -53,9 +53,6 @@ def csv_rows(
     lines: Iterable[str], separator: str, file: str, *, first_line: int = 1, skip_spaces: bool = False
 ) -> Iterator[tuple[int, list[str]]]:
     """Yield the line number and the cells of each row.
-
-    Args:
-        lines: with or without their ends.
 
     Raises:
         InputError: a cell is too long, as behind an unclosed quotation mark.

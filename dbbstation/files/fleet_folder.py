@@ -1,7 +1,6 @@
 """The folder of a fleet's results, each whole under its key.
 
-A result is one file; its models and pages are written before it. Two processes write the same content under the same
-name.
+A result is one file; its models and pages are written first. Two processes write the same content under the same name.
 """
 
 from __future__ import annotations
@@ -84,9 +83,6 @@ class FleetFolder:
     def keep(self, name: str, key: str, data: Mapping[str, Any], files: Mapping[str, bytes]) -> dict[str, object]:
         """Keep a result and return it as `known` would.
 
-        Args:
-            files: further files, by their ending.
-
         Raises:
             OutputError: it cannot be written.
         """
@@ -108,5 +104,5 @@ class FleetFolder:
 
 
 def _begun(path: Path) -> bool:
-    """Return whether a path is what a fleet leaves that was ended before it put its mark there."""
+    """Return whether a path is left from a fleet that ended before it marked the folder."""
     return path.name == LOCK_FILE or is_leftover(path)

@@ -1,7 +1,7 @@
-"""The one way in for files: regular files only, counted while they are read.
+"""The only reader of files: regular files only, with a size limit while reading.
 
-A pipe blocks, a device never ends, and a file may grow. `tests/files/test_gateway.py` finds code that reads elsewhere. A
-refusal is an `OSError` with its reason as `strerror`.
+A pipe blocks, a device never ends, and a file may grow. `tests/files/test_gateway.py` finds code that reads elsewhere.
+A refusal is an `OSError` with its reason as `strerror`.
 """
 
 from __future__ import annotations
@@ -36,13 +36,7 @@ class TooLargeError(OSError):
 
 
 class Source:
-    """An open regular file.
-
-    Args:
-        file: unbuffered.
-        path: for messages.
-        largest: most bytes to read.
-    """
+    """An open regular file."""
 
     def __init__(self, file: FileIO, path: Path, size: int, largest: int) -> None:
         self._file = file
@@ -65,20 +59,12 @@ class Source:
         return data
 
     def blocks(self) -> Iterator[bytes]:
-        """Yield the file in blocks.
-
-        Raises:
-            OSError: as `read`.
-        """
+        """Yield the file in blocks."""
         while data := self.read():
             yield data
 
     def content(self) -> bytes:
-        """Return the whole file.
-
-        Raises:
-            OSError: as `read`.
-        """
+        """Return the whole file."""
         # The whole at once, without a second copy: it grows on only where it grew since it was opened.
         first = self.read(self._size + 1)
         rest = list(self.blocks())
@@ -102,31 +88,19 @@ def opened(path: Path, largest: int = LARGEST_BYTES) -> Iterator[Source]:
 
 
 def content_of(path: Path, largest: int = LARGEST_BYTES) -> bytes:
-    """Return a file's bytes.
-
-    Raises:
-        OSError: as `opened`, and as `Source.read`.
-    """
+    """Return a file's bytes."""
     with opened(path, largest) as source:
         return source.content()
 
 
 def head_of(path: Path, most: int) -> bytes:
-    """Return at most the first `most` bytes of a file.
-
-    Raises:
-        OSError: as `opened`, and as `Source.read`.
-    """
+    """Return at most the first `most` bytes of a file."""
     with opened(path) as source:
         return source.read(most)
 
 
 def digest_of(path: Path) -> str:
-    """Return a file's SHA-256 in hexadecimal, read in blocks.
-
-    Raises:
-        OSError: as `opened`, and as `Source.read`.
-    """
+    """Return a file's SHA-256 in hexadecimal, read in blocks."""
     digest = hashlib.sha256()
     with opened(path) as source:
         for block in source.blocks():

@@ -30,11 +30,11 @@ class InputBook:
         self.virtual: dict[str, None] = {}
 
     def note_read(self, path: Path) -> None:
-        """Note a reading that outputs need not name."""
+        """Note a file that outputs need not name."""
         self._read.add(real_path(path))
 
     def was_read(self, path: Path) -> bool:
-        """Whether a file was read so far."""
+        """Return whether a file was read so far."""
         return real_path(path) in self._read
 
     def note_virtual(self, name: str) -> None:
@@ -78,7 +78,7 @@ def input_book() -> Iterator[InputBook]:
 
 
 def in_a_book(task: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Let a task note what it reads, if no command does: from Python, too, it then never replaces its own input."""
+    """Let a task note its inputs if no command does, so that from Python, too, it never replaces one."""
 
     @wraps(task)
     def call(*args: Given.args, **named: Given.kwargs) -> Result:
@@ -105,7 +105,7 @@ def note_known(path: Path, digest: str) -> None:
 
 
 def note_virtual(name: str) -> None:
-    """Note that what was read under a name comes from a virtual machine."""
+    """Note that an input of this name comes from a virtual machine."""
     book = _BOOK.get()
     if book is not None:
         book.note_virtual(name)

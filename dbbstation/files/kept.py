@@ -1,7 +1,7 @@
 """An index of computed results in the user's cache folder.
 
-It never holds the only copy of anything. A missing, damaged or outdated index is begun anew. SQLite runs without a
-write-ahead log and never on a network share.
+It is never the only copy. A missing, damaged or outdated index is rebuilt. SQLite runs without a write-ahead log and
+never on a network share.
 """
 
 from __future__ import annotations
@@ -36,11 +36,7 @@ SHARES = frozenset(
 
 @dataclass(frozen=True)
 class Stamp:
-    """What shows that a file has not changed, without reading it.
-
-    Attributes:
-        modified_ns: when it was written [ns].
-    """
+    """Evidence, without reading, that a file has not changed."""
 
     modified_ns: int
     size: int
@@ -62,12 +58,7 @@ def stamp_of(path: Path, *others: Path) -> Stamp:
 
 @dataclass(frozen=True)
 class NotedAnchor:
-    """An anchor as it was noted.
-
-    Attributes:
-        anchor: the link that a log ended with.
-        at: ISO 8601.
-    """
+    """An anchor as it was noted."""
 
     anchor: str
     at: str
@@ -84,10 +75,10 @@ class Kept:
     """What is kept of one folder's files, each written at once. A context.
 
     Args:
-        begin_anew: forget all but noted anchors.
+        begin_anew: discard all but noted anchors.
 
     Attributes:
-        problem: why nothing can be kept; empty if it can.
+        problem: why nothing can be kept; empty if possible.
     """
 
     def __init__(self, folder: Path, *, begin_anew: bool = False) -> None:
@@ -138,7 +129,7 @@ class Kept:
         return self._noted.get(name)
 
     def note(self, name: str, noted: NotedAnchor) -> None:
-        """Note the anchor of a file; it outlasts changes and a new index."""
+        """Note the anchor of a file; it survives changes and a new index."""
         self._noted[name] = noted
         self._write("INSERT OR REPLACE INTO noted VALUES (?, ?, ?)", [(name, noted.anchor, noted.at)])
 
@@ -227,13 +218,13 @@ def index_file(folder: Path) -> Path:
 
 
 def _unfit(file: Path, folder: Path) -> str:
-    """Return why an index must not be there; empty if it may."""
+    """Return why an index must not be there; empty if allowed."""
     if real_path(file).is_relative_to(real_path(folder)):
         return "the cache folder lies in the folder of the sessions; set XDG_CACHE_HOME to another"
     return folder_problem(file)
 
 
 def folder_problem(file: Path) -> str:
-    """Return why nothing can be kept in a file; empty if it can."""
+    """Return why a file cannot be an index; empty if it can."""
     kind = file_system(real_path(file))
     return f"the cache folder lies on a share ({kind}); set XDG_CACHE_HOME to a local one" if kind in SHARES else ""

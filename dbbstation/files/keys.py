@@ -1,4 +1,4 @@
-"""Keys of kept results, over all that decides them."""
+"""Keys of kept results, over all that determines them."""
 
 from __future__ import annotations
 

@@ -31,9 +31,7 @@ def classes_in_files(
     """Return classes that derive from `base`, each with its place.
 
     Args:
-        files: each runs once.
         base: abstract bases of others and names with an underscore do not count.
-        contract: where to read the requirements.
         faults: grows by files that are missing, not Python, or lack such a class.
     """
     found = []
@@ -64,7 +62,6 @@ def own_instances(
     """Return instances of all such classes, by distinct names.
 
     Args:
-        contract: where to read the requirements.
         attributes: required, with `name`.
         fault_of: fault and remedy of an instance; may run its code.
 
@@ -105,7 +102,6 @@ def module_name(path: Path) -> str:
 
 
 def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:
-    """Read a file as Python; None with the fault and its place added."""
     data = read_bytes(path, faults, LARGEST_PROGRAM)
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
@@ -123,7 +119,7 @@ def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:
 
 
 def _run(path: Path, tree: ast.Module, faults: list[Problem]) -> ModuleType | None:
-    """Run a file as a module without writing beside it; None with the fault and its line added."""
+    """Run a file as a module, writing nothing beside it; None with the fault and its line added."""
     module = ModuleType(module_name(path))
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # where dataclasses look up the types of their fields

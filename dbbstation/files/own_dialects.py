@@ -20,9 +20,6 @@ DECLARED = ("name", "extension", "what")
 def dialect_given(name_or_file: str) -> Dialect:
     """Return a dialect.
 
-    Args:
-        name_or_file: a known name, or a `.py` file, which is run.
-
     Raises:
         StationError: nothing has this name.
         InputError: the file is missing, not Python, has not exactly one dialect, or fails its trial.
@@ -40,7 +37,7 @@ def dialect_given(name_or_file: str) -> Dialect:
 
 
 def _tried(found: FoundClass[Dialect]) -> Dialect:
-    """Return an instance that has written and read all that a program may hold.
+    """Return an instance after it has written and read all elements of a program.
 
     Raises:
         InputError: what it lacks.

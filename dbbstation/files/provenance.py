@@ -52,7 +52,7 @@ class Provenance:
         """Return it as comments of an NC program, text by title.
 
         Args:
-            said: comments already there; inputs hashed in them are left out.
+            said: comments already there; inputs hashed in them are omitted.
         """
         words = textwrap.wrap(self.command, _COMMENT, break_long_words=False, break_on_hyphens=False)
         comments = {VIRTUAL: f"computed from {', '.join(self.virtual)}"} if self.virtual else {}

@@ -63,11 +63,7 @@ def is_comment(line: bytes) -> bool:
 
 
 def lines_of(blocks: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield lines without their ends; text without line ends comes in pieces.
-
-    Args:
-        blocks: cut anywhere.
-    """
+    """Yield lines without their ends; text without line ends comes in pieces."""
     left = b""
     for block in blocks:
         *whole, left = (left + block).split(b"\n")

@@ -206,11 +206,7 @@ def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[T
 def _change(
     since: int, found: int, at: NDArray[np.intp], values: NDArray[np.float64], u: NDArray[np.float64]
 ) -> TrendEvent:
-    """Return a change with all its values.
-
-    Args:
-        at: values of the level before, as far as they precede it.
-    """
+    """Return a change with all its values."""
     before, these = at[at < since], slice(since, found + 1)
     level, u_level = _mean(values[before], u[before])
     after, u_after = _mean(values[these], u[these])

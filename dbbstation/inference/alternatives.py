@@ -40,9 +40,7 @@ class Alternatives:
     """Classes of equivalent causes and ambiguities of a comparison.
 
     Args:
-        best: chosen set.
         form_uncertainty: relative inaccuracy of a member's formula.
-        of: members whose classes are wanted.
 
     Attributes:
         classes: equivalent causes by member, itself first.
@@ -96,17 +94,12 @@ class Alternatives:
         return (member.cause.name, *(c.name for c in rivals if self._is_alike(member, c, others)))
 
     def _is_alike(self, member: Member, rival: Cause, others: tuple[Member, ...]) -> bool:
-        """Return whether a replacement has the same effect, in any form of equal size."""
         own = member.variant.columns
         same = [v.columns for v in rival.variants if len(v.columns) == len(own)]
         cosine = max((self._cosine(own, columns, others) for columns in same), default=0.0)
         return cosine > EQUIVALENT and not self._is_decided(member, rival, others, cosine)
 
     def _is_decided(self, member: Member, rival: Cause, others: tuple[Member, ...], cosine: float) -> bool:
-        """Return whether measurements separate a member from its replacement.
-
-        Differences within formula inaccuracy decide nothing.
-        """
         in_place = self._comparison.scan(others, [rival])
         formulas = np.hypot(self._form_uncertainty(member), self._form_uncertainty(in_place.best[0]))
         if np.sqrt(1.0 - cosine**2) <= formulas:
@@ -164,11 +157,7 @@ ambiguous with a step over time in two of two sessions; with 6 four sessions are
 
 
 def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[Member]:
-    """Return the best replacements of a member that are not much worse.
-
-    Args:
-        causes: the hypothesis's own are skipped.
-    """
+    """Return the best replacements of a member that are not much worse."""
     scan = comparison.scan(best.without(name), [cause for cause in causes if cause.name not in best.names])
     enough = max(0.5 * best.log_factor(name), 0.0)
     return [scan.best[k] for k in np.argsort(-scan.log_factor)[:RIVALS] if scan.log_factor[k] > enough]
@@ -187,13 +176,7 @@ def standing_out(products: NDArray[np.float64], plausible: NDArray[np.float64]) 
 def norm_over_sigma(
     products: NDArray[np.float64], values: NDArray[np.float64], covariance: NDArray[np.float64]
 ) -> float:
-    """Return an effect's norm in standard deviations, to first order.
-
-    Args:
-        products: beside a base, by noise, shape (p, p).
-        values: shape (p,).
-        covariance: shape (p, p).
-    """
+    """Return an effect's norm in standard deviations, to first order."""
     norm = float(np.sqrt(np.maximum(values @ products @ values, 0.0)))
     if norm == 0.0:
         return 0.0
@@ -202,7 +185,6 @@ def norm_over_sigma(
 
 
 def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], NDArray[np.float64], dict[str, int]]:
-    """Return membership of relevant sets, shape (s, c), their probabilities, shape (s,), and places of causes."""
     top = max(posterior.weights.values())
     sets = [(key, weight) for key, weight in posterior.weights.items() if weight > top - NEGLIGIBLE]
     place = {name: k for k, name in enumerate(sorted(set().union(*(key for key, _ in sets))))}
@@ -214,7 +196,6 @@ def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], NDArray[np.flo
 
 
 def _inverse_root(products: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the inverse square root of products, without null directions."""
     value, axes = np.linalg.eigh(products)
     usable = value > RANK * max(float(value[-1]), 1e-300)
     return np.asarray((axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T, dtype=np.float64)

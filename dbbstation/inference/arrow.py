@@ -52,11 +52,8 @@ class Arrow:
     """Triangle of all blocks and priors.
 
     Attributes:
-        alone: untouched random effects, known by prior only, shape (a,).
-        random: others, shape (m,).
-        fitted: fitted columns, shape (f,).
+        alone: random effects that no block touches, known by their priors only, shape (a,).
         root: triangle over random, then fitted columns, shape (m + f, m + f).
-        target: shape (m + f,).
         floor: irreducible sum of squares.
     """
 
@@ -75,11 +72,7 @@ class Arrow:
 
 
 def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
-    """Eliminate groups and triangulate the rest.
-
-    Args:
-        noise: of a measurement, unless a block states its own.
-    """
+    """Eliminate groups and triangulate the rest."""
     members, border = _split(blocks, known)
     groups = tuple(_group([blocks[k] for k in places], columns, known, noise) for places, columns in members)
     triangle = triangle_of(np.vstack([border.priors(known), *(border.rows(group) for group in groups)]))
@@ -101,10 +94,6 @@ def triangles_without(
     """Yield the information on fitted columns without each part's blocks.
 
     Only the part's groups are renewed; others are pre-joined by the root of their number.
-
-    Args:
-        noise: of a measurement, unless a block states its own.
-        parts: places of omitted blocks.
 
     Yields:
         Triangle over the fitted columns, shape (f, f), its target, shape (f,), and the sum of squares that no values take away.
@@ -203,9 +192,6 @@ def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[li
 
     An effect of many blocks, such as a bar, would tie all. The limit of blocks per effect minimises rows times columns
     squared.
-
-    Args:
-        random: eliminable effects, shape (k,).
     """
     total, count = len(random), sum(len(block.target) for block in blocks)
     together = [(list(range(len(blocks))), np.zeros(0, dtype=np.int64))]
@@ -233,13 +219,7 @@ def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[li
 def _tied(
     blocks: Sequence[Block], which: NDArray[np.int64], touched: NDArray[np.int64], own: NDArray[np.bool_]
 ) -> list[tuple[list[int], NDArray[np.int64]]]:
-    """Return blocks tied by shared random effects.
-
-    Args:
-        which: block of each touch, shape (t,).
-        touched: column of each touch, shape (t,).
-        own: columns to eliminate, shape (k,).
-    """
+    """Return blocks tied by shared random effects."""
     number, total = len(blocks), len(own)
     touches = own[touched]
     edges = (np.ones(int(touches.sum())), (which[touches], number + touched[touches]))

@@ -74,12 +74,11 @@ class Bank:
     Attributes:
         whitening: over kept rows; None for uniform white noise.
         spread: relative noise of each kept row, shape (m,).
-        trust: root weight of each kept row's innovation, shape (m,); ones without long tails.
         tails: Student's t degrees of innovations; infinite if Gaussian.
         measures_beside_members: `measure` uses the hypothesis's residual, not everything's.
         long_tails: innovations may follow Student's t.
         grows_with: variable of the variance; may be empty.
-        nameless: causes that are the name of nothing.
+        nameless: causes that do not count as the name of an effect.
     """
 
     nameless: frozenset[str] = frozenset()
@@ -117,12 +116,7 @@ class Bank:
         return [cause for cause in self.causes if cause.name not in refused]
 
     def worthy(self, left: Left, found: Sequence[Pattern]) -> list[Pattern]:
-        """Return patterns worth their prior odds beside the fit.
-
-        Args:
-            left: whitened residual of kept rows.
-            found: from many.
-        """
+        """Return patterns worth their prior odds beside the fit."""
         found = [p for p in {p.name: p for p in found}.values() if p.name not in self.patterns]
         if not found:
             return []
@@ -137,7 +131,7 @@ class Bank:
 
     @property
     def looked_for(self) -> set[str]:
-        """Return names of patterns picked by a look."""
+        """Return names of patterns that a search picked."""
         return {name for name, pattern in self.patterns.items() if pattern.family in LOOKED_FOR}
 
     def kind_of(self, name: str) -> tuple[str, ...]:
@@ -316,7 +310,6 @@ class Bank:
         return level if alike(found.with_innovation(level.innovation), level) else found
 
     def _sizes(self, members: Sequence[Member]) -> NDArray[np.float64]:
-        """Return columns' prior standard deviations, zero outside members."""
         sd = np.zeros(self._columns.count)
         for member in members:
             sd[member.columns] = member.sd
@@ -355,7 +348,6 @@ class Bank:
         return _whitened(self.channel.kept, self.whitening, rows)
 
     def _whitener(self) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-        """Return the present whitening as a function."""
         return partial(_whitened, self.channel.kept, self.whitening)
 
     @property

@@ -1,7 +1,7 @@
-"""Effects that a signal bends or gathers: saturation, dead zone, friction within a speed, hysteresis scaled by a force, integral.
+"""Effects shaped by a signal: saturation, dead zone, friction within a speed, scaled hysteresis, integral.
 
-A smooth curve follows the first two about as well, and hysteresis the third. Laid out as laws they have few numbers, each of which is
-known by a name: a width, a speed, a rate.
+Smooth curves and plain hysteresis fit these effects about as well. As laws they have few numbers, each with a name: a
+width, a speed, a rate.
 """
 
 from __future__ import annotations
@@ -46,16 +46,7 @@ def bent_laws(
     size: float,
     unit: str,
 ) -> list[Law]:
-    """Saturation and dead zone of each variable; of those that run on in time friction, integral, and hysteresis scaled by another.
-
-    Args:
-        variables: that an effect may follow.
-        time: of the rows, rising within blocks, shape (n,); None where their order is unknown.
-        time_unit: of it.
-        blocks: rows of each, in time order.
-        size: of an effect, one standard deviation, in the unit of the residual.
-        unit: of the residual.
-    """
+    """Return saturation and dead zone of each variable; over time also friction, integral and scaled hysteresis."""
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0]
     found = []
     for family, column in ((Family.SATURATION, _saturation), (Family.DEAD_ZONE, _dead_zone)):
@@ -85,7 +76,7 @@ def _largest(variable: Variable) -> float:
 
 
 def _about(variable: Variable) -> NDArray[np.float64]:
-    """Values about zero where they are on both sides of it, else about the middle of their range."""
+    """Return values about zero if they have both signs, else about the middle of their range."""
     middle = 0.0 if variable.low < 0.0 < variable.high else 0.5 * (variable.low + variable.high)
     return variable.values - middle
 
@@ -124,7 +115,7 @@ def _with_width(
     unit: str,
     members: int,
 ) -> Law:
-    """Law of one amplitude and one width, tried at shares of the largest value."""
+    """Return a law with one amplitude and one width, tried at shares of the largest value."""
     slope = family is Family.DEAD_ZONE
     return Law(
         name=f"{family} of {variable.name}",
@@ -141,7 +132,7 @@ def _with_width(
 
 
 def integral_of(variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
-    """Integral of a variable about its mean over time, zero at the first row of each block, by trapezoids, shape (n,)."""
+    """Return a variable's integral about its mean by trapezoids, zero at each block's first row, shape (n,)."""
     found = np.zeros(len(time))
     for rows in blocks:
         own = variable.travel(rows) - float(np.mean(variable.values))
@@ -158,7 +149,7 @@ def _integral(
     unit: str,
     members: int,
 ) -> Law:
-    """What gathers in proportion to a variable, such as mass in a tank or heat in a body, and what each of several runs began with."""
+    """Return a law for what accumulates, such as mass or heat, with each run's initial value."""
     starts = starts_of(blocks) if len(blocks) > 1 else 0
     samples = np.zeros((len(time), 1 + starts))
     samples[:, 0] = integral_of(variable, time, blocks)
@@ -178,7 +169,7 @@ def _integral(
 
 
 def _scaled(one: Variable, by: Variable, blocks: Sequence[slice], size: float, unit: str, members: int) -> Law:
-    """Friction or play of one variable whose force is in proportion to another, such as a load; it turns at once or over a way."""
+    """Return friction or play whose force is proportional to another variable, at once or over a distance."""
     turned = [one.directions(blocks), *(play(one.values, blocks, share * one.extent) for share in TRANSITS[:-1])]
     labels = ("at once", *(f"over {share * one.extent:.3g} {one.unit}".strip() for share in TRANSITS[:-1]))
     samples = np.column_stack(turned) * by.values[:, None]

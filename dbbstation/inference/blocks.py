@@ -23,7 +23,6 @@ class Block:
         columns: touched, shape (k,).
         triangle: of J, shape (r, k), r at most k + 1.
         target: transformed, shape (r,).
-        count: measurements.
         square: of the target, a bound of what fits explain.
         noise: own, of another instrument; None: the channel's.
     """
@@ -37,7 +36,7 @@ class Block:
 
 
 def compress(columns: NDArray[np.int64], jacobian: NDArray[np.float64], target: NDArray[np.float64]) -> Block:
-    """Compress a run, shapes (k,), (n, k) and (n,), to its triangle."""
+    """Compress a run to its triangle."""
     stacked = np.column_stack([jacobian, target])
     triangle = triangle_of(stacked)[: jacobian.shape[1] + 1]
     return Block(columns, triangle[:, :-1], triangle[:, -1], len(target), float(target @ target))

@@ -1,4 +1,4 @@
-"""Verdicts on single causes, read off the levels of the classes that they are in."""
+"""Verdicts on single causes, from the levels of their classes."""
 
 from __future__ import annotations
 
@@ -29,16 +29,10 @@ MAKES_UP = "Held-out parts are predicted worse than as simulated, and something 
 
 
 class VerdictsByLevel:
-    """Verdicts on members of the best set, and on what rows cannot tell from them.
+    """Verdicts on members of the best set and on their equivalents.
 
-    A law that level 3 names is identified, what follows the time alone happened, and a class that gains nothing in held-out parts does not
-    predict. Everything else is ambiguous.
-
-    Args:
-        settled: what the comparison came to.
-        levels: read off that.
-        values: amplitudes of each member with their covariance, by name, shapes (p,) and (p, p).
-        worse: whether everything together leaves more than the reference; asked where no parts were held back.
+    A law that level 3 names is identified. An effect over time alone happened. A class without held-out gain does not
+    predict. All others are ambiguous.
     """
 
     def __init__(
@@ -52,7 +46,7 @@ class VerdictsByLevel:
         self._settled, self._levels, self._values, self._worse = settled, levels, values, worse
 
     def of_member(self, name: str, sigmas: float, acts: Acts) -> Said:
-        """What is said of a member whose effect is so many standard deviations out."""
+        """Return the verdict on a member, given its size in standard deviations."""
         classes = [one for one in self._levels.follows if name in one.members]
         answers = {one.answer for one in classes}
         if FollowsAnswer.UNDECIDED in answers:
@@ -76,18 +70,18 @@ class VerdictsByLevel:
         return _of_laws(classes, name, self._settled.channel.rows_are)
 
     def instead_of(self, name: str) -> frozenset[str]:
-        """Members in whose place a law is named that is none of them; none where it is not."""
+        """Return members that a named law replaces."""
         return frozenset[str]().union(*(one.members for one in self._levels.follows if _named(one, name)))
 
     def alike(self, name: str) -> str:
-        """What rows cannot tell a cause from that is no member; empty where there is nothing."""
+        """Return a member equivalent to a cause outside the set; empty if there is none."""
         for one in self._levels.follows:
             if one.form is not None and name in (*one.form.not_worse, *one.form.names):
                 return next(other for other in (*one.form.names, *sorted(one.members)) if other != name)
         return ""
 
     def equivalent(self, name: str) -> tuple[str, ...]:
-        """A named law, and laws that are the same to these rows; none where there are none."""
+        """Return a named law and its equivalents; empty if no law is named."""
         forms = [one.form for one in self._levels.follows if one.form is not None and one.form.name == name]
         same = dict.fromkeys(other for form in forms for other in form.not_worse)
         return (name, *same) if same else ()
@@ -105,7 +99,7 @@ class VerdictsByLevel:
 
     @cached_property
     def _pushes(self) -> dict[str, list[Value]]:
-        """Sizes of all stretches of time, by member."""
+        """Return sizes of all stretches of time, by member."""
         unit, patterns, found = self._settled.channel.unit, self._settled.bank.patterns, {}
         for name in (n for n in self._values if n in patterns and patterns[n].family in IN_TIME):
             values, covariance = self._values[name]
@@ -115,12 +109,12 @@ class VerdictsByLevel:
 
 
 def _named(one: Followed, name: str) -> bool:
-    """Whether a law is named for a class."""
+    """Return whether a law is named for a class."""
     return one.form is not None and name in one.form.names
 
 
 def _of_laws(classes: Sequence[Followed], name: str, rows: str) -> Said:
-    """What is said of a member of classes that are followed: each must name it."""
+    """Return the verdict on a member of followed classes: each must name it."""
     if all(_named(one, name) for one in classes):
         return Verdict.IDENTIFIED, (), ""
     open_to = [

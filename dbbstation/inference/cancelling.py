@@ -20,11 +20,7 @@ three quarters of the squares are gone. Of effects that have nothing to do with 
 
 @dataclass(frozen=True)
 class Cancelling:
-    """Effects that cancel each other.
-
-    Attributes:
-        rms: about its mean, by name, of those above the sum.
-    """
+    """Effects that cancel each other."""
 
     rms: Mapping[str, float]
     rms_of_sum: float
@@ -32,12 +28,7 @@ class Cancelling:
 
 
 def cancelling(effects: Mapping[str, NDArray[np.float64]], unit: str, scale: float = 1.0) -> Cancelling | None:
-    """Return effects above their sum if most squares cancel, else None.
-
-    Args:
-        effects: by name, shape (n,).
-        scale: per residual unit.
-    """
+    """Return effects above their sum if most squares cancel, else None."""
     rms = {name: float(np.std(effect)) for name, effect in effects.items()}
     whole = float(np.std(np.sum(list(effects.values()), axis=0))) if effects else 0.0
     if whole >= MOST_CANCELS * float(np.sqrt(np.sum(np.square(list(rms.values()))))):

@@ -1,12 +1,11 @@
-"""A channel: what was measured less what was simulated, with everything that may have gone into the difference.
+"""A channel: measured minus simulated values, and all possible contributions to this difference.
 
-It knows no machine. A client brings residual rows in blocks, variables, base columns that are fitted anew with every
-hypothesis, and laws: physical causes as columns. `settle` compares sets of laws and of patterns without physics.
+A client supplies residual rows in blocks, variables, base columns, and laws: physical causes as columns. The base is
+refitted with every hypothesis. `settle` compares sets of laws and of patterns without physics.
 
-    residual = base + sum of laws + sum of patterns + noise
+residual = base + sum of laws + sum of patterns + noise
 
-Rows may be held back (`kept`): columns exist for all rows, and only the kept ones are fitted, so that the others can be
-predicted.
+Columns cover all rows, but only `kept` rows are fitted, so that the others can be predicted.
 """
 
 from __future__ import annotations
@@ -47,7 +46,6 @@ class Base:
     """Columns refitted with every hypothesis.
 
     Attributes:
-        names: shape (k,).
         samples: effect of one unit, shape (n, k).
         prior: standard deviation about zero, infinite if unknown, shape (k,).
         random: set-up effects averaged over, with finite prior, shape (k,).
@@ -70,10 +68,8 @@ class Law:
     """A physical cause as columns.
 
     Attributes:
-        name: unique.
         columns: one unit of each amplitude at nonlinear parameters, all rows, shape (n, p).
         plausible: one standard deviation of amplitudes, shape (p,).
-        parameters: amplitudes, then nonlinear ones.
         grids: start values of nonlinear parameters, rising.
         positive: amplitudes that cannot be negative, shape (p,); may be empty.
         form_uncertainty: relative departure of real objects, one standard deviation.
@@ -85,12 +81,11 @@ class Law:
         reach: largest effect of each amplitude, one standard deviation, in the residual's unit; None: `plausible` holds
             everywhere.
         family: of patterns; None for a client's physics.
-        variables: followed, within a family.
         followed: names that are no variables, such as port signals.
         driven: those that result from the simulation.
         way: `direction` or `late` outside families; empty: by value.
         acts_once: no other rows can show it.
-        confirm: what shows it by itself; empty where nothing is known of that.
+        confirm: a measurement that shows it by itself; empty if unknown.
     """
 
     name: str
@@ -129,13 +124,11 @@ class Channel:
     Attributes:
         residual: measured less simulated, by block in time order, shape (n,).
         blocks: rows of each, covering all in order.
-        base: what is fitted anew with every hypothesis.
-        laws: physical causes.
         time: rising within blocks, shape (n,); None for unordered rows.
         simulated: to test lateness; None: not tested.
         kept: fitted rows, shape (n,); default all.
         apart: rows between kept ones without held-back rows.
-        static: patterns without look; None: all kinds over all variables.
+        static: patterns that need no search; None: all kinds over all variables.
         least_noise: always present in a row, in the residual's unit.
         step: of measured values, in the residual's unit; zero if unknown.
         surely: probability of the noise bound [interval of a variance by chi-square; JCGM 101:2008, sec. 6.4.9.4]; None: the
@@ -145,11 +138,11 @@ class Channel:
         known_noise: additional standard deviation per row, in the residual's unit, shape (n,); or None.
         levels: kind of each row from 0, with own noise each, shape (n,); None: one kind.
         clock: for omitted rows or gradual steps; None: immediate.
-        direction: of travel, shape (n,); None: no direction-dependent looks in time.
-        interchangeable: share of the squares of a fitted effect that one cause over another variable must make for both to be named: what
-            it leaves is less than a third of the effect. With 0.8 and 0.95 none of ten tables named a further variable, as with this.
-            Circles and sessions, where a tenth is thousands in log evidence, take that of equivalent causes.
-        rows_are: what answers call the rows: `rows`, or `tests`.
+        direction: of travel, shape (n,); None: no search for direction-dependent effects in time.
+        interchangeable: least share of a fitted effect's squares by which a cause over another variable makes both
+            named. The remainder is then less than a third of the effect; 0.8 and 0.95 gave the same on ten tables.
+            Circles and sessions use the share of equivalent causes, since a tenth is thousands in log evidence there.
+        rows_are: name of the rows in answers: `rows` or `tests`.
     """
 
     residual: NDArray[np.float64]
@@ -197,7 +190,7 @@ class Channel:
 
     @property
     def target(self) -> NDArray[np.float64]:
-        """Residual of the kept rows."""
+        """Return the residual of the kept rows."""
         return self.residual[self.kept]
 
     @cached_property
@@ -213,7 +206,7 @@ class Channel:
 
     @cached_property
     def known(self) -> Columns:
-        """Priors and scales of the base."""
+        """Return priors and scales of the base."""
         rms = np.sqrt(np.mean(self.base.samples[self.kept] ** 2, axis=0))
         scale = LARGEST * max(self._about, 1e-300) / np.maximum(rms, 1e-300)
         scale = np.where(np.isfinite(self.base.prior), np.minimum(self.base.prior, scale), scale)
@@ -250,7 +243,6 @@ class Channel:
 
     @property
     def _about(self) -> float:
-        """Return the residual's spread, a first idea of noise."""
         return max(
             float(np.std(self.target)), self.least_noise, 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300
         )

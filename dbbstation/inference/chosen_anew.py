@@ -1,9 +1,8 @@
 """Each effect's gain in parts that took no part in its choice, by predictive density.
 
-Without each part the set is chosen anew from all listed causes; places and nonlinear parameters are those of all rows
-within half a grid step. The part is then predicted with the set and without each effect, refitted. The score is the log
-density [Good, Rational decisions, J. R. Stat. Soc. B 14 (1952) 107], which includes noise, the part's own random effects
-and open directions of the base: what a part adds to a set's log evidence.
+Without each part the set is chosen anew from all causes; nonlinear parameters stay within half a grid step. The part is
+then predicted with the set and without each effect, refitted. The score is the log density [Good, Rational decisions,
+J. R. Stat. Soc. B 14 (1952) 107]: the part's contribution to the log evidence.
 """
 
 from __future__ import annotations
@@ -32,12 +31,12 @@ LEAST_PARTS = 4
 
 @dataclass(frozen=True, eq=False)
 class ChosenAnew:
-    """What was found when parts were held back in turn.
+    """Gains in parts held back in turn.
 
     Attributes:
-        brought: by kind, log density per part with less without it; absent if not chosen.
+        brought: by kind, log density per part, with minus without; absent if not chosen.
         whole: per part, of everything over the base.
-        of_classes: by class of variables, log density per part with less without what follows it.
+        of_classes: by class of variables, log density per part, with minus without.
     """
 
     brought: tuple[dict[Kind, float], ...]
@@ -59,9 +58,7 @@ class GainsOfTests:
     """Held-out gains of classes in groups of tests.
 
     Attributes:
-        rows: of each group, shape (n,).
         errors: rms error of predicting groups without each class, by its variables; of the base alone under none.
-        error: with everything.
     """
 
     rows: Sequence[NDArray[np.bool_]]
@@ -76,7 +73,7 @@ class GainsOfTests:
         return ClassGain(DensityGains(gains, tuple(int(one.sum()) for one in self.rows)), self.errors[key], self.error)
 
     def but_for(self, _ignored: Collection[str]) -> GainsOfTests:
-        """Return the same: what happens in a run is a random effect of that run."""
+        """Return the same, because effects within a run are random effects of that run."""
         return self
 
     def errors_with(self, _wanted: Collection[str]) -> list[float]:
@@ -98,7 +95,7 @@ def chosen_anew(
         of_all: causes over all rows.
         choose: most probable members, starting from all rows' choice.
         kind_of: from a cause to its kind.
-        classes: what follows each is left out together.
+        classes: effects of a class are left out together.
     """
     brought, whole, of_classes, follows = [], [], [], classes[1]
     for others in of_others:
@@ -123,5 +120,4 @@ def chosen_anew(
 
 
 def _predicted(of_all: ModelComparison, of_others: ModelComparison, members: Sequence[Member]) -> float:
-    """Return a held-back part's log density over the base's."""
     return of_all.log_evidence(members) - of_others.log_evidence(members)

@@ -75,7 +75,6 @@ class Coloured:
     """Noise of a channel.
 
     Attributes:
-        sigma: of a row, in the residual's unit.
         partial: partial autocorrelations from lag 1; none if white.
         told_by: fewer numbers that determine them.
     """
@@ -89,7 +88,6 @@ class Coloured:
         """Return white plus first-order noise, or oscillating noise.
 
         Args:
-            sigma: of a row.
             share: of the process in the variance, 0 to 1.
             decay: correlation of neighbours, or of the envelope.
             turn_rad: oscillation phase per row.
@@ -100,7 +98,7 @@ class Coloured:
 
     @property
     def is_white(self) -> bool:
-        """Whether neighbours do not resemble each other."""
+        """Return whether neighbours are uncorrelated."""
         return not self.partial
 
     @property
@@ -134,7 +132,6 @@ class Coloured:
 
     @cached_property
     def _predictors(self) -> tuple[list[NDArray[np.float64]], list[float]]:
-        """Return prediction coefficients of orders 0, 1, ..., and remaining variance shares."""
         coefficients, left = [np.zeros(0)], [1.0]
         for partial in self.partial:
             before = coefficients[-1]
@@ -159,9 +156,6 @@ class Coloured:
 
         n / (1 + 2 sum of rho(k)²) = n mean(S)² / mean(S²), S averaged over 1 / n [Bartlett, J. R. Stat. Soc. 98 (1935)
         536; Priestley 1981, sec. 5.3.2].
-
-        Args:
-            stretches: gapless rows.
         """
         power = np.exp(
             self.log_power((np.arange(FREQUENCIES, dtype=np.float64) + 0.5) / (2.0 * FREQUENCIES))
@@ -175,11 +169,7 @@ class Coloured:
         return total
 
     def whitening(self, stretches: Sequence[slice]) -> csr_array | None:
-        """Return the matrix to white noise of size `innovation`; None if white.
-
-        Args:
-            stretches: gapless, covering all rows in order.
-        """
+        """Return the matrix to white noise of size `innovation`; None if white."""
         if self.is_white:
             return None
         coefficients, left = self._predictors
@@ -203,11 +193,7 @@ class Coloured:
         return csr_array(flat, shape=(size, size))
 
     def unwhitened(self, white: NDArray[np.float64], stretches: Sequence[slice]) -> NDArray[np.float64]:
-        """Return the rows, shape (n,), that whitening maps to these.
-
-        Args:
-            white: shape (n,).
-        """
+        """Return the rows, shape (n,), that whitening maps to these."""
         if self.is_white:
             return white
         coefficients, left = self._predictors
@@ -224,18 +210,13 @@ class Coloured:
 
 
 def _state(taps: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the state of filter 1/taps behind outputs, last one last, shape (p,)."""
     order = len(taps) - 1
     recent = before[::-1]
     return np.array([-(taps[k + 1 :] @ recent[: order - k]) for k in range(order)])
 
 
 def partial_autocorrelations(correlation: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return partial autocorrelations [Levinson-Durbin recursion], without negligible last ones.
-
-    Args:
-        correlation: from lag 0, shape (p + 1,).
-    """
+    """Return partial autocorrelations [Levinson-Durbin recursion], without negligible last ones."""
     coefficients, left, found = np.zeros(0), 1.0, []
     for order in range(1, len(correlation)):
         partial = float((correlation[order] - coefficients @ correlation[1:order][::-1]) / left)
@@ -259,7 +240,6 @@ class Bands:
     Attributes:
         frequency: mean [cycles per row], shape (b,).
         log_power: bias-corrected mean log, shape (b,).
-        count: frequencies per band.
     """
 
     frequency: NDArray[np.float64]
@@ -300,10 +280,6 @@ def autoregressive(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Col
 
     [Burg's method; Percival and Walden, Spectral Analysis for Physical Applications, 1993, sec. 9.5], order by Akaike's
     criterion for few rows [Hurvich and Tsai, Biometrika 76 (1989) 297].
-
-    Args:
-        rows: shape (n,).
-        stretches: gapless.
     """
     ahead = [rows[stretch] for stretch in stretches if stretch.stop - stretch.start > 1]
     count = sum(len(own) for own in ahead)

@@ -44,8 +44,6 @@ def concealment(
 
     Args:
         fitted: columns, shape (f,).
-        columns: of the signature, shape (p,).
-        amplitudes: shape (p,).
         free: fitted directions as columns, shape (f, g); None: all. Held directions absorb nothing.
     """
     wanted = np.concatenate([fitted, columns])

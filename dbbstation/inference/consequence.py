@@ -1,4 +1,4 @@
-"""Whether a column may result from what is simulated: it follows that, and what it departs by is the difference itself."""
+"""Whether a column may result from the simulation, so that its departure is the difference itself."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ STILL = 1e-9
 
 
 def may_result(variable: Variable, channel: Channel) -> bool:
-    """Whether a column may be a consequence of what is simulated as well as a cause of the difference.
+    """Return whether a column may be a consequence of the simulation as well as a cause of the difference.
 
-    A torque that is measured beside a motion follows the motion as it was, not as it was simulated: it carries the difference. A cause of the
-    difference carries it, too, so that these rows alone cannot tell.
+    A measured torque follows the actual motion, and so contains the difference. A cause contains it too; these rows
+    alone cannot separate them.
     """
     if channel.simulated is None or channel.time is None:
         return False
@@ -57,7 +57,7 @@ def may_result(variable: Variable, channel: Channel) -> bool:
 def _with_derivatives(
     values: NDArray[np.float64], time: NDArray[np.float64], blocks: Sequence[slice]
 ) -> NDArray[np.float64]:
-    """A constant, values, and their first two derivatives by central differences, shape (n, 4)."""
+    """Return a constant, values, and their first two derivatives by central differences, shape (n, 4)."""
     found = np.column_stack([np.ones(len(values)), values, np.zeros((len(values), 2))])
     for rows in blocks:
         if rows.stop - rows.start > 2 and np.all(np.diff(time[rows]) > 0.0):  # noqa: PLR2004 - a second difference
@@ -67,6 +67,5 @@ def _with_derivatives(
 
 
 def _left(values: NDArray[np.float64], by: NDArray[np.float64]) -> float:
-    """Sum of squares that columns leave of values."""
     scaled = by / np.maximum(np.linalg.norm(by, axis=0), 1e-300)
     return float(np.sum(np.square(values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0])))

@@ -33,7 +33,7 @@ class Spline(Form):
 
     @property
     def count(self) -> int:
-        """Return one per function."""
+        """Return the number of functions."""
         return self.functions - self.falls
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -45,7 +45,7 @@ class Spline(Form):
         return np.asarray(flat.reshape(*share.shape, self.functions)[..., : self.count], dtype=np.float64)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Three for each function."""
+        """Return three per function."""
         return np.linspace(low, high, 3 * self.functions)
 
 
@@ -58,12 +58,12 @@ class Power(Form):
     power: int = 1
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The power of the scaled variable."""
+        """Return the scaled power."""
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
         return (((values - middle) / half) ** self.power)[..., None]
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Enough to see its bend."""
+        """Return enough points to show its bend."""
         return np.linspace(low, high, 3 if self.power == 1 else 13)
 
 

@@ -53,7 +53,7 @@ def detectable(settled: Settled) -> tuple[Detectable, ...]:
 
 
 def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
-    """Return the same of each law that says what shows it, but for those that move nothing here at their plausible size."""
+    """Return the same for laws with a confirming measurement that move something here at plausible size."""
     laws, found = settled.bank.laws, list[Detectable]()
     for cause in (c for c in settled.causes if c.name in laws and laws[c.name].confirm):
         variant = max(cause.variants, key=lambda one: len(one.columns))
@@ -105,8 +105,6 @@ def least_seen(
 
     Args:
         products: information beside base and others, shape (p, p).
-        samples: shape (m, p).
-        plausible: shape (p,).
     """
     rng = np.random.default_rng(SEED)
     directions = rng.standard_normal((DRAWS, len(plausible)))

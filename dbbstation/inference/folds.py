@@ -55,7 +55,7 @@ class Fold:
     Attributes:
         as_simulated: rms error of the reference, in the residual's unit.
         before: base refitted by ordinary least squares.
-        gains: by kind, squared error without less with it, in squared units; for a simulator, log density with less without.
+        gains: by kind, squared error without minus with; for a simulator, log density with minus without.
     """
 
     name: str
@@ -138,7 +138,6 @@ def held_out_error(
 
 
 def _gains(settled: Settled, rows: NDArray[np.bool_]) -> dict[Kind, float]:
-    """Return each member's gain in unused rows, others refitted, by kind."""
     residual, members = settled.channel.residual, settled.best.members
     with_all = float(np.sum(np.square((residual - settled.predicted())[rows])))
     columns = {member.cause.name: settled.bank.samples(member.columns) for member in members}

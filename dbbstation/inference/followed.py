@@ -46,11 +46,7 @@ VALUE = "value"
 
 @dataclass(frozen=True, eq=False)
 class WithoutPart:
-    """Everything chosen anew without one part.
-
-    Attributes:
-        rows: shape (n,).
-    """
+    """Everything chosen anew without one part."""
 
     rows: NDArray[np.bool_]
     settled: Settled
@@ -108,7 +104,7 @@ def follow_of(settled: Settled) -> Callable[[str], frozenset[str]]:
 
 
 def weighted(settled: Settled) -> list[tuple[Settled, float]]:
-    """Return noise beginnings' outcomes with probability."""
+    """Return outcomes of all initial noise models with their probabilities."""
     every = [settled, *settled.others]
     logs = np.array([one.log_probability for one in every])
     return list(zip(every, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
@@ -121,7 +117,7 @@ def probability_of_any(settled: Settled) -> float:
 
 
 class VariableProbabilities:
-    """Probabilities of followed variables over all sets and noise beginnings."""
+    """Probabilities of followed variables over all sets and initial noise models."""
 
     def __init__(self, settled: Settled) -> None:
         self._sets: dict[frozenset[str], float] = {}
@@ -158,7 +154,6 @@ class VariableClass:
 
     Attributes:
         others: indistinguishable variables.
-        members: of the best set.
     """
 
     each: tuple[tuple[str, ...], ...]
@@ -212,7 +207,7 @@ def interchangeable(
 
 
 def shares_of(settled: Settled, members: Collection[str], causes: Sequence[Cause]) -> dict[str, float]:
-    """Shares of the squares of what members do that each cause can make, beside base and the other members: its best form."""
+    """Return the share of the members' squares that each cause in its best form can make."""
     if not causes:
         return {}
     columns, values, _ = estimated(settled, members)
@@ -232,7 +227,7 @@ def shares_of(settled: Settled, members: Collection[str], causes: Sequence[Cause
 def estimated(
     settled: Settled, names: Collection[str]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Columns of some members, with their values, shape (p,), and the covariance of these."""
+    """Return columns of some members, their values, shape (p,), and covariance."""
     members = settled.best.members
     every = settled.comparison.estimates(members)
     inside = np.concatenate([np.full(len(m.columns), m.cause.name in names) for m in members])
@@ -241,7 +236,7 @@ def estimated(
 
 
 def share_made(products: NDArray[np.float64], values: NDArray[np.float64]) -> float:
-    """Share of the squares of an effect, of the first columns with these values, that the other columns make."""
+    """Return the share of an effect's squares that the other columns make."""
     p = len(values)
     whole = float(values @ products[:p, :p] @ values)
     axes_of = np.linalg.pinv(products[p:, p:], rcond=1e-9, hermitian=True)
@@ -254,8 +249,7 @@ class ClassGain:
     """A class's held-out gains.
 
     Attributes:
-        gains: log density with less without it.
-        before: rms error without it.
+        gains: log density with minus without it.
     """
 
     gains: DensityGains
@@ -264,7 +258,7 @@ class ClassGain:
 
     @property
     def predicts(self) -> bool:
-        """Return whether parts without the best prefer it, with half of the rows and less error."""
+        """Return whether parts other than the best prefer it, with half of the rows and less error."""
         return self.gains.predicts and self.gains.share_with_gain >= MOST_PARTS and self.after < self.before
 
 
@@ -283,10 +277,10 @@ class PartGains(Protocol):
         """Return the gain of everything over some variables; None: everything."""
 
     def but_for(self, ignored: Collection[str]) -> PartGains:
-        """Return the same without what follows some variables alone, such as the time."""
+        """Return the same without effects of some variables alone, such as time."""
 
     def errors_with(self, wanted: Collection[str]) -> list[float]:
-        """Return the rms error of each part with what follows some variables alone; none: with everything."""
+        """Return each part's rms error with effects of these variables alone; none given: with everything."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,8 +288,7 @@ class ChosenWithoutParts:
     """Parts of a table.
 
     Attributes:
-        parts: chosen anew without each.
-        ignored: what follows these alone takes no part in predictions.
+        ignored: effects of these variables alone take no part in predictions.
     """
 
     parts: Sequence[WithoutPart]
@@ -311,17 +304,17 @@ class ChosenWithoutParts:
         return gain_of(self.parts, wanted, self.ignored)
 
     def but_for(self, ignored: Collection[str]) -> ChosenWithoutParts:
-        """Return the same without what follows some variables alone, such as the time."""
+        """Return the same without effects of some variables alone, such as time."""
         return replace(self, ignored=frozenset(ignored))
 
     def errors_with(self, wanted: Collection[str]) -> list[float]:
-        """Return the rms error of each part with what follows some variables alone; none: with everything."""
+        """Return each part's rms error with effects of these variables alone; none given: with everything."""
         left = [left_with(part.settled, wanted)[part.rows] for part in self.parts]
         return [float(np.sqrt(np.mean(np.square(rows)))) for rows in left]
 
 
 def left_with(one: Settled, wanted: Collection[str]) -> NDArray[np.float64]:
-    """Return the residual beside what follows some variables alone, refitted with the base, shape (n,); none: beside everything."""
+    """Return the residual after effects of these variables alone, refitted; none given: after everything."""
     follow = follow_of(one)
     rest = [name for name in one.best.names if wanted and not follow(name) & set(wanted)]
     return _left_without(one, rest)
@@ -348,7 +341,6 @@ def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignore
 
 
 def _left_without(one: Settled, names: Collection[str]) -> NDArray[np.float64]:
-    """Return the residual without some members, others refitted, shape (n,)."""
     if not names:
         return np.asarray(one.channel.residual - one.predicted())
     effect = np.zeros(len(one.channel.residual))

@@ -95,7 +95,7 @@ class Walk(Form):
         return np.clip((values[..., None] - self.at[:-1]) / steps, 0.0, 1.0) * np.sqrt(steps / self.unit)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Its own."""
+        """Return its points."""
         del low, high
         return self.at
 
@@ -108,15 +108,15 @@ class Wave(Form):
 
     @property
     def count(self) -> int:
-        """Two."""
+        """Return two."""
         return 2
 
     def text(self, unit: str) -> str:
-        """Its period."""
+        """Return its period."""
         return f"period {1.0 / self.frequency:.6g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Cosine, sine."""
+        """Return cosine and sine."""
         phase = 2.0 * np.pi * self.frequency * values
         return np.stack([np.cos(phase), np.sin(phase)], axis=-1)
 
@@ -180,7 +180,7 @@ class Lobes(Form):
         return f"{self.numbers[0]} lobes" if len(self.numbers) == 1 else ""
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Cosine and sine of each."""
+        """Return cosine and sine of each."""
         theta = np.radians(values)
         return np.stack([f(k * theta) for k in self.numbers for f in (np.cos, np.sin)], axis=-1)
 
@@ -199,15 +199,15 @@ class Bump(Form):
     width: float
 
     def text(self, unit: str) -> str:
-        """Where, how wide."""
+        """Return its place and width."""
         return f"about {self.centre:.5g} {unit}, {self.width:.3g} {unit} wide either way"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """One at its centre."""
+        """Return a bell of height one."""
         return np.exp(-0.5 * ((values - self.centre) / self.width) ** 2)[..., None]
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Across the bump."""
+        """Return points across the bump."""
         return _across(self.centre, self.width, low, high)
 
 
@@ -219,15 +219,15 @@ class StepForm(Form):
     width: float
 
     def text(self, unit: str) -> str:
-        """Where."""
+        """Return its place."""
         return f"at {self.at:.5g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """From minus to plus a half."""
+        """Return the step from minus to plus a half."""
         return 0.5 * np.tanh((values - self.at) / self.width)[..., None]
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Across the step."""
+        """Return points across the step."""
         return _across(self.at, self.width, low, high)
 
 
@@ -241,11 +241,11 @@ class SignForm(Form):
     """Plus one way, minus the other."""
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sign of the variable."""
+        """Return the sign of the variable."""
         return np.sign(values)[..., None]
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Either way."""
+        """Return one point per direction."""
         del low, high
         return np.array([-1.0, 1.0])
 
@@ -302,7 +302,7 @@ class PlaneStep(Form):
     width: float
 
     def text(self, unit: str) -> str:
-        """Where."""
+        """Return its place."""
         return f"across a line {self.at:.4g} {unit} from the origin, at {self.across_deg:.0f} deg to +X"
 
     @property
@@ -319,7 +319,7 @@ class PlaneStep(Form):
         return StepForm(self.at, self.width).columns(self.along(values))
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Across the line."""
+        """Return points across the line."""
         return _across(self.at, self.width, low, high)
 
 
@@ -341,7 +341,7 @@ class Spring(Form):
         return 2
 
     def text(self, unit: str) -> str:
-        """Whereto."""
+        """Return its direction."""
         del unit
         return f"towards {self.towards_deg:.0f} deg to +X"
 
@@ -367,11 +367,11 @@ class Ringing(Form):
 
     @property
     def count(self) -> int:
-        """Two."""
+        """Return two."""
         return 2
 
     def text(self, unit: str) -> str:
-        """Period and decay."""
+        """Return period and decay."""
         return f"period {self.period:.3g} {unit}, fading over {self.decay:.3g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -390,29 +390,29 @@ class Ringing(Form):
 
 @dataclass(frozen=True, eq=False)
 class BehindReversal(Form):
-    """What stays behind when the direction turns: any curve of the way since then, which has the sign of the new direction.
+    """The lag behind a reversal: any curve of the distance since then, signed by the new direction.
 
-    Straight between its points, nothing at the turn itself and from `length` on.
+    It is piecewise linear, zero at the reversal and from `length` on.
     """
 
     length: float
 
     @property
     def count(self) -> int:
-        """One amplitude per point."""
+        """Return one per point."""
         return BEHIND_POINTS
 
     def text(self, unit: str) -> str:
-        """Over which way."""
+        """Return its distance."""
         return f"over {self.length:.3g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Against the new direction; zero before the first reversal."""
+        """Return curves against the new direction; zero before the first reversal."""
         place = np.abs(values) / self.length * (BEHIND_POINTS + 1)
         hats = np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(1, BEHIND_POINTS + 1)))
         return -np.sign(values)[..., None] * hats
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Its own, and both ends."""
+        """Return its own points and both ends."""
         del low, high
         return np.linspace(0.0, self.length, BEHIND_POINTS + 2)

@@ -1,8 +1,7 @@
 """Residuals of whole periods in harmonics: noise level and misfit.
 
-Missing physics lives in low harmonics, noise far beyond. The spectrum above, continued downwards, is the noise at low
-harmonics independent of misfit: floor plus first-order process, S(k) = a + b / (1 + (k / c)²) [Priestley, Spectral
-Analysis and Time Series, 1981, sec. 4.12].
+Missing physics appears in low harmonics. The noise there is extrapolated from high harmonics: floor plus first-order
+process, S(k) = a + b / (1 + (k / c)²) [Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12].
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ class Misfit:
     """The residual beyond noise.
 
     Attributes:
-        probability: by noise alone.
+        probability: that noise alone gives this.
         noise: white noise per sample of equal low-harmonic power.
         rms: beyond noise in low harmonics, at least zero.
         ratio: low-harmonic power over noise's.
@@ -72,7 +71,6 @@ def coefficients(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], 
     White noise s gives coefficients of size s.
 
     Args:
-        residual: shape (n,) or (n, m), about equally spaced.
         phase_rad: 0 to 2 pi, shape (n,).
         highest: below half of the samples.
     """
@@ -90,13 +88,12 @@ def basis(phase_rad: NDArray[np.float64], highest: int) -> NDArray[np.float64]:
 
 
 def _waves(phase_rad: NDArray[np.float64], highest: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Return factor waves whose products are harmonics a + AT_ONCE b, shapes (AT_ONCE, n) and (blocks, n), ten times faster than cosines."""
+    """Return factor waves whose products are harmonics a + AT_ONCE b, ten times faster than cosines."""
     first = np.exp(1j * phase_rad)
     return _powers(first, min(AT_ONCE, highest + 1)), _powers(np.exp(1j * AT_ONCE * phase_rad), highest // AT_ONCE + 1)
 
 
 def _powers(wave: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
-    """Return powers 0 to count - 1, shape (count, n)."""
     found = np.empty((count, len(wave)), dtype=np.complex128)
     found[0] = 1.0
     for k in range(1, count):
@@ -131,11 +128,6 @@ def amplitudes(values: NDArray[np.float64], phase_rad: NDArray[np.float64], high
 
     Normal equations need only sums and differences of harmonics. Incomplete periods are ill-conditioned and use the
     basis.
-
-    Args:
-        values: shape (n,).
-        phase_rad: shape (n,).
-        highest: below half of the samples.
     """
     return amplitudes_of([values], phase_rad, highest)[0]
 
@@ -241,10 +233,9 @@ def noise_left_by(
 ) -> Spectrum:
     """Return noise from a residual of many columns, in higher harmonics.
 
-    Absorption is measured with draws of white noise.
+    Draws of white noise measure the absorption.
 
     Args:
-        residuals: one period per run.
         of_white: residuals of white draws, per run, shape (n, draws).
     """
     low, high = bands(min(len(residual) for residual in residuals))
@@ -280,12 +271,10 @@ LEAST_LEFT = 0.02
 def _all_coefficients(
     residuals: Sequence[NDArray[np.float64]], phases_rad: Sequence[NDArray[np.float64]], high: int
 ) -> NDArray[np.float64]:
-    """Return all runs' coefficients, shape (runs, 2 high + 1) or (runs, 2 high + 1, m)."""
     return np.array([coefficients(r, phase, high) for r, phase in zip(residuals, phases_rad, strict=True)])
 
 
 def _squares(all_coefficients: NDArray[np.float64], high: int) -> tuple[float, NDArray[np.float64]]:
-    """Return sums of squares over runs: harmonic 0, and 1 to `high`, shape (high,)."""
     squares = (all_coefficients**2).sum(axis=0)
     return float(squares[0]), squares[1 : high + 1] + squares[high + 1 :]
 
@@ -294,9 +283,7 @@ def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Sp
     """Return the noise spectrum up to `low` from higher harmonics.
 
     Args:
-        squares: at low + 1, low + 2, ..., shape (h,).
         low: excluded.
-        freedom: of each.
     """
     found = continuations(squares, low, freedom, partial(first_order, corners=CORNERS))
     if found is None:
@@ -335,9 +322,7 @@ def continuations(
     """Continue noise below `low` with a floor and each process; None if white.
 
     Args:
-        squares: at low + 1, low + 2, ..., shape (h,).
         low: excluded.
-        freedom: of each.
         processes: power at harmonics, of free size, shape (processes, h).
     """
     harmonic = np.arange(low + 1.0, low + 1.0 + len(squares))
@@ -367,7 +352,6 @@ def first_order(harmonic: NDArray[np.float64], corners: NDArray[np.float64]) -> 
 
 
 def _on_a_floor(power: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return floor and each process, shape (processes, 2, h)."""
     return np.stack([np.ones_like(power), power], axis=1)
 
 
@@ -384,10 +368,6 @@ def _not_negative(rows: NDArray[np.float64], values: NDArray[np.float64]) -> NDA
     """Return non-negative least squares by two columns, shape (processes, 2).
 
     A negative solution lies on an edge: one column.
-
-    Args:
-        rows: two columns per problem, shape (processes, 2, h).
-        values: shape (processes, h).
     """
     normal = np.einsum("cih,cjh->cij", rows, rows)
     right = np.einsum("cih,ch->ci", rows, values)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """What predictions leave of measurements that were not fitted.
+    """Prediction errors of measurements that were not fitted.
 
     Attributes:
         rms: with own random effects settled under priors, in the channel's unit.
@@ -42,8 +42,6 @@ def held_out(
 
     Args:
         groups: of each block, such as its test's fold.
-        known: priors and scales of all columns.
-        active: used columns, shape (a,).
         noise: white noise of equal low-frequency power.
         held: directions kept at zero, in scales.
         single: of a single measurement if less; None: `noise`.
@@ -71,10 +69,6 @@ def _restricted(block: Block, active: NDArray[np.int64]) -> Block:
 
 
 def _weighted(blocks: Sequence[Block], fitted: Solution, noise: float) -> tuple[float, int]:
-    """Return weighted squares of prediction errors and their freedom.
-
-    noise + W C W^T, C = F F^T, is inverted at C's size [Woodbury].
-    """
     # The last row of a triangle holds the length of what no column reaches, which is not one measurement's noise.
     cut = [Block(b.columns, b.triangle[:-1], b.target[:-1], b.count, b.square) for b in blocks]
     whole, target = np.hsplit(spread(cut, len(fitted.x)), [-1])

@@ -59,11 +59,7 @@ that the list explains. Of more members those pairs are taken that are worth lea
 
 @dataclass(eq=False)
 class SearchWork:
-    """What a search may still do: sets that are looked at, each counted by its causes times their columns.
-
-    Attributes:
-        left: so many of these products.
-    """
+    """Work that a search may still do: the sum of causes times columns over examined sets."""
 
     left: float = np.inf
 
@@ -73,7 +69,7 @@ class SearchWork:
 
     @property
     def is_spent(self) -> bool:
-        """Whether no set is looked at any more."""
+        """Return whether the work is used up."""
         return self.left <= 0.0
 
 
@@ -93,7 +89,7 @@ class Hypothesis:
 
     @property
     def names(self) -> frozenset[str]:
-        """Of its causes."""
+        """Return names of its causes."""
         return frozenset(member.cause.name for member in self.members)
 
     @property
@@ -102,11 +98,11 @@ class Hypothesis:
         return all(f + m.cause.log_prior_odds > 0.0 for m, f in zip(self.members, self.log_factors, strict=True))
 
     def without(self, *names: str) -> tuple[Member, ...]:
-        """Members but for those named."""
+        """Return the members without those named."""
         return tuple(member for member in self.members if member.cause.name not in names)
 
     def log_factor(self, name: str) -> float:
-        """Log Bayes factor of one of its causes beside the others."""
+        """Return a cause's log Bayes factor beside the others."""
         return next(f for m, f in zip(self.members, self.log_factors, strict=True) if m.cause.name == name)
 
 
@@ -126,7 +122,7 @@ class Posterior:
 
     @property
     def best(self) -> Hypothesis:
-        """The most probable."""
+        """Return the most probable set."""
         return self.hypotheses[0]
 
     def probability(self, names: Iterable[str]) -> float:
@@ -156,7 +152,7 @@ def search(
     thorough: bool = True,
     work: SearchWork | None = None,
 ) -> Posterior:
-    """Posterior over sets of causes.
+    """Return the posterior over sets of causes.
 
     Args:
         seeds: further sets to examine, such as earlier ones.
@@ -201,7 +197,6 @@ class _Search:
         return Posterior(found, weights, at_limit=self._beyond > self._top)
 
     def _grow(self, seeds: Iterable[Sequence[Member]]) -> None:
-        """Expand the most probable unexpanded sets."""
         self._look_at(())
         for members in seeds:
             self._look_at([self._anew(member) for member in members if member.cause.name in self._causes])
@@ -250,7 +245,7 @@ class _Search:
                 self._pairs(hypothesis.without(member.cause.name), around.without([member.cause.name])[0])
 
     def _least_worth(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
-        """Pairs of its members that are worth least together, at most so many as may be replaced."""
+        """Return the least valuable pairs of members, at most as many as may be replaced."""
         worth = dict(zip((m.cause.name for m in hypothesis.members), hypothesis.log_factors, strict=True))
         pairs = combinations(sorted(worth), 2)
         return sorted(pairs, key=lambda pair: worth[pair[0]] + worth[pair[1]])[:MOST_REPLACED]
@@ -337,7 +332,6 @@ class _Search:
             self._look_at(found.without(found.members[int(np.argmin(worth))].cause.name))
 
     def _settled(self, members: list[Member]) -> Hypothesis:
-        """Return settled members with their worth."""
         many = len(members) > MANY
         beside = _Beside(self._comparison, members)
         for _ in range(SWEEPS if len(members) > 1 else 1):
@@ -418,10 +412,7 @@ class _Search:
 
 
 class _Beside:
-    """Members of one set asked beside each other, the largest eliminated once.
-
-    Args:
-        members: forms and sizes may change.
+    """Members of one set evaluated beside each other, the largest eliminated once.
 
     Attributes:
         local: of their causes alone.
@@ -454,5 +445,4 @@ class _Beside:
 
 
 def _single(member: Member) -> bool:
-    """Return whether a cause has one exact form."""
     return len(member.cause.variants) == 1 and not len(member.variant.slack)

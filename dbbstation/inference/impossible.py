@@ -16,12 +16,7 @@ NEGATIVE_SIGMA = 3.0
 
 
 def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.float64]) -> str:
-    """Return why amplitudes are impossible, or an empty text.
-
-    Args:
-        values: shape (p,).
-        variances: shape (p,).
-    """
+    """Return why amplitudes are impossible, or an empty text."""
     for k, positive in enumerate(law.positive):
         value = float(values[k])
         sigma = float(np.hypot(np.sqrt(variances[k]), law.form_uncertainty * value))
@@ -36,18 +31,14 @@ others."""
 
 
 def beyond_reach(law: Law, rms: float) -> str:
-    """Return why an effect of a family is too large to be; empty if possible.
-
-    Args:
-        rms: of the effect about its mean, in the residual's unit.
-    """
+    """Return why an effect of a family is too large to be; empty if possible."""
     if law.family is None or law.reach is None or rms <= BEYOND * law.reach:
         return ""
     return f"It would have to be {rms / law.reach:.2g} times the difference itself, and cancel with others."
 
 
 def impossibly_negative(name: str, value: float, sigma: float, unit: str) -> str:
-    """Return why a non-negative quantity's value is impossible, or an empty text."""
+    """Return why a negative value is impossible, or an empty text."""
     if value >= -NEGATIVE_SIGMA * sigma:
         return ""
     return (

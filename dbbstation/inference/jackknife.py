@@ -24,11 +24,7 @@ if TYPE_CHECKING:
 
 
 def jackknife_covariance(blocks: Sequence[Block], size: int) -> NDArray[np.float64]:
-    """Return the values' covariance, shape (k, k).
-
-    Args:
-        blocks: at least two; values known to one alone get a large variance.
-    """
+    """Return the values' covariance, shape (k, k)."""
     norm = np.maximum(np.linalg.norm(spread(blocks, size)[:, :-1], axis=0), 1e-300)
     values = []
     for out in range(len(blocks)):
@@ -47,15 +43,12 @@ def weighted_jackknife(
 ) -> NDArray[np.float64]:
     """Return standard uncertainties by omitted parts, shape (p,), weighted by remaining information.
 
-    The expected square is the stated variance if right [weighted jackknife, Wu, Annals of Statistics 14 (1986) 1261, eq.
-    5.1, by value]. `values` and `variances` have shape (p,); `without` and `variances_without` shape (k, p), not finite
-    if a value is lost.
+    The expected square is the stated variance if right [weighted jackknife, Wu, Annals of Statistics 14 (1986) 1261,
+    eq. 5.1, by value].
 
     Args:
-        values: from all parts, shape (p,).
-        variances: stated of them, shape (p,).
         without: values without each part, shape (k, p).
-        variances_without: stated of these, shape (k, p); not finite where nothing is left that knows the value.
+        variances_without: their stated variances, shape (k, p); infinite if a part alone determines the value.
     """
     with np.errstate(all="ignore"):
         squares = variances / variances_without * np.square(without - values)
@@ -79,11 +72,7 @@ def widening(
 
 
 def refits_without(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> tuple[Solution, ...]:
-    """Return refits of base and best members without each part, nothing chosen anew.
-
-    Args:
-        parts: rows, shape (n,).
-    """
+    """Return refits of base and best members without each part, nothing chosen anew."""
     bank, channel, members = settled.bank, settled.channel, settled.best.members
     columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
     known = with_random(channel.known, np.concatenate([np.zeros(0), *(member.sd for member in members)]))

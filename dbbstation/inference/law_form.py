@@ -34,21 +34,19 @@ def law_form(
     parts: Sequence[NDArray[np.bool_]] | None,
     found_anew: Collection[str] | None = None,
 ) -> LawForm:
-    """Score single causes over the variables of a class, and the best set's own sum, in the place of what follows it.
+    """Score single causes, and the best set's own sum, over the variables of a class.
 
-    The score of a part is the log evidence of all rows less that of the rows without the part, in the noise of all rows. A law is named
-    where it beats each other candidate, and nothing, by the odds at which something is sure, without its best part. Where a sum of several
-    is best, each of these is asked in its own place, beside the others.
+    A part's score is the log evidence of all rows minus the evidence without the part, in equal noise. A law is named
+    if it surely beats every other candidate and no law at all, even without its best part. If a sum is best, each of
+    its laws is tested in place.
 
-    A candidate that contains the law, as a curve contains a straight line, predicts parts about as well as
-    the simpler one. The evidence of all rows, which counts what more amplitudes cost, may refute it, and any other with more amplitudes.
-    Otherwise the first is listed beside the name, and the other leaves the law open.
+    A law and a more flexible candidate that contains it predict about equally well. The evidence of all rows, which
+    counts amplitudes, may refute the flexible one; otherwise it leaves the law open.
 
     Args:
-        settled: what the comparison came to.
-        one: the class.
-        parts: rows of each part, shape (n,); None: nothing was held back, and the evidence of all rows decides.
-        found_anew: causes at picked places that parts gain by though each part took no part in picking; others are not named. None: not tested.
+        parts: rows of each part, shape (n,); None: the evidence of all rows decides.
+        found_anew: causes at picked places that were found again without each part; others are not named. None: not
+            tested.
     """
     barred = settled.bank.nameless
     if found_anew is not None:
@@ -67,7 +65,7 @@ def _place(
     parts: Sequence[NDArray[np.bool_]] | None,
     barred: Collection[str],
 ) -> LawForm:
-    """Law in the place of some members, the others kept."""
+    """Place a law in some members' place, the others kept."""
     others = _sure(settled, names)
     candidates, worth = _candidates(settled, names, wanted, others)
     scores = (
@@ -103,7 +101,7 @@ def _place(
 
 
 def _sure(settled: Settled, names: Collection[str]) -> tuple[Member, ...]:
-    """Members but for some that are sure: another is as good as absent, and must not stand for what is asked about."""
+    """Return members without uncertain ones, which must not replace the cause under test."""
     best = settled.best
     return tuple(m for m in best.without(*names) if best.log_factor(m.cause.name) + m.cause.log_prior_odds >= SURELY)
 
@@ -111,7 +109,7 @@ def _sure(settled: Settled, names: Collection[str]) -> tuple[Member, ...]:
 def _candidates(
     settled: Settled, names: Collection[str], wanted: Collection[str], others: Sequence[Member]
 ) -> tuple[dict[str, tuple[Member, ...]], dict[str, float]]:
-    """What may stand in the place of some members, by name, and what each is worth: log evidence of all rows with its prior odds."""
+    """Return candidates for the place of some members, with their log evidence and prior odds."""
     comparison, taken = settled.comparison, {m.cause.name for m in others}
     rivals = [c for c in settled.causes if followed_by(settled.bank, c.name) & set(wanted) and c.name not in taken]
     scan = comparison.scan(others, rivals)
@@ -135,7 +133,7 @@ def _candidates(
 
 
 def _is_worse(best: NDArray[np.float64], other: NDArray[np.float64], parts: Sequence[NDArray[np.bool_]] | None) -> bool:
-    """Whether parts but the one that speaks most for the best, or all rows where none were held back, prefer it for sure."""
+    """Return whether parts other than the best one's strongest, or all rows if none were held back, surely prefer it."""
     apart = best - other
     return float(apart.sum() - (max(apart.max(), 0.0) if parts else 0.0)) >= SURELY
 
@@ -163,7 +161,7 @@ def _scores(
 
 
 def _contains(settled: Settled, one: Sequence[Member], other: Sequence[Member], others: Sequence[Member]) -> bool:
-    """Whether some members, a single law also at the ends of its grids, make what other members do in the same place."""
+    """Return whether some members can make the effect of others in the same place."""
     bank = settled.bank
     own = np.concatenate([m.columns for m in other])
     effect = bank.fitted(own) @ settled.comparison.estimates([*other, *others]).values[: len(own)]
@@ -184,11 +182,9 @@ def _are_the_same(settled: Settled, one: Sequence[Member], other: Sequence[Membe
 
 
 def _count(members: Sequence[Member]) -> int:
-    """Amplitudes."""
     return sum(len(member.variant.columns) for member in members)
 
 
 def _left(effect: NDArray[np.float64], by: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What columns, shape (m, p), leave of an effect, shape (m,)."""
     scaled = by / np.maximum(np.linalg.norm(by, axis=0), 1e-300)
     return np.asarray(effect - scaled @ np.linalg.lstsq(scaled, effect, rcond=None)[0])

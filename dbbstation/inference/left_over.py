@@ -32,13 +32,12 @@ FEWEST = 20
 
 @dataclass(frozen=True)
 class ResidualTest:
-    """One way of asking whether something is left.
+    """One test for a remaining effect.
 
     Attributes:
         name: `sum of squares`, `wave in time`, `runs of sign`, `blocks`, or a variable.
         probability: by noise.
         rms: beyond noise, in the residual's unit.
-        where: may be empty.
     """
 
     name: str
@@ -66,11 +65,7 @@ class LeftOver:
 
 
 def left_over(settled: Settled, freedom: float | None = None) -> LeftOver:
-    """Test the best hypothesis's whitened residual.
-
-    Args:
-        freedom: None: by the number of amplitudes.
-    """
+    """Test the best hypothesis's whitened residual."""
     channel, bank = settled.channel, settled.bank
     rows = channel.residual - settled.predicted()
     left = bank.whitened(rows) / settled.noise.innovation

@@ -75,9 +75,9 @@ class DifferenceFound:
     """Level 1.
 
     Attributes:
-        why: if not a plain yes.
+        why: reason if not a plain yes.
         matters: size of interest, in the residual's unit.
-        matters_stated: else the refitted residual.
+        matters_stated: False: `matters` is the refitted residual.
         gain: held-out log density of everything over the base; None if not tested.
     """
 
@@ -122,7 +122,7 @@ class LawForm:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all laws that are named."""
+        """Return all named laws."""
         return self.together if self.name is None else (self.name,)
 
 
@@ -137,13 +137,13 @@ class Followed:
         rms: fitted sum, in the residual's unit.
         members: of the most probable set.
         before: held-out error without them; None if not tested.
-        gain: held-out log density with less without; None if not tested.
+        gain: held-out log density, with minus without; None if not tested.
         consequence: the variable results from the simulation, as stated, and is no cause.
         may_result: the variable carries the difference itself: cause or consequence.
         form: None if not followed, or time.
         slope: of the straight line through the members' sum over the first variable; None for times and angles.
-        straight: share of the squares that this line makes.
-        where: strut, or all struts; absent where it is none, or not sure.
+        straight: share of the squares that the line makes.
+        where: strut, or all struts; None if uncertain.
     """
 
     variables: tuple[tuple[str, ...], ...]
@@ -167,7 +167,7 @@ class Followed:
 
     @property
     def in_time(self) -> bool:
-        """Whether it is the time, or the run, alone: other rows cannot show it again."""
+        """Return whether it follows time or run alone, which other rows cannot repeat."""
         return set[str]().union(*self.variables) <= ONCE
 
     @property
@@ -182,8 +182,7 @@ class Levels:
 
     Attributes:
         follows: with level 3, most probable first; consequences last.
-        correction: whether the fitted sum predicts better than as simulated; False if untested and worse on all rows; None if nothing was
-            found, or nothing was tested.
+        correction: whether the fitted sum predicts better than the simulation; None if nothing was found or tested.
     """
 
     differs: DifferenceFound
@@ -192,7 +191,7 @@ class Levels:
 
     @property
     def corrects(self) -> frozenset[str]:
-        """Variables of the classes that a correction is made of; none: it is made of everything."""
+        """Return variables that a correction uses; empty: all."""
         every = [one for one in self.follows if one.answer in CORRECTS]
         own = frozenset(name for one in every for names in one.variables for name in names)
         return own | {name for one in every for name in one.or_variables if name != TIME}
@@ -232,8 +231,6 @@ def difference_of(
     """Return level 1 from the others.
 
     Args:
-        classes: level 2.
-        gains: None: not tested.
         rest: size of interest, whether stated, independent samples, detectable sizes.
     """
     matters, stated, samples, detectable = rest

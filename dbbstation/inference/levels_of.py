@@ -55,11 +55,8 @@ def levels_of(
     """Return the three levels.
 
     Args:
-        left: residual tests.
-        parts: None if not tested.
-        matters: size of interest, in the residual's unit; None: the refitted residual.
         worse: without held-out parts: the fitted sum leaves more of all rows than the reference.
-        sizes: smallest detectable ones where noise is of a known kind; None: over variables, and the order of the rows tells the noise.
+        sizes: smallest detectable ones for a known kind of noise; None: computed over variables.
     """
     probabilities = VariableProbabilities(settled)
     every = classes_of(settled, probabilities)
@@ -172,7 +169,7 @@ def _followed(
 
 
 def _found_anew(settled: Settled, one: VariableClass, held_out: HeldOutError | ChosenAnew) -> list[str]:
-    """Return members whose kind held-out parts gain by, found anew without each."""
+    """Return members whose kind gains in held-out parts when chosen without each."""
     return [name for name in one.members if held_out.gains_of({settled.bank.kind_of(name)}).predicts]
 
 
@@ -181,7 +178,7 @@ def _in_time(one: VariableClass) -> bool:
 
 
 def _straight(settled: Settled, one: VariableClass) -> tuple[Value | None, float]:
-    """Slope of the straight line through what the members of a class do, over its first variable, and its share of the squares."""
+    """Return slope and share of squares of the line through a class's effect over its first variable."""
     channel = settled.channel
     variable = next((v for v in channel.variables if v.name == one.each[0][0]), None)
     if variable is None or variable.kind is Kind.TIME or variable.period is not None:

@@ -1,4 +1,4 @@
-"""What ended at a limit, so that whoever reads an answer knows what it leaves open."""
+"""Limits at which a computation ended, to show what remains open."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class LimitReached:
-    """One thing that ended at a limit.
+    """A limit at which a computation ended.
 
     Attributes:
         what: `search`, `parameter`, `fit` or `stopped`.
-        name: source and parameter, such as `play shaking_n`; empty where it is none.
-        text: one or two sentences for people.
+        name: source and parameter, such as `play shaking_n`; may be empty.
+        text: one or two sentences.
     """
 
     what: str

@@ -1,7 +1,7 @@
 """Search a residual for waves, bumps, steps and pulses.
 
-The number of independent tries counts against a find [look-elsewhere effect: Gross and Vitells, Eur. Phys. J. C 70 (2010)
-525].
+The number of independent tries counts against a find [look-elsewhere effect: Gross and Vitells, Eur. Phys. J. C 70
+(2010) 525].
 """
 
 from __future__ import annotations
@@ -67,8 +67,6 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_
     """Return the best waves, bumps and steps over variables.
 
     Args:
-        left: of kept rows.
-        kept: shape (n,).
         size: one standard deviation, in noise.
     """
     found: list[Pattern] = []
@@ -110,7 +108,6 @@ def _waves(variable: Variable, sums: Sums, size: float, pieces: int, strongest: 
 
 
 def _nearest(sums: Sums, frequency: float, step: float, lowest: float, size: float) -> tuple[float, float]:
-    """Return the greatest explained squares near a frequency, and its place."""
     near = np.asarray(frequency + np.arange(-15, 16) * step, dtype=np.float64)
     near = near[near > lowest]
     by_near = sums.explained(_cosines(sums.at, float(near[0]), step, len(near)), size)
@@ -151,13 +148,7 @@ def _least(tried: float) -> float:
 
 
 def placed_better(pattern: Pattern, left: Left, kept: NDArray[np.bool_], size: float) -> Pattern:
-    """Return a pattern refined in frequency, place and width.
-
-    Args:
-        pattern: from `looked_for`.
-        left: residual without it.
-        kept: shape (n,).
-    """
+    """Return a pattern refined in frequency, place and width."""
     (variable,), form = pattern.variables, pattern.form
     if form is None:
         return pattern
@@ -170,7 +161,6 @@ def placed_better(pattern: Pattern, left: Left, kept: NDArray[np.bool_], size: f
 
 
 def _explained_by(left: Left, columns: NDArray[np.float64], size: float) -> float:
-    """Return squares explained by whitened columns, shape (m, p), less their cost."""
     beside = columns - left.axes @ (left.axes.T @ columns)
     along = columns.T @ left.rest
     return float(along @ np.linalg.solve(columns.T @ beside + np.eye(columns.shape[1]) / size**2, along))

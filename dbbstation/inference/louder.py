@@ -44,7 +44,6 @@ def louder(residuals: Sequence[NDArray[np.float64]], begins: Sequence[NDArray[np
     Freedom of correlated mean squares is 2 mean² / variance [Satterthwaite, Biometrics Bulletin 2 (1946) 110].
 
     Args:
-        residuals: per run, in time order, shape (n,).
         begins: rows per run, unordered.
     """
     inside, outside = [], []

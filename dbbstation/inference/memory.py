@@ -1,6 +1,6 @@
 """Effects with memory: first-order lag or dead time.
 
-Their shadows are curves over time, hysteresis and speed; they compete by prediction.
+Curves over time, hysteresis and speed imitate them; prediction decides.
 """
 
 from __future__ import annotations
@@ -52,13 +52,7 @@ def memory_laws(
     size: float,
     unit: str,
 ) -> list[Law]:
-    """Return lag and dead time of each path variable.
-
-    Args:
-        time: rising within blocks, shape (n,).
-        blocks: in time order.
-        size: one standard deviation, in the residual's unit.
-    """
+    """Return lag and dead time of each path variable."""
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0 and v.is_path(blocks)]
     moving = [rows for rows in blocks if rows.stop - rows.start > 1]
     steps = [np.diff(time[rows]) for rows in moving]
@@ -125,7 +119,7 @@ def _lag(
 
 
 def starts_of(blocks: Sequence[slice]) -> int:
-    """Starts that a law has: one of each run, or one of all where there are many."""
+    """Return initial states of a law: one per run, or one for all if there are many runs."""
     return len(blocks) if len(blocks) <= MOST_STARTS else 1
 
 
@@ -152,8 +146,6 @@ def lagging(values: NDArray[np.float64], time: NDArray[np.float64], constant: fl
     Systems, 3rd ed., sec. 6.3.2].
 
     Args:
-        values: shape (n,).
-        time: rising, shape (n,).
         constant: in `time`'s unit.
     """
     steps = np.diff(time)

@@ -53,9 +53,6 @@ class Variant:
     """One form of a cause.
 
     Attributes:
-        columns: of amplitudes, shape (p,).
-        plausible: sizes, shape (p,).
-        nonlinear: parameters of the columns.
         label: kind or strut; may be empty.
         law: if a cause has several.
         whole: columns of the form with all amplitudes, shape (q,); may be empty.
@@ -130,7 +127,6 @@ class Scan:
         factors: by form and size, shape (m, s).
         first: first form of each cause, shape (c,).
         last: one behind its last, shape (c,).
-        slim: forms with fewer than `FLEXIBLE` amplitudes.
     """
 
     causes: tuple[Cause, ...]
@@ -148,7 +144,7 @@ class Scan:
 
     @cached_property
     def best(self) -> tuple[Member, ...]:
-        """The same of each cause."""
+        """Return the best variant and scale of each cause."""
         return tuple(self.best_of(k) for k in range(len(self.causes)))
 
     @cached_property
@@ -196,9 +192,6 @@ class Estimates:
 
 class _OfCause:
     """Forms of one cause by number of amplitudes.
-
-    Args:
-        gram: shape (n, n).
 
     Attributes:
         groups: by p: forms, shape (m,); columns and plausible sizes, shape (m, p) each; products, shape (m, p, p).
@@ -257,7 +250,6 @@ class ModelComparison:
     Args:
         gram: products beside the base, in noise, shape (n, n).
         towards: with the target, shape (n,).
-        columns: numbers, rising, shape (n,); None: from zero.
         evidence: of causes already in this base.
     """
 
@@ -318,7 +310,7 @@ class ModelComparison:
         return np.asarray(sd * _solved(lower, z, transposed=True), dtype=np.float64)
 
     def estimates(self, members: Sequence[Member]) -> Estimates:
-        """Posterior means and covariance of the amplitudes and the slack of members."""
+        """Return posterior means and covariance of members' amplitudes and slack."""
         columns, sd = _stacked(members)
         information = self._information(columns, sd)
         factor = cholesky(information)
@@ -415,7 +407,6 @@ class ModelComparison:
         return found
 
     def _information(self, columns: NDArray[np.int64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the information with priors, in prior units, shape (p, p)."""
         own = self._at(columns)
         information = self._gram[np.ix_(own, own)]
         information *= sd[:, None]
@@ -424,7 +415,6 @@ class ModelComparison:
         return information
 
     def _forms_of(self, causes: tuple[Cause, ...]) -> _Forms:
-        """Return causes' forms for `scan`, cached."""
         each = []
         for cause in causes:
             one = self._of_causes.get(cause.name)
@@ -458,12 +448,7 @@ class ModelComparison:
 
 
 def _scanned(forms: _Forms, towards: NDArray[np.float64], left: Sequence[NDArray[np.float64]]) -> Scan:
-    """Scan all forms at all sizes.
-
-    Args:
-        towards: shape (q,).
-        left: products beside a hypothesis, by group, shape (m, p, p).
-    """
+    """Scan all forms at all sizes."""
     factors = np.empty((len(forms.weights), len(SCALES)))
     for (numbers, own, plausible, _), products in zip(forms.groups, left, strict=True):
         seen, axes = np.linalg.eigh(plausible[:, :, None] * products * plausible[:, None, :])
@@ -484,12 +469,6 @@ class Around:
 
     With A the members' information, P its inverse and C products with a cause, members without columns k absorb C^T P C -
     R^T (P_kk)^-1 R, R the rows k of P C [Schur complement; Horn and Johnson, Matrix Analysis, 2nd ed., sec. 0.7.3].
-
-    Args:
-        lower: Cholesky factor.
-        z: transformed target.
-        across: transformed products, shape (p, q).
-        towards: shape (q,).
     """
 
     def __init__(
@@ -539,7 +518,6 @@ class Around:
 
 
 def _solved(lower: NDArray[np.float64], right: NDArray[np.float64], *, transposed: bool = False) -> NDArray[np.float64]:
-    """Return a triangular solution without slow checks."""
     if not len(lower):
         return right
     found, info = dtrtrs(np.asarray(lower, order="C").T, right, lower=0, trans=0 if transposed else 1)
@@ -578,12 +556,12 @@ def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:
 
 
 def amplitude_size(member: Member, values: NDArray[np.float64]) -> float:
-    """Return a member's rms amplitude, shape (p,), in plausible ones."""
+    """Return a member's rms amplitude in plausible ones."""
     return float(np.sqrt(np.mean(np.square(values / member.variant.plausible))))
 
 
 def _log_factors(seen: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return log Bayes factors at all scales, shape (m, s), from information and squared target, shape (m, p)."""
+    """Return log Bayes factors at all scales, shape (m, s)."""
     squares = SCALES[:, None] ** 2
     information = 1.0 + squares * seen[:, None, :]
     return np.asarray(

@@ -37,8 +37,6 @@ def modulated(
     """Return effects of m movers times smooth functions, over all runs, shape (n, q).
 
     Args:
-        effects: per run, shape (n, m).
-        along: per run, shape (n, m).
         signs: direction per run if relevant, shape (n, m); or None.
     """
     effect, values = np.vstack(effects), np.vstack(along)

@@ -23,13 +23,7 @@ if TYPE_CHECKING:
 def named_values(
     settled: Settled, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
 ) -> dict[str, Value]:
-    """Return amplitudes and nonlinear parameters, slack included in uncertainty.
-
-    Args:
-        member: of the hypothesis, or beside it.
-        values: shape (p,).
-        covariance: shape (p, p).
-    """
+    """Return amplitudes and nonlinear parameters, slack included in uncertainty."""
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     width = len(member.variant.columns)
     law = settled.bank.laws.get(member.cause.name)
@@ -59,11 +53,7 @@ def named_values(
 
 
 def with_jackknife(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:
-    """Return values with the larger of own and jackknife uncertainty.
-
-    Args:
-        found: from all rows.
-    """
+    """Return values with the larger of own and jackknife uncertainty."""
     if not found:
         return {}
     u = weighted_jackknife(
@@ -89,5 +79,4 @@ _NAMES = {
 
 
 def _unit(unit: str, per: str) -> str:
-    """Return an amplitude's unit."""
     return f"{unit}{per}" if per == "" or per.startswith(("/", " per")) else per

@@ -21,7 +21,6 @@ class Noise:
     """Noise of one sample.
 
     Attributes:
-        sigma: in the channel's unit.
         correlation_samples: per independent sample; 1 if white.
     """
 
@@ -39,9 +38,6 @@ def noise_of(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> N
 
     Integrated autocorrelation over positive pairs of lags [Geyer, Practical Markov Chain Monte Carlo, Statistical Science
     7 (1992), sec. 3.3].
-
-    Args:
-        residuals: per run, in time order.
     """
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)
@@ -59,11 +55,10 @@ def noise_of(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> N
 def noise_of_turns(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> Noise:
     """Return noise from residuals of whole turns.
 
-    Misfit and absorption are smooth, so noise is read in higher harmonics and continued below
+    Misfit and absorption are smooth, so noise is measured in higher harmonics and extrapolated
     (`dbbstation.inference.harmonics`). Residual beyond noise counts as white.
 
     Args:
-        residuals: per turn, in time order, about equally spaced.
         freedom_used: on smooth columns.
     """
     count = sum(len(residual) for residual in residuals)

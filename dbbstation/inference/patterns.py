@@ -1,7 +1,7 @@
 """Patterns: effects without physics over variables, with prior odds.
 
-Some are named forms: linear, per turn, hysteresis, product, drift; others smooth curves, also by direction. Waves, bumps,
-steps and pulses come from `looks`.
+Some have names: linear, per turn, hysteresis, product, drift. Others are smooth curves, also by direction. `looks`
+finds waves, bumps, steps and pulses.
 """
 
 from __future__ import annotations
@@ -92,7 +92,6 @@ class Pattern:
         form: over the first variable or row number; None for a product.
         units: of amplitudes, shape (p,); empty: the channel's.
         per: divisors for these, shape (p,).
-        label: within its family and variables.
         tried: independent forms of the choice.
         choices: alternative forms: columns, log probability, label.
         acts_once: no other rows can show it.
@@ -137,10 +136,9 @@ def patterns(
     simulated: Variable | None,
     time_unit: str = "s",
 ) -> list[Pattern]:
-    """Return patterns without look.
+    """Return patterns that need no search.
 
     Args:
-        blocks: in time order.
         time: shape (n,); None: unordered, without direction and speed.
         simulated: None: lateness is not tested.
     """
@@ -238,11 +236,7 @@ TRANSITS = (0.003, 0.01, 0.03, 0.1)
 
 
 def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> NDArray[np.float64]:
-    """Return the place within a play, -1 to 1, shape (n,) [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]; each block begins in the middle.
-
-    Args:
-        blocks: rows of each; each begins in the middle.
-    """
+    """Return the place within a play, -1 to 1, shape (n,) [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]; each block begins in the middle."""
     found = np.empty(len(values))
     for rows in blocks:
         own = values[rows]
@@ -270,9 +264,9 @@ def _speed(
 
 
 def _product(one: Variable, other: Variable) -> Pattern:
-    """Product of two variables. Their zeros are unknown: each is tried at both ends and in the middle of its range.
+    """Return the product of two variables, each with its zero at both ends and the middle of its range.
 
-    Of angles, products of their cosines and sines: waves of their sum and difference.
+    For angles, cosines and sines are multiplied: waves of their sum and difference.
     """
     if covers_turns(one) or covers_turns(other):
         a, b = (

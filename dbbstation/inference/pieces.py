@@ -27,7 +27,6 @@ class Left:
     """A whitened residual with the fit's directions, in noise.
 
     Attributes:
-        rest: shape (n,).
         axes: orthonormal fitted directions, less priors, shape (n, k).
         whitening: shape (n, n), or None.
         known: `beside` if known, shape (n, k).
@@ -49,13 +48,7 @@ class Left:
         coloured: Coloured,
         whitening: csr_array | None,
     ) -> Left:
-        """Return the residual of a whitened target beside Gaussian columns.
-
-        Args:
-            target: shape (n,).
-            columns: shape (n, k).
-            sd: prior, infinite if unknown, shape (k,).
-        """
+        """Return the residual of a whitened target beside Gaussian columns."""
         return Fitting.of(columns, sd, coloured, whitening).left(target)
 
     @cached_property
@@ -69,15 +62,11 @@ class Left:
         return self.transposed(self.axes) if self.known is None else self.known
 
     def whitened(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rows with their noise made white."""
+        """Return rows with white noise."""
         return rows if self.whitening is None else np.asarray(self.whitening @ rows)
 
     def whitened_part(self, rows: NDArray[np.float64], here: slice, there: slice) -> NDArray[np.float64]:
-        """Return a whitened place of rows that are zero elsewhere.
-
-        Args:
-            rows: shape (b, p).
-        """
+        """Return a whitened place of rows that are zero elsewhere."""
         if self.whitening is None:
             return rows
         if there.start >= there.stop:
@@ -105,7 +94,6 @@ class Fitting:
 
     Attributes:
         axes: of rows and one row per prior, shape (n + b, k).
-        whitening: or None.
     """
 
     axes: NDArray[np.float64]
@@ -151,9 +139,6 @@ class LeftBesideOthers:
 
     Args:
         fitting: of everything else.
-        sd: of each amplitude, shape (k,).
-        target: whitened, shape (n,).
-        whitened: function.
     """
 
     def __init__(
@@ -240,7 +225,6 @@ class Sums:
         """Return squares explained by curves less their cost, shape (m,).
 
         Args:
-            curves: shape (b, m, p).
             size: amplitude standard deviation, in noise.
         """
         pieces, many, count = curves.shape
@@ -253,11 +237,7 @@ class Sums:
         return np.asarray(np.einsum("mp,mp->m", rest, np.linalg.solve(normal, rest[:, :, None])[:, :, 0]))
 
     def explained_by_waves(self, most: float, size: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return wave frequencies, half a period apart, and explained squares, shape (m,), by Fourier transform.
-
-        Args:
-            size: amplitude standard deviation, in noise.
-        """
+        """Return wave frequencies, half a period apart, and explained squares, shape (m,), by Fourier transform."""
         length = 2 * (int(self.place[-1]) + 1)
         last = min(int(2.0 * most), length // 4)
 
@@ -279,7 +259,6 @@ class Sums:
 
 
 def _sides(transform: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return cosine and sine sums, shape (m, 2, ...)."""
     return np.stack([transform.real, -transform.imag], axis=1)
 
 

@@ -1,4 +1,4 @@
-"""Levels of tests that are held back in groups, and which part of an object a class acts on, such as one strut."""
+"""Levels of tests held back in groups, and the strut on which each class acts."""
 
 from __future__ import annotations
 
@@ -20,12 +20,7 @@ if TYPE_CHECKING:
 
 
 def levels_by_tests(settled: Settled, left: LeftOver, gains: GainsOfTests | None) -> Levels:
-    """Return the three levels, with the strut, or all struts, that each class acts on for sure.
-
-    Args:
-        left: residual tests.
-        gains: None: not tested.
-    """
+    """Return the three levels, with the strut, or all struts, on which each class surely acts."""
     anew = None if gains is None else gains.anew
     found = levels_of(settled, left, gains, anew, sizes=detectable_causes(settled))
     follows = tuple(replace(one, where=_place(settled, one.members)) for one in found.follows)
@@ -34,7 +29,7 @@ def levels_by_tests(settled: Settled, left: LeftOver, gains: GainsOfTests | None
 
 
 def _place(settled: Settled, names: tuple[str, ...]) -> str | None:
-    """Return the form that all members have at a probability of `SURE`, beside the others; None if there is none, or it has no name."""
+    """Return the form that all members surely have; None if there is none, or it has no name."""
     labels = {max(form_probabilities(settled, name).items(), key=lambda one: one[1]) for name in names}
     found = {label if probability >= SURE else "" for label, probability in labels}
     return (found.pop() or None) if len(found) == 1 else None

@@ -41,7 +41,6 @@ class CauseColumns:
     Args:
         base: shape (n, k).
         whitened: from columns, shape (m, q), to samples, shape (n, q), on demand; None: identity.
-        room: initial columns without copying.
 
     Attributes:
         numbers: columns with known products, if not all.
@@ -119,7 +118,6 @@ class CauseColumns:
         return self._products
 
     def _renew(self) -> None:
-        """Recompute products of replaced columns."""
         changed, self._changed = np.array(self._changed, dtype=np.int64), []
         for known, products in ((len(self._products), True), (self._along.shape[1], False)):
             own = changed[changed < known]
@@ -179,7 +177,7 @@ class CauseColumns:
         return self.samples.T @ target, self.axes.T @ target
 
     def part(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> RowProducts:
-        """Return what rows, shape (n,), say of all or some columns, shape (q,)."""
+        """Return products of rows, shape (n,), with all or some columns, shape (q,)."""
         own = np.arange(self.count) if only is None else only
         axes, columns = self.axes[rows], self.samples.T[np.ix_(own, np.flatnonzero(rows))]
         return RowProducts(rows, only, axes.T @ axes, (columns @ axes).T, columns @ columns.T)
@@ -188,7 +186,6 @@ class CauseColumns:
         """Return the causes without some rows, where targets must be zero.
 
         Args:
-            rows: shape (n,).
             only: rising, shape (q,); None: all.
         """
         return self.without(self.part(rows, only))
@@ -200,15 +197,7 @@ class CauseColumns:
 
 @dataclass(frozen=True, eq=False)
 class RowProducts:
-    """Products over some rows, for subtraction.
-
-    Attributes:
-        rows: shape (n,).
-        numbers: shape (q,); None: all.
-        of_axes: shape (k, k).
-        across: axes with columns, shape (k, q).
-        of_columns: shape (q, q).
-    """
+    """Products over some rows, for subtraction."""
 
     rows: NDArray[np.bool_]
     numbers: NDArray[np.int64] | None
@@ -273,7 +262,6 @@ class BesideBase:
     Args:
         held: orthonormal directions kept at zero in the base fit, in scales; here of usual size, so that visible curvature is no
             cause.
-        noise: of a sample.
     """
 
     def __init__(self, causes: CauseColumns, known: Columns, held: NDArray[np.float64], noise: float) -> None:
@@ -294,12 +282,7 @@ class BesideBase:
         self._taken = np.linalg.qr(np.vstack([columns, priors]))[0][: len(base)].T
 
     def comparison(self, target: NDArray[np.float64], only: NDArray[np.int64] | None = None) -> ModelComparison:
-        """Compare causes on a target, shape (n,).
-
-        Args:
-            target: shape (n,).
-            only: rising; None: all.
-        """
+        """Compare causes on a target, shape (n,)."""
         causes = self._causes
         if only is None:
             along, products, (of_columns, of_axes) = causes.along, causes.gram, causes.towards(target)
@@ -316,12 +299,7 @@ class BesideBase:
         return ModelComparison(gram, towards / self._noise**2, causes.numbers if only is None else only)
 
     def left(self, targets: NDArray[np.float64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the residual of base and causes, shape (n, m).
-
-        Args:
-            targets: shape (n, m).
-            sd: prior of all columns, shape (p,); zero: not used.
-        """
+        """Return the residual of base and causes, shape (n, m)."""
         causes, axes = self._causes, self._causes.axes
         used = np.flatnonzero(sd > 0.0)
         size = sd[used] / self._noise

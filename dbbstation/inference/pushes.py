@@ -1,4 +1,4 @@
-"""Counting events in time: equal sizes count once, and many are none."""
+"""Counting events in time: equal sizes count once, and too many count as none."""
 
 from __future__ import annotations
 

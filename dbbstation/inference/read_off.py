@@ -56,14 +56,12 @@ class CauseFinding:
 
     Attributes:
         family: None for a law.
-        label: form, such as a strut; may be empty.
         rms: beyond the base, over its rows; in the residual's unit.
         sigmas: norm over standard deviation.
-        confounded: R² on base parameters.
+        confounded: R² of the effect on base parameters.
         spans: variables' ranges of at least half size.
         rows_there: number; 0 if not asked.
         rows: first and last of each stretch; may be empty.
-        blocks: rms in each.
         equivalent: indistinguishable causes, itself first; may be empty.
         ambiguous_with: one is present if not this.
         text: reason; may be empty.
@@ -103,7 +101,6 @@ class Trial:
     """Evidence of parts on findings.
 
     Attributes:
-        held_out: predictions, chosen anew; None if not tested.
         refits: [`refits_without`]; none: model uncertainties.
         is_worse_here: worse than the reference on the rows themselves, without held-out parts.
     """
@@ -123,7 +120,7 @@ def read_off(settled: Settled, trial: Trial | None = None, levels: Levels | None
 
     Args:
         trial: evidence of parts; None: not tested.
-        levels: verdicts are read off these; None: before they are known, what is sure is identified.
+        levels: source of the verdicts; None: sure causes are identified.
     """
     judge = CauseJudge(settled, trial, levels)
     found = [judge.finding(cause) for cause in settled.causes]
@@ -132,11 +129,7 @@ def read_off(settled: Settled, trial: Trial | None = None, levels: Levels | None
 
 
 class CauseJudge:
-    """Findings on causes; a client of its own words and values derives from it.
-
-    Args:
-        form_uncertainty: of a member, as a share; None: its law's.
-    """
+    """Findings on causes; a client subclasses it for its own words and values."""
 
     def __init__(
         self,
@@ -182,7 +175,7 @@ class CauseJudge:
         )
 
     def finding(self, cause: Cause) -> CauseFinding:
-        """What is said of one cause."""
+        """Return the finding on a cause."""
         pattern = self._settled.bank.patterns.get(cause.name)
         member = self._members.get(cause.name)
         equal = self._equal(cause.name)
@@ -236,7 +229,6 @@ class CauseJudge:
         )
 
     def _gains(self, name: str) -> Gains | None:
-        """Return held-out gains of a member and its class."""
         if self._trial is None or self._trial.held_out is None:
             return None
         return self._trial.held_out.gains_of({self._settled.bank.kind_of(one) for one in self._equal(name)})
@@ -292,18 +284,18 @@ class CauseJudge:
         return Verdict.AMBIGUOUS, others, text
 
     def _instead_of(self, name: str) -> frozenset[str]:
-        """Members in whose place a law is named that is none of them; none where it is not."""
+        """Return members that a named law replaces."""
         return frozenset() if self._levels is None or name in self._members else self._levels.instead_of(name)
 
     def _alike(self, name: str) -> str:
-        """Member that rows cannot tell a cause from, alone or among others; empty where there is none."""
+        """Return a member equivalent to a cause, alone or among others; may be empty."""
         if self._levels is not None and (found := self._levels.alike(name)):
             return found
         unsure = self._alternatives.ambiguities
         return next((one for of in (self._classes, unsure) for one, names in of.items() if name in names), "")
 
     def _claimed(self, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
-        """Verdict of what is there for sure beside the most probable noise, before a client has levels."""
+        """Return the verdict on a surely present cause before a client has levels."""
         if probability < SURE:
             return Verdict.AMBIGUOUS, (), "Noise whose neighbours resemble each other explains it as well."
         if sigmas < OUT:
@@ -311,7 +303,7 @@ class CauseJudge:
         return Verdict.IDENTIFIED, (), ""
 
     def _equal(self, name: str) -> tuple[str, ...]:
-        """A cause and what nothing measured here tells from it."""
+        """Return a cause and its equivalents."""
         return (self._levels is not None and self._levels.equivalent(name)) or self._classes.get(name, (name,))
 
     def _impossible_in_place(self, cause: Cause) -> str:
@@ -350,7 +342,6 @@ class CauseJudge:
         return float(np.median(standing_out(products, variant.plausible)))
 
     def _sigmas(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
-        """Return an effect's norm beside the base in standard deviations."""
         return norm_over_sigma(self._settled.comparison.beside((), member.columns), values, covariance)
 
     def _concealed(
@@ -366,7 +357,6 @@ class CauseJudge:
 
 
 def _at_half(effect: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return rows at half of the largest effect, about its median."""
     away = np.abs(effect - np.median(effect))
     return np.asarray(away >= HALF * away.max())
 

@@ -39,7 +39,7 @@ class Largest:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What a model leaves, by its harmonics, by its runs and by its samples.
+    """Residuals of a model by harmonic, run and sample.
 
     Attributes:
         run: worst over low harmonics.
@@ -70,9 +70,7 @@ def remainder(
     """Find the worst harmonic, run and stretch.
 
     Args:
-        residuals: one period per run.
         groups: sharing the first harmonic.
-        noise: measured elsewhere.
     """
     low, _ = bands(min(len(residual) for residual in residuals))
     found = np.array([coefficients(r, phase, low) for r, phase in zip(residuals, phases_rad, strict=True)])
@@ -105,7 +103,6 @@ def remainder(
 
 
 def _largest(squares: Sequence[tuple[float, int]], freedom: float) -> tuple[int, float]:
-    """Return the least probable sum's number and probability."""
     chances = [float(f_distribution.sf(square / count, count, freedom)) for square, count in squares]
     at = int(np.argmin(chances))
     return at, chances[at]

@@ -43,7 +43,6 @@ def seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Patter
 
 
 def _fitted(bank: Bank, members: Sequence[Member]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return whitened columns of base and members, and prior standard deviations, shape (m, k) and (k,)."""
     known, held = bank.channel.known, bank.channel.held
     fixed, random = np.flatnonzero(~known.random), np.flatnonzero(known.random)
     base = bank.base

@@ -44,18 +44,9 @@ def selection_frequency(
 ) -> dict[str, float]:
     """Return each cause's share of selections.
 
-    Each draw keeps seven tenths of groups without replacement, lest repeated groups look certain [Meinshausen and
-    Bühlmann, J. R. Stat. Soc. B 72 (2010) 417, sec. 2, draw halves]. `blocks` have base, then causes' columns; `groups`
-    are kept together, such as a test; `held` directions stay zero; `noise` is a measurement's.
-
-    Args:
-        blocks: compressed runs: columns of the base, then those of the causes, numbered as the causes have them.
-        groups: which blocks are kept or left out together, such as those of one test.
-        known: priors and scales of the base columns.
-        held: directions of the base that are kept at zero.
-        noise: standard deviation of one measurement.
-        begin: members that every search begins with, beside none.
-        most_members: causes of a hypothesis at the most; None: no limit.
+    Each draw keeps seven tenths of the groups without replacement, because repeated groups look certain [Meinshausen
+    and Bühlmann, J. R. Stat. Soc. B 72 (2010) 417, sec. 2, draw halves]. Groups, such as tests, are kept together.
+    `held` base directions stay zero.
     """
     base = len(known.prior)
     columns = (

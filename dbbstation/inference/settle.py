@@ -1,4 +1,4 @@
-"""The set of laws and patterns that explains a channel: compare, look, refine, repeat."""
+"""The set of laws and patterns that explains a channel: compare, search, refine, repeat."""
 
 from __future__ import annotations
 
@@ -61,14 +61,14 @@ def settle(
 ) -> Settled:
     """Compare sets of laws and patterns.
 
-    Noise is part of the comparison: measured from several beginnings, then on the best hypothesis, until stable. The most
-    probable outcome is returned with the others.
+    Noise is part of the comparison: measured from several initial models, then on the best hypothesis, until stable.
+    All outcomes are returned, the most probable first.
 
     Args:
         look: search waves, bumps, steps and pulses.
-        static: include patterns without look.
+        static: include patterns that need no search.
         most_expanded: hypotheses expanded per search.
-        most_looks: successive residual looks.
+        most_looks: successive searches of the residual.
         in_time: search steps and pulses in time; False if blocks have own curves.
         thorough: several starts and a final look; False: one fast search.
         rivals: noise of any colour competes; False: first order beside everything.
@@ -137,7 +137,7 @@ def _from(
 
 
 def _known_as(settled: Settled, known: Sequence[Settled]) -> Settled:
-    """Return another beginning's outcome if met."""
+    """Return another start's outcome if met."""
     return next((one for one in known if _meets(settled, one)), settled)
 
 
@@ -162,7 +162,7 @@ class _Options:
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
-    """Return patterns without look, independent of held-back rows."""
+    """Return patterns that need no search, independent of held-back rows."""
     return tuple(patterns(channel.variables, channel.blocks, channel.time, channel.simulated, channel.time_unit))
 
 
@@ -182,13 +182,7 @@ def _settled(
     impossible: Mapping[str, str] | None = None,
     known: Sequence[Settled] = (),
 ) -> Settled:
-    """Look, compare and refine until stable.
-
-    Args:
-        bank: grows.
-        impossible: refused laws with reasons.
-        known: other outcomes, returned if met.
-    """
+    """Look, compare and refine until stable."""
     channel, look = bank.channel, options.look
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     laid_out: set[str] = set()
@@ -243,7 +237,7 @@ def _settled(
 
 
 def _rough(settled: Settled, laid_out: Collection[str], work: SearchWork) -> list[Member]:
-    """Laws that are wanted and not laid out yet; none where no work is left to compare them anew."""
+    """Return promising laws without exact columns yet; none if no work is left to compare them."""
     return [] if work.is_spent else [m for m in _laws_of(settled) if m.cause.name not in laid_out]
 
 
@@ -255,7 +249,6 @@ def _placed(bank: Bank, members: tuple[Member, ...]) -> tuple[Member, ...]:
 
 
 def _would_be_the_same(compared: Settled, bank: Bank, best: Sequence[Member], refused: Mapping[str, str]) -> bool:
-    """Return whether a search would repeat the last."""
     there = {cause.name: cause.variants for cause in bank.but_for(refused)}
     before = {cause.name: cause.variants for cause in compared.causes}
     same = {member.cause.name for member in best} == compared.best.names and there == before
@@ -433,7 +426,6 @@ def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.
     """Return nonlinear parameters moved along tangents within grids.
 
     Args:
-        values: shape (p,).
         per: `growth` for tangents of another form.
     """
     nonlinear = list(member.variant.nonlinear)

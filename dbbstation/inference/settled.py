@@ -26,8 +26,8 @@ MOST_EXPANDED = 8
 class Beginning(Enum):
     """What noise is first measured beside.
 
-    Beside everything, wandering noise looks like curves; beside nothing, smooth effects look like noise; with long tails,
-    pulses look like outliers. All are tried.
+    Each start has its own blind spot: wandering noise resembles curves, smooth effects resemble noise, and pulses
+    resemble outliers. All are tried.
     """
 
     EVERYTHING = "everything"
@@ -38,14 +38,13 @@ class Beginning(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """What the comparison came to.
+    """The outcome of a comparison.
 
     Attributes:
-        noise: of a row.
         refused: impossible laws with reasons.
         log_probability: of noise and best hypothesis, up to a constant.
         others: most probable first.
-        stopped: the search ended at its limit of work, with the best so far.
+        stopped: the search reached its limit of work; the best so far is returned.
     """
 
     channel: Channel
@@ -62,7 +61,7 @@ class Settled:
 
     @property
     def best(self) -> Hypothesis:
-        """The most probable hypothesis."""
+        """Return the most probable hypothesis."""
         return self.posterior.best
 
     def effect(self, names: Sequence[str] | None = None) -> NDArray[np.float64]:
@@ -85,10 +84,10 @@ class Settled:
         return np.asarray(effect + self.channel.base.samples @ self.base_values(effect), dtype=np.float64)
 
     def averaged(self, probability: float, names: Collection[str]) -> float:
-        """Return causes' probability over all beginnings.
+        """Return causes' probability over all initial noise models.
 
         Args:
-            names: picked effects of one family and variables count alike.
+            names: found effects of one family and variables count alike.
         """
         if not self.others:
             return probability

@@ -34,8 +34,6 @@ class Spreads:
     Attributes:
         shared: root, shape (k, q).
         own: columns, shape (j,), and root, shape (j, j), per group.
-        alone: untouched columns, shape (a,).
-        prior: of these, shape (a,).
     """
 
     shared: NDArray[np.float64]
@@ -82,7 +80,7 @@ class Spreads:
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """Directions of fitted columns in scales, best seen first.
+    """Directions of fitted columns in scales, most certain first.
 
     Attributes:
         singular: one over standard deviation, shape (f,).
@@ -98,7 +96,6 @@ class Solution:
     """Result of `solve`.
 
     Attributes:
-        x: shape (k,).
         directions: of fitted columns, random ones averaged.
         held: rows held at zero, in scales, shape (h, f).
         chi2: weighted residual squares with priors.
@@ -134,7 +131,6 @@ def solve(
     """Return best estimates of fitted and predictions of random columns.
 
     Args:
-        noise: unless a block states its own.
         held: rows kept at zero, in scales, shape (h, f).
     """
     arrow = arrow_of(blocks, known, noise)
@@ -194,13 +190,7 @@ def chi2_without(
     held: NDArray[np.float64],
     parts: Sequence[Sequence[int]],
 ) -> list[float]:
-    """Return chi-square without each part's blocks, priors included.
-
-    Args:
-        noise: unless a block states its own.
-        held: rows kept at zero, in scales, shape (h, f).
-        parts: omitted blocks.
-    """
+    """Return chi-square without each part's blocks, priors included."""
     towards = known.scale[~known.random][:, None] * complement(held).T
     found = []
     for root, target, floor in triangles_without(blocks, known, noise, parts):
@@ -224,11 +214,6 @@ def unseen_combinations(
 
     A direction lost at the first linearisation differs at the solution: here other columns follow by least squares.
     Combinations are orthonormal in scales, with zero random effects.
-
-    Args:
-        blocks: linearised at the solution.
-        noise: unless a block states its own.
-        held: rows kept at zero, in scales, shape (h, f).
     """
     combinations = np.zeros((len(held), len(known.prior)))
     if len(held):
@@ -242,7 +227,7 @@ def unseen_combinations(
 
 
 def directions_of(seen: NDArray[np.float64]) -> Directions:
-    """Return directions of a scaled information root, shape (r, f), best seen first."""
+    """Return directions of a scaled information root, shape (r, f), most certain first."""
     _, singular, vectors = np.linalg.svd(seen, full_matrices=True)
     padded = np.zeros(seen.shape[1])
     padded[: len(singular)] = singular

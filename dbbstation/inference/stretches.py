@@ -1,6 +1,7 @@
 """Steps and pulses in time: stretches with a shifted residual.
 
-All lengths and places are tried; the best is added, and the look repeats. A stretch to a block's end is a step.
+All lengths and places are tried; the best is added, and the search repeats. A stretch that reaches a block's end is a
+step.
 """
 
 from __future__ import annotations
@@ -57,9 +58,6 @@ def stretches(
     """Return outstanding stretches as patterns of one, two and more.
 
     Args:
-        left: of kept rows.
-        blocks: in time order.
-        kept: shape (n,).
         size: one standard deviation, in noise.
         clock: None: gapless with immediate steps.
         by: time, and direction, shape (n,), for odd effects.
@@ -101,7 +99,6 @@ def refined(
 
     Args:
         lefts: residual without one, by number and all columns, shape (n, count).
-        direction: shape (n,), if odd in it.
     """
     clock = Clock.plain(len(kept)) if clock is None else clock
     factor = np.ones(len(kept)) if direction is None else direction
@@ -176,7 +173,7 @@ def _label(found: Sequence[tuple[float, float]]) -> str:
 
 
 class _Look:
-    """Sums over windows: by pieces, then rows at the best ends."""
+    """Sums over windows: by bins, then rows at the best ends."""
 
     def __init__(
         self,
@@ -203,7 +200,6 @@ class _Look:
         self.tried = max(float(len(self._windows)) / INDEPENDENT, 1.0)
 
     def _all_windows(self) -> NDArray[np.int64]:
-        """Return each window's first row and one behind its last, shape (w, 2)."""
         per = max(1, int(np.ceil(len(self._rows) / PIECES)))
         found = [np.zeros((0, 2), dtype=np.int64)]
         for first, last in self._blocks:
@@ -222,7 +218,6 @@ class _Look:
         return np.column_stack([starts, ends])[ends - starts < len(self._rows)]
 
     def _information(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return whitened windows' squares beside the fit."""
         own, along = self._whole[ends] - self._whole[starts] + self._edges[ends - starts], self._along_axes.columns
         for many in range(0, len(starts), AT_ONCE):
             rows = slice(many, many + AT_ONCE)
@@ -329,7 +324,6 @@ class _Look:
     def _columns(
         self, begins: NDArray[np.float64], ends: NDArray[np.float64], rows: slice = slice(None)
     ) -> NDArray[np.float64]:
-        """Return columns of stretches, shape (m, p)."""
         at = self._at[rows, None]
         return (self._clock.response(at - begins) - self._clock.response(at - ends)) * self._factor[rows, None]
 
@@ -367,22 +361,17 @@ ALIKE = 1e-12
 
 
 def _squares(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return rows' squares, shape (w,)."""
     return np.asarray(np.einsum("wk,wk->w", rows, rows), dtype=np.float64)
 
 
 def _cumulative(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return cumulative sums, shape (n + 1, ...)."""
     found = np.zeros((len(rows) + 1, *rows.shape[1:]))
     np.cumsum(rows, axis=0, out=found[1:])
     return found
 
 
 def _squares_of_edges(noise: Coloured, longest: int) -> NDArray[np.float64]:
-    """Return two edges' squares after whitening, by stretch length 0 to `longest`.
-
-    The filter starts at the begin and rings behind the end.
-    """
+    """Return two edges' squares after whitening, by stretch length 0 to `longest`."""
     taps = noise.filter
     step = np.concatenate([np.cumsum(taps), np.full(longest, taps.sum())])
     inside = np.concatenate([[0.0], np.cumsum(step[:longest] ** 2 - taps.sum() ** 2)])

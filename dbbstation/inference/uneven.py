@@ -24,14 +24,7 @@ TAIL_ROUNDS = 12
 def most_probable_variance(
     powers: NDArray[np.float64], even: NDArray[np.float64], grows: NDArray[np.float64], odds: float
 ) -> tuple[float, NDArray[np.float64]]:
-    """Return the cost and the most probable variance of each row [Schwarz 1978].
-
-    Args:
-        powers: squares, shape (m,).
-        even: constant variance up to a factor, shape (m,).
-        grows: candidates, shape (m, k).
-        odds: log number of candidates.
-    """
+    """Return the cost and the most probable variance of each row [Schwarz 1978]."""
     squares = grows / np.maximum(np.mean(grows, axis=0), 1e-300)
     every = np.array(list(product(GROWN, repeat=squares.shape[1])))
     costs = []
@@ -45,12 +38,7 @@ def most_probable_variance(
 
 
 def spread_by_kind(powers: NDArray[np.float64], kinds: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return rows' relative standard deviations by kind, shape (m,).
-
-    Args:
-        powers: squares, shape (m,).
-        kinds: from 0, shape (m,).
-    """
+    """Return rows' relative standard deviations by kind, shape (m,)."""
     count = np.maximum(np.bincount(kinds), 1)
     mean = np.bincount(kinds, powers) / count
     own = np.maximum(mean, QUIET**2 * float(mean.max(initial=0.0)))[kinds]
@@ -62,11 +50,7 @@ QUIET = 1e-4
 
 
 def most_probable_tails(new: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Return root weights, shape (m,), and best Student's t degrees of innovations.
-
-    Args:
-        new: standardised, shape (m,).
-    """
+    """Return root weights, shape (m,), and best Student's t degrees of innovations."""
     squares = np.square(new)
     best, found = -np.inf, (np.ones(len(new)), np.inf)
     for tails in TAILS:
@@ -81,7 +65,6 @@ def student_likelihood(new: NDArray[np.float64], tails: float) -> float:
     """Return Student's t log likelihood at best scale, over the normal density's height.
 
     Args:
-        new: standardised, shape (m,); a normal distribution has -m / 2.
         tails: degrees of freedom.
     """
     return _likelihood(new, tails, _scale_of(np.square(new), tails))
@@ -113,10 +96,6 @@ def has_long_tails(new: NDArray[np.float64]) -> bool:
 
 
 def log_student(new: NDArray[np.float64], tails: float) -> NDArray[np.float64]:
-    """Return Student's t log density over the normal density's height, shape (m,).
-
-    Args:
-        new: in scales, shape (m,).
-    """
+    """Return Student's t log density over the normal density's height, shape (m,)."""
     height = gammaln(0.5 * (tails + 1.0)) - gammaln(0.5 * tails) - 0.5 * np.log(0.5 * tails)
     return np.asarray(height - 0.5 * (tails + 1.0) * np.log1p(new**2 / tails))

@@ -1,6 +1,7 @@
 """Variables that an error may follow, with direction of motion.
 
-A variable is a column in time order by blocks; its kind decides what makes sense: turns for angles, order for times.
+A variable is a column in time order by blocks. Its kind decides which effects make sense: turns for angles, order for
+times.
 """
 
 from __future__ import annotations
@@ -45,9 +46,6 @@ class Variable:
     """What an error may follow.
 
     Attributes:
-        name: unique.
-        unit: may be empty.
-        values: shape (n,).
         period: one turn of an angle, in its unit; else None.
         driven: results from the simulation, so may be caused by the difference.
     """
@@ -61,17 +59,17 @@ class Variable:
 
     @property
     def low(self) -> float:
-        """Least value."""
+        """Return the least value."""
         return float(self.values.min())
 
     @property
     def high(self) -> float:
-        """Greatest value."""
+        """Return the greatest value."""
         return float(self.values.max())
 
     @property
     def extent(self) -> float:
-        """Of its values."""
+        """Return the range."""
         return self.high - self.low
 
     @property
@@ -100,8 +98,8 @@ class Variable:
     def directions(self, blocks: Sequence[slice]) -> NDArray[np.float64]:
         """Return each row's direction: 1 up, -1 down, shape (n,).
 
-        Along a path by speed; between poses by arrival. Resting rows keep their direction; before a block's first move it
-        is that move's.
+        Along a path by speed; between poses by arrival. Stationary rows keep the last direction; before a block's first
+        move, the next.
         """
         return _signs(self, blocks, _central if self.is_path(blocks) else _arriving)
 
@@ -110,7 +108,7 @@ class Variable:
         return _signs(self, blocks, _arriving)
 
     def rates(self, time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
-        """Return central differences per time within blocks, shape (n,); zero if time stands."""
+        """Return central differences per time within blocks, shape (n,); zero if time does not advance."""
         found = np.zeros(len(self.values))
         for rows in blocks:
             own, at = self.travel(rows), time[rows]

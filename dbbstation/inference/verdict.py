@@ -44,7 +44,7 @@ SEEN_WORSE = 1e-3
 
 
 class Verdict(StrEnum):
-    """What can be said of a cause, in the order in which findings are listed; the values are the tokens of `--json`."""
+    """What can be said of a cause, in the order of listings; the values are the tokens of `--json`."""
 
     IDENTIFIED = "identified"
     HAPPENED = "happened"
@@ -72,7 +72,6 @@ class Gains:
 
     Attributes:
         parts: squared errors without less with it, others refitted, in squared units; zero if not chosen.
-        rows: of each part; none if equal.
     """
 
     parts: tuple[float, ...]
@@ -87,7 +86,7 @@ class Gains:
     @computed_field  # type: ignore[prop-decorator]
     @property
     def total(self) -> float:
-        """Over all parts."""
+        """Return the sum over all parts."""
         return sum(self.parts)
 
     @property
@@ -117,11 +116,8 @@ class Gains:
 class DensityGains(Gains):
     """An effect's gain in predictive density.
 
-    Parts that hardly show it bring little, and the sum is evidence [Good, J. R. Stat. Soc. B 14 (1952) 107], so parts
-    need not be counted.
-
-    Attributes:
-        parts: log density with less without it, others refitted; zero if not chosen.
+    Parts that hardly show the effect contribute little, and the sum is evidence [Good, J. R. Stat. Soc. B 14 (1952)
+    107], so parts need not be counted.
     """
 
     @property

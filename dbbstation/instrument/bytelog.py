@@ -50,7 +50,6 @@ class ByteLog:
     Args:
         path: must not exist.
         instrument: protocol name.
-        profile: may be empty.
         force: overwrite the file.
 
     Raises:

@@ -37,7 +37,6 @@ class Written:
 
     Attributes:
         before: digits before the point.
-        unit: may be empty.
     """
 
     value: float

@@ -144,10 +144,6 @@ def _orthogonalise(matrix: NDArray[np.float64], triangle: NDArray[np.float64], s
     exchanges: Householder's method in disguise. [Björck, BIT 7 (1967) 1-21; Björck and Paige, SIAM J. Matrix Anal. Appl.
     13 (1992) 176-190] Args: `triangle` gets parts along each column and, on its diagonal, 1/|c|², shape (6, 6, LANES);
     `sound` is 1.0 for full rank, else 0.0, shape (LANES,).
-
-    Args:
-        triangle: gets what was along each column c and, on its diagonal, 1/|c|², shape (6, 6, LANES).
-        sound: 1.0 where the matrix has full rank, 0.0 where it has not or is not a number, shape (LANES,).
     """
     for k in range(6):
         for lane in range(LANES):

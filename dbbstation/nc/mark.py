@@ -191,12 +191,7 @@ def _free(toolpath: Toolpath, moves: NDArray[np.int64], decimals: Sequence[int])
 
 @cache
 def _steps(angle: int, angle_and_place: int) -> NDArray[np.int64]:
-    """Return steps of the six last decimals, shape (k, 6), the least felt first, beginning with none.
-
-    Args:
-        angle: greatest step of angles if X, Y and Z stay.
-        angle_and_place: greatest step of angles if X, Y and Z move too.
-    """
+    """Return steps of the six last decimals, shape (k, 6), the least felt first, beginning with none."""
     alone, beside = np.arange(-angle, angle + 1), np.arange(-angle_and_place, angle_and_place + 1)
     place = np.arange(-FARTHEST_PLACE, FARTHEST_PLACE + 1)
     both = np.stack(np.meshgrid(*[place] * 3, *[beside] * 3, indexing="ij"), axis=-1).reshape(-1, 6)

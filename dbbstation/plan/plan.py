@@ -66,7 +66,6 @@ class PlannedTest:
     """One test: a ball and the circle about it, run in one or both directions.
 
     Attributes:
-        name: unique.
         directions: in order.
     """
 

@@ -223,10 +223,6 @@ class Assigned:
         """Return the log density of all readings by labels of some runs, machine errors of all sizes alike probable.
 
         Given the other runs, readings are normal [Rasmussen and Williams (2006), eq. 2.9]: one factor serves all labels.
-
-        Args:
-            others: sum of the other runs.
-            instead: sets of labels, one for each of `runs`.
         """
         chosen = list(zip(runs, np.array(instead).T, strict=True))
         joined = np.concatenate([self._read[run][labels] for run, labels in chosen], axis=1)

@@ -23,7 +23,6 @@ class Size:
 
     Attributes:
         u_um: standard uncertainty; None if a cause of unknown size counts.
-        why_not: may be empty.
     """
 
     um: float

@@ -85,11 +85,6 @@ def _may_share(begins: NDArray[np.uint64], other: Seen, length: int) -> bool:
     """Return whether two neighbouring blocks of a run begin with readings that follow one another in another run.
 
     Otherwise `_shared` is zero. Stretches of the other run are sorted once for each length, which is a power of two.
-
-    Args:
-        begins: with what each block of the run begins.
-        other: the other run.
-        length: readings of each beginning.
     """
     assert other.analysis is not None  # noqa: S101 - asked before
     if length not in other.stretches:
@@ -103,11 +98,6 @@ def _shared(own_mm: NDArray[np.float64], other_mm: NDArray[np.float64], row: int
     """Return how many readings stand in common stretches.
 
     Blocks of half the length that chance allows suffice: a common stretch holds a whole one.
-
-    Args:
-        own_mm: shape (n,).
-        other_mm: shape (m,).
-        row: equal readings in a row beyond chance.
     """
     block = (row + 1) // 2
     if min(len(own_mm), len(other_mm)) < row:

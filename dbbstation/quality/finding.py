@@ -51,7 +51,6 @@ class Finding:
     """One thing that was looked for in one run.
 
     Attributes:
-        value: or None.
         limit: of a sound run, or None.
         text: finding, place and remedy; or why undecided.
         short: may be empty if name, value and limit suffice.

@@ -128,11 +128,7 @@ def _by_feed_um(one: CircleAnalysis) -> float:
 
 
 def _beyond(u: float, freedom: float, others: Sequence[tuple[float, float]]) -> float:
-    """Return the limit of a value about zero, by its uncertainty and the excess scatter of others.
-
-    Args:
-        others: value and standard uncertainty each; too few are ignored.
-    """
+    """Return the limit of a value about zero, by its uncertainty and the excess scatter of others."""
     parts = [(u, freedom)]
     if len(others) >= FEWEST_OTHERS:
         scale, known = scale_of([value / own for value, own in others])

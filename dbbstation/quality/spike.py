@@ -104,11 +104,7 @@ def _apart(
 
 
 def _scales(apart: NDArray[np.float64], among: NDArray[np.bool_]) -> tuple[NDArray[np.float64], float]:
-    """Return the standard deviation about each reading, shape (n,) [µm], and its freedom.
-
-    Args:
-        apart: shape (n,) [µm].
-    """
+    """Return the standard deviation about each reading, shape (n,) [µm], and its freedom."""
     count = len(apart)
     whole, _ = scale_of(list(apart[among]))
     if among.any():

@@ -110,12 +110,7 @@ def _predicted(one: Seen) -> Iterator[_Explained]:
 def _density(
     off: NDArray[np.float64], covariance: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return log normal densities without the common constant, and squared distances.
-
-    Args:
-        off: shape (..., 7).
-        covariance: shape (..., 7, 7).
-    """
+    """Return log normal densities without the common constant, and squared distances."""
     squares: NDArray[np.float64] = np.sum(off * np.linalg.solve(covariance, off[..., None])[..., 0], axis=-1)
     return -0.5 * (np.linalg.slogdet(covariance)[1] + squares), squares
 

@@ -101,9 +101,6 @@ def _tail(weights: NDArray[np.float64], covariances_um2: NDArray[np.float64]) ->
     """Return the factor on the mean covariance by which a mixture of sizes has longer tails than a normal distribution.
 
     Its square radius is exceeded with probability SHARE; covariances of different sizes are taken as alike in shape.
-
-    Args:
-        covariances_um2: shape (9, 7, 7).
     """
     sizes = np.trace(covariances_um2, axis1=1, axis2=2)
     sizes /= weights @ sizes

@@ -23,7 +23,6 @@ class Certified:
 
     Attributes:
         lacking: missing parts; empty for a certificate.
-        place: may be empty.
     """
 
     lacking: tuple[str, ...]
@@ -44,7 +43,6 @@ def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolera
 
     Args:
         job: typed; empty: the sessions'.
-        place: may be empty.
         tolerances: whether there are any.
     """
     lacking = dict.fromkeys(text for session in sessions for text in _lacking(session, job))

@@ -54,7 +54,6 @@ class Modelled:
 
     Attributes:
         evaluation: None if impossible.
-        problem: may be empty.
     """
 
     identified: IdentifiedModel
@@ -71,9 +70,7 @@ class Reported:
         settings: with tolerances.
         before: None if not given.
         modelled: None if not given.
-        job: may be empty.
         ranked: None without a model.
-        place: may be empty.
     """
 
     found: Circled

@@ -72,11 +72,7 @@ class Drawing:
 
 
 def history_html(history: HistoryResult, provenance: Provenance, tolerances_from: str = "") -> bytes:
-    """Return reproducible HTML without script or outside references.
-
-    Args:
-        tolerances_from: may be empty.
-    """
+    """Return reproducible HTML without script or outside references."""
     k = history.coverage_factor
     machines = [
         {

@@ -38,7 +38,6 @@ def draw_map(
 
     Args:
         name: of the panel; may be empty.
-        tests: by name.
         circles: of one session, with figures.
     """
     centres_um = _centres_um(circles)

@@ -65,11 +65,7 @@ class Sheet:
     def __init__(
         self, width_in: float, room_in: float, title: str, keys: Sequence[Key], block: Sequence[Sequence[Cell]]
     ) -> None:
-        """Lay out all but the panels.
-
-        Args:
-            room_in: height of panels.
-        """
+        """Lay out all but the panels."""
         self.width_in = width_in
         self.inner_in = width_in - 2.0 * MARGIN_IN
         lines = wrapped(title, TITLE_PT, self.inner_in, MOST_LINES)

@@ -38,7 +38,6 @@ class ShownCauses:
 
     Attributes:
         session: of the circles.
-        why_not: may be empty.
         polars: without the first cause.
         said: the diagnosis in two sentences; may be empty.
     """
@@ -70,7 +69,6 @@ class ShownModel:
     """A model as the page shows it.
 
     Attributes:
-        problem: may be empty.
         failed: whether physics is missing.
         parameters: rows.
     """
@@ -92,7 +90,6 @@ class ReportContent:
         reasons_shown: on the first page.
         ranking: None without a model.
         before_name: earlier session; may be empty.
-        modelled: or None.
         files: name and SHA-256 of every underlying file.
     """
 

@@ -166,7 +166,6 @@ class FleetResult(Framed):
     Attributes:
         task: `calibrate`, `circles`, `diagnose` or `report`.
         page: with a row per machine.
-        sessions: by name.
         notes: on sessions without serial number.
         comparison: None without comparable values.
     """

@@ -32,7 +32,6 @@ def level_sentences(
     """Return sentences on existence, variables and law of a difference, and correction.
 
     Args:
-        unit: may be empty.
         values: numbers of laws, by law and number.
         rows: what took part, such as `tests`.
         what: differs.

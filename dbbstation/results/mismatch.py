@@ -30,7 +30,6 @@ class VariableResult:
 
     Attributes:
         kind: such as `angle` or `time`.
-        unit: may be empty.
         period: in that unit, or None.
     """
 

@@ -21,7 +21,6 @@ class ListedRun:
     Attributes:
         mounting: of the ball; None if not counted.
         started: ISO 8601; None if not noted.
-        reason: or None.
         file: in the session's folder.
     """
 

@@ -48,7 +48,6 @@ class HeldLine:
 
     Attributes:
         latest: None before a reading and during failure.
-        failure: or None.
     """
 
     def __init__(

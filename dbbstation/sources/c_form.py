@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 class CForm:
     """Statements of C that add a source's effect at one pose.
 
-    They may use what `control/kernel.c` defines: `at`, the struts as the source sees them in its model; `e`, to which they
-    add; `v`, the values; `EACH`, which loops over struts i. Thermometer k is `warmer[thermometer[k]]`, in kelvin above its zero.
+    They may use names of `control/kernel.c`: `at`, the struts as the source sees them in its model; `e`, the sum to add
+    to; `v`, the values; `EACH`, a loop over struts i. Thermometer k is `warmer[thermometer[k]]`, in kelvin above its
+    zero.
 
     Attributes:
         body: statements.
-        by_pose: False if it reads no more of `at` than lengths, so that the pose need not be found.
+        by_pose: False if it uses only lengths of `at`, so that the pose need not be solved for.
         constants: further constants by name, a number or an array.
         thermometers: columns without their unit.
     """

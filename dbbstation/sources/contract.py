@@ -79,7 +79,6 @@ class Thermometer:
     """One thermometer over a session.
 
     Attributes:
-        time_s: on the clock of `Motion.time_s`, rising, shape (q,).
         degc: without quantisation, shape (q,).
     """
 
@@ -104,7 +103,6 @@ class Setup:
         place_known: False under the spindle, where `fixed_ball_mm` is the machine's commanded place.
         set_up_errors: micrometer readings, or None.
         plate: None for a ball in no bore.
-        run: may be empty.
         start_uncertainty_deg: of the turn's begin, one standard deviation; zero with recorded angles.
         moving_s: begin and end of all runs in order, on the clock of `Motion.time_s`; may be empty.
         thermometers: over the session, by column without unit.
@@ -142,8 +140,8 @@ class Motion(WithLogged):
         kept: the rows that count.
         time_s: since the session's first sample, shape (n,); None if unknown.
         logged: by column, shape (n,) each; see `temperature_degc` and `motor_current_a`.
-        load_n: axial forces of the motors, positive if the platform pulls, shape (n, 6); None: by the machine file's weights at
-            commanded poses.
+        load_n: axial forces of the motors, positive if the platform pulls, shape (n, 6); None: by the machine file's
+            weights at commanded poses.
         setup: None for unmeasured poses.
         reading_mm: as place of the bar's encoder, shape (n,); None if unmeasured.
         reading_is_measured: from an instrument with noise, not a model.
@@ -277,14 +275,7 @@ class Parameter:
 def of_each_strut(
     name: str, unit: str, plausible: float, meaning: str, *, positive: bool = False
 ) -> tuple[Parameter, ...]:
-    """Return one amplitude for each strut.
-
-    Args:
-        name: `{}` stands for the strut, 1 to 6.
-        plausible: one standard deviation, in that unit.
-        meaning: one line with the sign; `{}` stands for the strut.
-        positive: cannot be negative.
-    """
+    """Return one amplitude for each strut."""
     return tuple(
         Parameter(name.format(k), unit, plausible, meaning.format(k), positive=positive, strut=k)
         for k in range(1, STRUTS + 1)
@@ -425,7 +416,6 @@ class ErrorSource(ABC):
 
         Args:
             motion: the run or its beginning, which shows the struts' directions.
-            values: shape (p,).
         """
         return None
 
@@ -439,7 +429,6 @@ class ErrorSource(ABC):
 
         Args:
             motion: in time order; `straight`.
-            values: shape (p,).
             state: from `begin` or the previous stretch; not modified.
         """
         if Need.PATH not in self.needs:
@@ -462,7 +451,6 @@ class ErrorSource(ABC):
         Args:
             motion: a command near the solution.
             reached: the stretch as this source alone should reach it.
-            values: shape (p,).
         """
         raise NotImplementedError
 
@@ -517,7 +505,6 @@ class ErrorSource(ABC):
 
         Args:
             machine: with the identified compliance.
-            values: shape (p,).
             thermometers: columns without unit that the control has.
 
         Raises:
@@ -554,7 +541,7 @@ class ErrorSource(ABC):
         return Need.CURRENT in self.needs
 
     def found_compliance(self, machine: Machine, values: NDArray[np.float64]) -> Compliance | None:  # noqa: ARG002
-        """Return the struts' compliance by these values, in proportion to the first, or None."""
+        """Return the struts' compliance by these values, scaled by the first, or None."""
         return None
 
     def current_per_load(
@@ -563,7 +550,7 @@ class ErrorSource(ABC):
         machine: Machine,  # noqa: ARG002
         values: NDArray[np.float64],  # noqa: ARG002
     ) -> NDArray[np.float64] | None:
-        """Return the derivative of `current_a` by the motor's load, shape (n, 6) [A/N]; None: no dependence."""
+        """Return the derivative of `current_a` by the motor's load, shape (n, 6) [A/N]; None: independent."""
         return None
 
     def require(self, motion: Motion) -> None:
@@ -612,7 +599,7 @@ class LinearSource(ErrorSource):
     """A source proportional to its parameters: only the derivative is written."""
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Derivative times values."""
+        """Return derivative times values."""
         return self.derivative(motion, machine, values).times(values)
 
 
@@ -621,7 +608,6 @@ class Fitted:
     """A source with values for one of its sets, as a model carries it.
 
     Attributes:
-        values: in parameter order, shape (p,).
         shared: name of the set; empty for the machine's.
     """
 

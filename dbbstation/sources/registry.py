@@ -33,7 +33,6 @@ def known_sources() -> Mapping[str, ErrorSource]:
 
 @cache
 def _known() -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
-    """Return all sources without files, and the origins of foreign ones."""
     faults: list[Problem] = []
     others = installed(GROUP, _BASE, faults)
     found, whose = _with(in_folders(_BASE, causes, unmodelled), {}, others, faults)
@@ -70,7 +69,6 @@ def _with(
 
 
 def _checked(found: FoundClass[ErrorSource], faults: list[Problem]) -> ErrorSource | None:
-    """Return a source from a class, or None with its faults added."""
     kind, place = found.kind, found.place
     said, line = undeclared(kind), place.line
     if not said:

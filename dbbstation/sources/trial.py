@@ -121,7 +121,6 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
     """Return faults of a source's parameters, effect and derivative; may be empty.
 
     Args:
-        source: from a complete class.
         machine: tried on a circle about mid-travel.
 
     Raises:

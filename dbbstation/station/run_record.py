@@ -39,9 +39,6 @@ class RunRecall(Protocol):
     def __call__(self, run: RunId, behind: Sequence[Sample], /) -> Recording:
         """Return the whole run.
 
-        Args:
-            behind: last samples, unknown to observers.
-
         Raises:
             StationError: it cannot be read.
         """

@@ -229,12 +229,7 @@ def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[S
 def _with_thermometers(
     observations: Sequence[Observation], logs: Mapping[str, Sequence[tuple[float, Recording]]]
 ) -> list[Observation]:
-    """Tell every run the thermometers of its session that all used runs have.
-
-    Args:
-        logs: per session, begins [s] and content of all runs with thermometers, also omitted ones: growth counts from the same
-            start.
-    """
+    """Tell every run the thermometers of its session that all used runs have."""
     of = {}
     for session, runs in logs.items():
         known = (set(o.raw.temperature_degc) for o in observations if o.setup.session == session)

@@ -175,11 +175,7 @@ def _modelled(runs: Recorded | StationError, identified: IdentifiedModel, tellin
 def _ranked(
     recorded: Recorded | StationError, names: Sequence[str], identified: IdentifiedModel, telling: Telling
 ) -> Ranked:
-    """Return each cause's contribution under nominal programs, with a note on sessions that the model cannot take.
-
-    Args:
-        recorded: runs before, if given; or why unreadable.
-    """
+    """Return each cause's contribution under nominal programs, with a note on sessions that the model cannot take."""
     telling.stage("effects of causes")
     try:
         if isinstance(recorded, StationError):

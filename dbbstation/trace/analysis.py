@@ -83,10 +83,6 @@ def _step(columns: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np
     """Return the least-squares solution of few columns, shape (k,), or None.
 
     Normal equations suffice, since Gauss-Newton corrects rounding; short arcs are solved orthogonally.
-
-    Args:
-        columns: shape (k, n).
-        left: shape (n,).
     """
     normal = columns @ columns.T
     least, *_, most = np.linalg.eigvalsh(normal)

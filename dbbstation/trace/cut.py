@@ -229,13 +229,7 @@ def _first_below(t: NDArray[np.float64], length: NDArray[np.float64], circle: Ci
 
 
 def _edge(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle, first: int) -> float:
-    """Return an edge's time on the way in, halfway between outside and inside [s].
-
-    Args:
-        t: rising or falling, shape (n,) [s].
-        length: shape (n,) [mm].
-        first: first sample below half the feed-in.
-    """
+    """Return an edge's time on the way in, halfway between outside and inside [s]."""
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     after_s = np.abs(t - t[first]) * np.where(np.arange(len(t)) < first, -1.0, 1.0)
     outside = (after_s > -OUTSIDE_FEEDINGS * feeding_s) & (after_s < -feeding_s)

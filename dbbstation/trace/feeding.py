@@ -64,12 +64,7 @@ def feeding_ways(
 def _way(
     recording: Recording, circle: Circle, behind_s: NDArray[np.float64], along_deg: NDArray[np.float64]
 ) -> tuple[float, float] | None:
-    """Return way and standard uncertainty at one corner [µm].
-
-    Args:
-        behind_s: time on the circle's side of the edge, shape (n,).
-        along_deg: arc from the corner, shape (n,).
-    """
+    """Return way and standard uncertainty at one corner [µm]."""
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     outside = recording.length_mm[(behind_s > -OUTSIDE_FEEDINGS * feeding_s) & (behind_s < -feeding_s)]
     chosen = (along_deg > LEFT_OUT_DEG) & (along_deg < LEFT_OUT_DEG + READ_DEG)

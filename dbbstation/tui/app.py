@@ -464,11 +464,7 @@ class StationApp(App[None]):
             self.leave(sure=True)
 
     def _ask_temperature(self, then: Callable[[], None], back: Callable[[], None] = lambda: None) -> None:
-        """Ask for the shop's temperature, note it, then go on; one question at a time.
-
-        Args:
-            back: called in place of `then` where the question is left.
-        """
+        """Ask for the shop's temperature, note it, then go on; one question at a time."""
         if isinstance(self.screen, TemperatureQuestion):
             return
 

@@ -251,9 +251,6 @@ def _approached(
     Early residuals are curvature. Taken for noise they would hide visible directions. The noise is therefore read only
     when steps no longer halve the residual.
 
-    Args:
-        left: residual at the start per run, shape (n,) [mm].
-
     Returns:
         Values of all columns, shape (k,), and blocks of the circles about them.
     """

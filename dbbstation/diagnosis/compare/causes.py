@@ -30,7 +30,7 @@ it did in A: the sine of the angle whose cosine is `EQUIVALENT`, 4.5 %."""
 
 @dataclass(frozen=True)
 class When:
-    """A way of acting; differences are B less A.
+    """A way of acting; differences are B minus A.
 
     Attributes:
         label: empty for a change common to both.
@@ -47,11 +47,7 @@ IN_B = When("in B", 0.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """One error source over both sessions.
-
-    Attributes:
-        share: plausible size of a change.
-    """
+    """One error source over both sessions."""
 
     source: ErrorSource
     sides: Sides
@@ -105,7 +101,7 @@ class Change:
         )
 
     def columns(self, point: tuple[float, ...]) -> NDArray[np.float64]:
-        """Return reading B less A by amplitude and way, shape (n, p)."""
+        """Return reading B minus A by amplitude and way, shape (n, p)."""
         of_a = self._of(0, point) if len(self._whens) > 1 else None
         of_b = self._of(1, point)
         found = []
@@ -117,7 +113,7 @@ class Change:
         return np.hstack(found)
 
     def _at(self, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the same about amplitudes, for effects that are not proportional."""
+        """Return the same about amplitudes, for nonproportional effects."""
         found = self.columns(point)
         width = len(amplitudes) // len(self._whens)
         for k in np.flatnonzero(amplitudes).tolist():
@@ -131,7 +127,6 @@ class Change:
         return found
 
     def _effect(self, side: int, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a source's effect in one session, shape (n,)."""
         pieces, sides = [], self.sides
         for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
             values = self._values(point, np.split(amplitudes, self._sets)[group])
@@ -187,7 +182,6 @@ class Change:
         return shown or values[:1]
 
     def _of(self, side: int, point: tuple[float, ...]) -> NDArray[np.float64]:
-        """Return the effect of all sets' amplitudes in one session, shape (n, p)."""
         count = len(self._amplitudes)
         values = self._values(point, np.zeros(count))
         amplitudes = [k for k, p in enumerate(self._parameters) if not p.grid]
@@ -202,7 +196,6 @@ class Change:
     def _discrepancy(
         self, effect: NDArray[np.float64], point: tuple[float, ...], amplitudes: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return formula slack in both sessions."""
         count = len(self._amplitudes) * self._sets
         total = [np.zeros(count), np.zeros(count)]
         for when, own in zip(self._whens, np.split(amplitudes, len(self._whens)), strict=True):

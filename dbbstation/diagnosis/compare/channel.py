@@ -1,7 +1,7 @@
 """Two sessions as a channel: readings of A simulate B, circle by circle.
 
-Base: stated balls, bars and turn begins. Causes: changed sources, displaced balls and bars, a moved jig. Unmodelled: over
-angle and other variables, on struts, and own curves of tests or runs.
+Base: stated balls, bars and turn begins. Causes: changed sources, displaced balls and bars, a moved jig. Unmodelled:
+over angle and other variables, on struts, and separate curves of tests or runs.
 """
 
 from __future__ import annotations
@@ -37,12 +37,7 @@ RESOLUTION_MM = 1e-5
 
 
 def channel_of(sides: Sides, sources: Sequence[ErrorSource]) -> Channel:
-    """Put two sessions on a channel.
-
-    Args:
-        sides: at common angles.
-        sources: candidates with their needs in both; geometry is always included.
-    """
+    """Put two sessions on a channel."""
     variables, runs = variables_of(sides), samples_of_b(sides)
     # A run is travelled at one speed: its rows are its clock.
     time = np.concatenate([np.arange(rows.stop - rows.start, dtype=np.float64) for rows in sides.blocks])

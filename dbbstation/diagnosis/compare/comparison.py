@@ -1,7 +1,4 @@
-"""Compare two sessions: whether, where, in what form and by which cause they differ.
-
-B less A is a channel of `dbbstation.inference`.
-"""
+"""Compare two sessions: whether, where, in what form and by which cause they differ."""
 
 from __future__ import annotations
 
@@ -55,13 +52,12 @@ CENTRED_SHAPE = 25.0
 
 @dataclass(frozen=True, eq=False)
 class RunDifference:
-    """A run of B less that of A.
+    """A run of B minus that of A.
 
     Attributes:
         smooth_mm: up to the highest smooth harmonic, shape (s,).
-        noise_mm: rms of noise in it.
+        noise_mm: rms noise of the smooth difference.
         found_mm: by found causes, shape (s,).
-        centre_mm: move of the centre, x and y.
         centre_sigma_mm: standard deviation by noise and stated balls.
         radial_mm: change of mean length.
         radial_sigma_mm: by noise, stated bars, and balls of raised bars.
@@ -101,9 +97,8 @@ class Comparison:
     """Everything found.
 
     Attributes:
-        runs: in session A's order.
         trial: evidence of groups of tests; without predictions if nothing was found or groups are few.
-        held_out: predictions by stated set-up, and with findings [mm].
+        held_out: predictions with the stated set-up, and with findings [mm].
         effects: of the best set, largest first, by name.
         noticed_mm: detectable change of any strut's length.
         lacking: sources not tested, with reasons.
@@ -188,10 +183,7 @@ def compare(
     """Compare two sessions.
 
     Args:
-        machine: nominal.
-        a: accepted runs.
-        b: accepted runs.
-        sources: candidates with their needs.
+        sources: candidates whose needs both sessions meet.
         lacking: sources not tested, with reasons.
         hold_out: choose anew without each group of tests.
 
@@ -281,7 +273,6 @@ def _run(
 
 
 def _refuse_centred(name: str, runs: Sequence[Observation]) -> None:
-    """Refuse a session with all circles centred by software."""
     if len(runs) < 2:  # noqa: PLR2004 - one centre may be where it belongs
         return
     for run in runs:

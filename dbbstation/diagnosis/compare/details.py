@@ -31,7 +31,7 @@ class EffectOfCause:
 
     Attributes:
         share: of the total chi-square reduction, alone.
-        taken_up: share of squares that a kinematic calibration of B would absorb.
+        taken_up: share of squares that a kinematic calibration of B absorbs.
         opposite: share of squares odd in direction, over tests run both ways.
         test: of the largest effect.
         theta_deg: arc of at least half its peak, from and to.

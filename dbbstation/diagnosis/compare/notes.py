@@ -98,6 +98,5 @@ def _temperatures(pairs: Sequence[Pair]) -> list[str]:
 
 
 def _means(logs: Sequence[Mapping[str, NDArray[np.float64]]]) -> dict[str, float]:
-    """Return means of sensors logged by all runs [degC]."""
     sensors = set.intersection(*(set(log) for log in logs))
     return {sensor: float(np.mean([log[sensor].mean() for log in logs])) for sensor in sorted(sensors)}

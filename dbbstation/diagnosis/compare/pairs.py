@@ -40,7 +40,6 @@ class Pair:
     """A run of both sessions.
 
     Attributes:
-        a: one, or repeats to average.
         number: in its test and direction, from 1.
         a_mm: raw less commanded length of A at sector middles from +X, shape (s,).
     """
@@ -53,7 +52,7 @@ class Pair:
 
     @property
     def test(self) -> str:
-        """Name of the test."""
+        """Return the test's name."""
         return self.a[0].test
 
     @property
@@ -63,7 +62,7 @@ class Pair:
 
     @property
     def direction(self) -> Direction:
-        """Sense of travel."""
+        """Return the sense of travel."""
         return self.circle.direction
 
     @property
@@ -86,12 +85,12 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Matching:
-    """Which runs were put side by side.
+    """Runs paired for comparison.
 
     Attributes:
         pairs: in session A's order.
         not_comparable: equal names, different circles, with differences.
-        averaged: with reasons.
+        averaged: repeats that were averaged, with reasons.
     """
 
     pairs: tuple[Pair, ...]
@@ -144,8 +143,8 @@ def common_sectors(raws: Sequence[RawCircle]) -> int:
 class Sectors:
     """Moves samples of a turn to sector middles.
 
-    Samples are averaged and moved along the run's smooth curve, since 0.1 mm off centre changes 0.4 µm in a quarter
-    degree; noise is unchanged.
+    Samples move along the run's smooth curve before averaging, since 0.1 mm off centre changes 0.4 µm in a quarter
+    degree. Noise is unchanged.
 
     Attributes:
         there: filled sectors, shape (q,).
@@ -197,7 +196,6 @@ def _by_run(runs: Sequence[Observation]) -> dict[tuple[str, str], list[Observati
 
 
 def _unlike(runs: Sequence[Observation]) -> str:
-    """Return differences of circles of one name; may be empty."""
     first = runs[0].raw.circle
     for circle in (run.raw.circle for run in runs[1:]):
         pairs = [

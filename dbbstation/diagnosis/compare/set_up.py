@@ -92,7 +92,6 @@ def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, NDArray[np.flo
 
 
 def _sd(source: ErrorSource, motion: Motion) -> NDArray[np.float64]:
-    """Return a random effect's stated size; large for unknown balls [mm, deg]."""
     stated = source.stated_mm(motion)
     known = np.zeros(0) if stated is None else stated
     lost = source.name == "mounting" and motion.setup is not None and not motion.setup.place_known
@@ -150,7 +149,7 @@ def _outsize(
 
 
 def jig_laws(sides: Sides, runs: Sequence[Samples]) -> list[Law]:
-    """Return shift and rotations of all balls together."""
+    """Return shift and rotations common to all balls."""
     samples = sides.averaged(1, [run.gain[TABLE] for run in runs])
     seen = np.flatnonzero(np.abs(samples).max(axis=0) > NOTHING)
     names = [f"{name}_mm" for name in "xyz"] + [f"turn_{name}_rad" for name in "xyz"]

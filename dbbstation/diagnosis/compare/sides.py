@@ -44,14 +44,14 @@ class Sides:
 
     @classmethod
     def of(cls, machine: Machine, pairs: Sequence[Pair]) -> Sides:
-        """Take runs that were put side by side."""
+        """Take paired runs."""
         a = tuple(_thinned(pair.a[0], pair) for pair in pairs)
         b = tuple(_thinned(pair.b[0], pair) for pair in pairs)
         return cls(machine, tuple(pairs), (a, b))
 
     @cached_property
     def motions(self) -> tuple[tuple[Motion, ...], tuple[Motion, ...]]:
-        """Motions of these runs."""
+        """Return motions of these runs."""
         a, b = ([run.motion() for run in runs] for runs in self.runs)
         return tuple(a), tuple(b)
 
@@ -69,7 +69,7 @@ class Sides:
 
     @cached_property
     def blocks(self) -> tuple[slice, ...]:
-        """Rows of each pair."""
+        """Return rows of each pair."""
         ends = np.cumsum([0, *(len(order) for order in self.orders)])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
@@ -78,12 +78,7 @@ class Sides:
         return np.concatenate([values_of(pair)[order] for pair, order in zip(self.pairs, self.orders, strict=True)])
 
     def averaged(self, side: int, values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Return values along one session's motions as rows, shape (n, ...).
-
-        Args:
-            side: 0 for A, 1 for B.
-            values: per pair, in order of travel, shape (m, ...).
-        """
+        """Return values along one session's motions as rows, shape (n, ...)."""
         found = []
         for sectors, order, one in zip(self._sectors[side], self.orders, values, strict=True):
             middles = sectors.at_middles(one.reshape(len(one), -1))
@@ -121,6 +116,5 @@ class Sides:
 
 
 def _thinned(run: Observation, pair: Pair) -> Observation:
-    """Return the run at fewer angles on the plan's circle."""
     raw, most = run.raw, FINER * len(pair.theta_deg)
     return replace(run, raw=averaged(raw, most) if len(raw) > most else raw, commanded=None)

@@ -28,7 +28,7 @@ SAME_RHYTHM = 0.999
 
 
 def variables_of(sides: Sides) -> tuple[Variable, ...]:
-    """Return model-free variables: angle, place, tilt, time."""
+    """Return variables for unmodelled effects: angle, place, tilt, time."""
     circles = [pair.circle for pair in sides.pairs]
     per_run = [
         ("place in X", "mm", Kind.LENGTH, [circle.centre_mm[0] for circle in circles]),
@@ -43,7 +43,6 @@ def variables_of(sides: Sides) -> tuple[Variable, ...]:
 
 
 def _times(sides: Sides) -> list[Variable]:
-    """Return time in each session; one if the rhythm is equal."""
     found = {}
     for side, name in ((1, "time in B"), (0, "time in A")):
         times = [motion.time_s[motion.kept] for motion in sides.motions[side] if motion.time_s is not None]
@@ -56,7 +55,7 @@ def _times(sides: Sides) -> list[Variable]:
 
 
 def of_readings(variables: Sequence[Variable], sides: Sides, time: NDArray[np.float64]) -> list[Pattern]:
-    """Return effects on the reading; speed only shows as direction."""
+    """Return effects on the reading; speed appears only as direction."""
     every = patterns(variables, sides.blocks, time, None)
     return [pattern for pattern in every if pattern.family is not Family.SPEED]
 
@@ -102,7 +101,7 @@ def _pattern(shape: Shape, sides: Sides, runs: Sequence[Samples]) -> Pattern:
 
 
 def of_each_test(sides: Sides) -> Pattern:
-    """Return own curves over the angle of every test or run, or of one."""
+    """Return separate curves over the angle, for every test or run, or for one."""
     angle = sides.rows(lambda pair: pair.theta_deg)
     waves = Lobes(OWN_LOBES).columns(angle)
     tests = list(dict.fromkeys(pair.test for pair in sides.pairs))

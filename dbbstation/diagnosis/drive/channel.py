@@ -58,11 +58,10 @@ SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class DriveChannel:
-    """A channel and what its laws are of.
+    """A channel and the sources of its laws.
 
     Attributes:
-        scale: with waves of a first look.
-        sources: by name.
+        scale: with waves found by a first search.
         shortest_wave_mm: searched; infinite without search.
     """
 
@@ -87,9 +86,7 @@ def drive_channel(
     """Make the channel of recordings.
 
     Args:
-        sources: to compare.
         base: parameters refitted with every hypothesis.
-        refused: impossible laws.
     """
     variables = _variables(recordings)
     motion = recordings.motion[:, [(MASS, VISCOUS).index(name) for name in base]]
@@ -134,8 +131,8 @@ def drive_channel(
 def _beyond(straight: NDArray[np.float64], patterns: Iterator[Pattern]) -> Iterator[Pattern]:
     """Return curves orthogonal to base and single-parameter causes, which they contain.
 
-    Curves near standstill stay, lest friction extend them to full speed. Over position the whole curve also competes with
-    a name plus rest.
+    Curves near standstill are not orthogonalised, because friction would extend them to full speed. Over position the
+    whole curve also competes with a named law plus remainder.
     """
     axes = _axes(straight)
     for pattern in patterns:
@@ -208,7 +205,7 @@ def _law(
 
 
 def _departure(effect: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return formula slack per row: effect times smooth functions, and shifts by a sample for reversals, shape (m, q)."""
+    """Return formula slack, shape (m, q): effect times smooth functions, and shifts by a sample for reversals."""
     late = np.gradient(effect)
     return np.column_stack([modulated([effect[:, None]], [along[:, None]], None), late, np.gradient(late)])
 
@@ -283,7 +280,6 @@ def _curve(
     values: Callable[[Signals], NDArray[np.float64]],
     factor: Callable[[Signals], NDArray[np.float64]] | None,
 ) -> NDArray[np.float64]:
-    """Return a curve's functions at every sample, shape (n, p)."""
     found = spline.columns(values(signals))
     return found if factor is None else found * factor(signals)[:, None]
 
@@ -299,7 +295,7 @@ def _starts(recordings: Recordings) -> list[float]:
 def _first_look(recordings: Recordings, smooth: NDArray[np.float64]) -> tuple[Scale, float]:
     """Return sizes with the strongest position waves, and the shortest searched [mm].
 
-    At usual speed that passes in a cut-off period. Waves are picked successively.
+    The shortest wave passes in a cut-off period at usual speed. Waves are found successively.
     """
     scale = recordings.scale
     speed = float(np.median(np.abs(recordings.at(lambda s: s.speed_m_s))))

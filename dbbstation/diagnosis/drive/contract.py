@@ -26,14 +26,11 @@ class Scale:
     """Sizes over all recordings, for comparable amplitudes.
 
     Attributes:
-        force_n: rms in the band.
-        speed_m_s: greatest.
         mean_m: position at compared samples.
         cutoff_hz: of the band.
         reverses: some recording changes direction.
         both_ways: enough samples each way.
         waves_per_m: strongest residual waves over position [1/m].
-        waves_tried: independent waves tried.
     """
 
     force_n: float
@@ -51,7 +48,7 @@ class Scale:
 
     @property
     def travel_m(self) -> float:
-        """Between the ends of the travel [m]."""
+        """Return the distance between the ends of travel [m]."""
         return self.high_m - self.low_m
 
 
@@ -60,8 +57,7 @@ class DriveParameter:
     """One number of a cause.
 
     Attributes:
-        name: unique, ending with its unit.
-        plausible: one standard deviation, in that unit.
+        plausible: one standard deviation, in the name's unit.
         meaning: one line with the sign.
         positive: cannot be negative.
     """
@@ -78,11 +74,9 @@ class DriveForm:
     """One form of a cause.
 
     Attributes:
-        amplitudes: p of them.
         columns: force per amplitude, shape (n, p), at values of `shapes`.
         shapes: nonlinear numbers.
         grids: start values, rising.
-        label: of a coexisting form; may be empty.
         tried: independent forms of the choice.
     """
 
@@ -111,9 +105,5 @@ class DriveSource(ABC):
         """Return forms; none if invisible in these recordings."""
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
-        """Return whether values can be this cause.
-
-        Args:
-            values: of the whole model, by name.
-        """
+        """Return whether values can be this cause."""
         return True

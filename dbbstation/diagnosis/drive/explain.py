@@ -34,14 +34,7 @@ LOOKED_AT = 60
 
 @dataclass(frozen=True, eq=False)
 class ExplainedDrive:
-    """What the comparison came to.
-
-    Attributes:
-        before: mass and viscous friction.
-        after: best hypothesis.
-        refused: impossible laws with reasons.
-        dropped: negative base parameters, and their meaning.
-    """
+    """The outcome of the comparison."""
 
     drive: DriveChannel
     settled: Settled
@@ -116,7 +109,7 @@ def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
 def _impossible(drive: DriveChannel, fitted: DriveFit) -> dict[str, str]:
     """Return impossible laws by their sources.
 
-    Amplitudes below zero are probably zero.
+    Negative amplitudes are probably zero.
     """
     values = fitted.all_values()
     found = {}

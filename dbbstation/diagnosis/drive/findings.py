@@ -33,7 +33,6 @@ class CausePart:
     """One wave, pulse or form.
 
     Attributes:
-        label: may be empty.
         t_s: first and last time of a pulse; else None.
     """
 
@@ -53,15 +52,15 @@ class Complement:
 
 @dataclass(frozen=True, kw_only=True)
 class DriveFinding:
-    """What is said of one cause.
+    """Finding on one cause.
 
     Attributes:
         ambiguous_with: causes of about equal explanation.
-        concealed: share of squares absorbed by mass and viscous friction.
+        concealed: share of squares that mass and viscous friction absorb.
         unconcealed_rms_n: beyond them.
         probability: of it or an equivalent.
-        gain: log Bayes factor beside others.
-        parameters: fitted, or best amplitudes, whose uncertainty bounds what could hide.
+        gain: log Bayes factor beside the others.
+        parameters: fitted; of an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
         parts: waves, pulses or forms if several.
         at_end: parameters at the end of their grid.
         complement: alternative stretches to `parts`.
@@ -94,7 +93,7 @@ class UnexplainedForce:
     Attributes:
         text: such as `curve over speed`.
         rms_n: beside mass and viscous friction.
-        low, high: range of the variable in which it is at least half as large as anywhere; `from` and `to` in JSON.
+        low, high: range of the variable with at least half of the largest effect; `from` and `to` in JSON.
     """
 
     text: str
@@ -113,8 +112,6 @@ class ForceLocation:
     Attributes:
         direction: `forwards` or `backwards`.
         at_reversal: in or beside a reversal or stop.
-        variable: or None.
-        share: of squares.
         peak_n: measured minus model.
     """
 
@@ -133,7 +130,6 @@ class ModelStep:
     """A step of models, and its prediction of a held-back stretch.
 
     Attributes:
-        added: None for the base.
         relative_force_error: |F - F_model| / |F| on the stretch.
         parameters: without the stretch.
     """
@@ -146,7 +142,7 @@ class ModelStep:
 
 @dataclass(frozen=True)
 class ForceErrors:
-    """With mass and viscous friction (before), and all findings (after)."""
+    """Errors with mass and viscous friction (before), and all findings (after)."""
 
     before: float
     after: float
@@ -154,7 +150,7 @@ class ForceErrors:
 
 @dataclass(frozen=True)
 class HeldBack:
-    """How models predict a stretch that was held back.
+    """Prediction errors on a held-back stretch.
 
     Attributes:
         relative_force_error: |F - F_model| / |F|.
@@ -186,7 +182,6 @@ class UnexplainedForces:
 
     Attributes:
         probability: by noise.
-        variable: or None.
         effects: unnamed, largest first.
     """
 
@@ -256,16 +251,11 @@ class DriveFindings:
     """Everything found of one strut drive.
 
     Attributes:
-        mismatch: beyond mass and viscous friction.
-        probability: by chance.
+        mismatch: present beyond mass and viscous friction.
         misfit_rms_n: beyond noise.
-        held_back: predictions of a stretch.
         parameters: base first.
         parameter_shift: bias by missing physics.
         friction: Coulomb and viscous by direction; may be empty.
-        locations: base misfit, largest share first.
-        sources: best first.
-        cancelling: or None.
         held_out_rms_n: None if not tested.
         noticed: `notes` in JSON.
         table: compared samples by column.

@@ -38,13 +38,7 @@ IMPOSSIBLE_SIGMA = 3.0
 
 @dataclass(frozen=True, eq=False)
 class DriveFit:
-    """A fit: base, then amplitudes and slack by member.
-
-    Attributes:
-        samples: shape (m, k).
-        values: shape (k,).
-        covariance: shape (k, k).
-    """
+    """A fit: base, then amplitudes and slack by member."""
 
     drive: DriveChannel
     members: tuple[Member, ...]
@@ -54,7 +48,7 @@ class DriveFit:
 
     @property
     def base(self) -> dict[str, Value]:
-        """Base parameters by name."""
+        """Return base parameters by name."""
         sigma = np.sqrt(np.diag(self.covariance))
         return {
             name: Value(float(self.values[k]), float(sigma[k]), BASE_UNITS[name])
@@ -105,7 +99,7 @@ class DriveFit:
         return {k: (low, high) for k, (low, high) in ends.items() if not low < found[k].value < high}
 
     def all_values(self) -> dict[str, float]:
-        """Values of all parameters of base and laws by name."""
+        """Return all parameters of base and laws by name."""
         found = {name: value.value for name, value in self.base.items()}
         for member in self.members:
             if member.cause.name in self.drive.of_law:
@@ -137,11 +131,7 @@ class DriveFit:
 def fit(
     drive: DriveChannel, settled: Settled, members: Sequence[Member], rows: NDArray[np.bool_] | None = None
 ) -> DriveFit:
-    """Fit base and members under priors.
-
-    Args:
-        rows: shape (m,); None: all.
-    """
+    """Fit base and members under priors."""
     channel, bank = drive.channel, settled.bank
     samples = np.hstack([channel.base.samples, *(bank.samples(member.columns) for member in members)])
     rows = np.ones(len(samples), dtype=bool) if rows is None else rows
@@ -195,9 +185,9 @@ def _solved(
 def measured(drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> DriveFit:
     """Return the fit for reported values, with conservative uncertainties.
 
-    Whitened rows weigh force changes, where friction laws are least exact. Ordinary least squares suffers less and is
-    taken if both differ beyond noise [Hausman, Specification tests in econometrics, Econometrica 46 (1978) 1251, sec. 2],
-    with coloured covariance [Huber, Proc. 5th Berkeley Symp. 1 (1967) 221].
+    Whitening emphasises force changes, where friction laws are least exact. Ordinary least squares is less sensitive
+    and is taken if both differ beyond noise [Hausman, Specification tests in econometrics, Econometrica 46 (1978) 1251,
+    sec. 2], with coloured covariance [Huber, Proc. 5th Berkeley Symp. 1 (1967) 221].
     """
     bank, sd = settled.bank, _prior_sd(drive, members)
     white = fit(drive, settled, members)
@@ -233,8 +223,8 @@ def _widened(
 ) -> DriveFit:
     """Return the fit with uncertainties widened by omitted stretches and half the band.
 
-    Noise alone would understate them. [Efron and Stein, The jackknife estimate of variance, Ann. Statist. 9 (1981) 586,
-    eq. 1.5]
+    Noise alone understates them [Efron and Stein, The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq.
+    1.5].
     """
     stretch = np.arange(len(rows)) * STRETCHES // len(rows)
     each = [triangle_of(rows[stretch == k]) for k in range(STRETCHES)]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> tuple[HeldOutForce, ChosenWithoutParts]:
-    """Hold back parts: whole recordings from five on, else ten stretches, with the filter's reach excluded."""
+    """Hold back whole recordings if there are five, else ten stretches without the filter's reach."""
     channel = drive.channel
     parts = parts_of(channel)
     gap = int(np.ceil(GAP_PERIODS / drive.scale.cutoff_hz / drive.recordings.samples_apart_s))
@@ -68,7 +68,6 @@ GAP_PERIODS = 0.5
 
 
 def _left(drive: DriveChannel, settled: Settled, of_chosen: RowsKept, members: Sequence[Member]) -> NDArray[np.float64]:
-    """Return residuals of kept-row fits over all samples, shape (m,) [N], without events in time."""
     values, columns = of_chosen.solved(members)
     first = drive.channel.base.samples.shape[1]
     used = np.ones(len(values), dtype=bool)

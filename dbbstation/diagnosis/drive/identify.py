@@ -73,9 +73,8 @@ def identify(
     """Identify a drive beyond mass and viscous friction.
 
     Args:
-        sources: to look for.
         cutoff_hz: of the band; None: by the data.
-        hold_out: test on unused parts; takes up to twice as long again.
+        hold_out: test on unused parts; doubles the time.
 
     Raises:
         CalibrationError: the recordings carry no identification.
@@ -152,7 +151,6 @@ def identify(
 def _table(
     recordings: Recordings, base_n: NDArray[np.float64], model_n: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """Return compared samples by column with unit."""
     return {
         "t_s": recordings.time_s,
         "position_mm": 1e3 * recordings.at(lambda s: s.position_m),
@@ -165,7 +163,6 @@ def _table(
 
 
 def _cancelling(explained: ExplainedDrive) -> Cancelling | None:
-    """Return cancelling forces [N], or None."""
     settled, drive = explained.settled, explained.drive
     base, patterns = settled.channel.base, settled.bank.patterns
     shown = {name: source_of(drive, patterns, name) for name in settled.best.names}
@@ -205,7 +202,6 @@ def _number(value: Value, *, is_known: bool) -> DriveValue:
 
 
 def _is_known(viscous: Value, speed_m_s: float, force_n: float) -> bool:
-    """Return whether viscous friction is known relative to itself or to the top-speed force."""
     return viscous.uncertainty < VAGUE * max(viscous.value, 0.1 * force_n / speed_m_s)
 
 
@@ -216,7 +212,6 @@ def _left_of_base(explained: ExplainedDrive) -> LeftOver:
 
 
 def _beyond(residual: NDArray[np.float64], sigma: float) -> float:
-    """Return the rms beyond noise."""
     return float(np.sqrt(max(float(np.mean(residual**2)) - sigma**2, 0.0)))
 
 
@@ -329,7 +324,6 @@ def _with_weight(finding: DriveFinding, values: dict[str, Value]) -> DriveFindin
 
 
 def _curve(explained: ExplainedDrive) -> FrictionCurve:
-    """Return fitted friction against speed."""
     drive, fitted = explained.drive, explained.after
     recordings, scale = drive.recordings, drive.scale
     speeds = recordings.at(lambda s: s.speed_m_s)

@@ -1,4 +1,4 @@
-"""What recordings cannot show: acceleration, speeds, reversals."""
+"""What recordings cannot determine: acceleration, speeds, reversals."""
 
 from __future__ import annotations
 
@@ -24,13 +24,7 @@ VAGUE = 0.3
 
 @dataclass(frozen=True)
 class DriveLimits:
-    """What cannot be distinguished.
-
-    Attributes:
-        accelerates: beyond acceleration noise.
-        several_speeds: usual Coulomb and viscous friction are separable.
-        reverses: friction and constant load are separable.
-    """
+    """What cannot be distinguished."""
 
     accelerates: bool
     several_speeds: bool
@@ -40,7 +34,7 @@ class DriveLimits:
 def limits_of(explained: ExplainedDrive) -> DriveLimits:
     """Return the limits of the motion.
 
-    Coulomb friction must show beside mass, viscous friction and a delay, which ramps confuse.
+    Coulomb friction must be significant beside mass, viscous friction and a delay, which ramps confuse.
     """
     recordings, bank = explained.drive.recordings, explained.settled.bank
     acceleration = recordings.motion[:, 0]

@@ -1,11 +1,11 @@
-"""How much every sample of a recording weighs in the comparison, and what that does to the noise.
+"""Weights of a recording's samples in the comparison, and their effect on noise.
 
-While a drive stands, friction is a reaction: it is whatever holds the drive, and no law gives it. Low-passes are linear. A sum of
-columns that holds at every sample where a weight is not zero therefore holds for what they leave of weighted columns,
+Friction at standstill is a reaction that no law determines. If a sum of columns holds wherever a weight is nonzero, it
+also holds for low-passed weighted columns,
 
-    h * (w F) = sum of theta_k h * (w phi_k),
+h * (w F) = sum of theta_k h * (w phi_k),
 
-exactly, whatever the force is where w = 0. Divided by h * w this is a mean over what moves about a sample. [Normalized
+exactly, whatever the force at w = 0. Divided by h * w this is a local mean over moving samples. [Normalized
 convolution: Knutsson and Westin, Normalized and differential convolution, CVPR 1993, 515, eq. 4]
 """
 
@@ -78,12 +78,7 @@ def weights(unknown: NDArray[np.bool_], rise: int) -> NDArray[np.float64]:
 def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_s2: float, most: int) -> int:
     """Return the rise that limits edge noise in the acceleration.
 
-    Sharp edges admit position noise that neighbours would cancel.
-
-    Args:
-        noise_m: white, of position.
-        cutoff_hz: of the comparison.
-        allowed_m_s2: standard deviation.
+    Sharp edges admit position noise that otherwise cancels.
     """
     response = impulse_response(rate_hz, cutoff_hz)
     at = np.arange(len(response)) - len(response) // 2
@@ -100,10 +95,6 @@ def edge_noise_m_s2(
     weight: NDArray[np.float64], kept: NDArray[np.int64], noise_m: float, rate_hz: float, cutoff_hz: float
 ) -> NDArray[np.float64]:
     """Return the excess acceleration noise of compared samples.
-
-    Args:
-        weight: shape (n,).
-        kept: compared samples, shape (m,).
 
     Returns:
         shape (m,) [m/s²].

@@ -20,11 +20,7 @@ DRIFT = "friction-drift"
 
 
 def source_of(drive: DriveChannel, patterns: Mapping[str, Pattern], name: str) -> str:
-    """Return a member's source; empty if none.
-
-    Args:
-        patterns: by name.
-    """
+    """Return a member's source; empty if none."""
     if name in drive.of_law:
         return drive.of_law[name][0].name
     pattern = patterns.get(name)

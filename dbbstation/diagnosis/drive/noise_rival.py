@@ -1,7 +1,7 @@
 """Whether stretches in time are correlated noise.
 
-Any-colour noise would absorb slow friction laws, so causes compete beside first-order noise. Lawless stretches alone
-compete with any colour.
+Noise of any colour would absorb slow friction laws, so causes compete beside first-order noise. Stretches without a law
+compete with noise of any colour.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def probability_beside_noise(settled: Settled) -> float:
-    """Return the stretches' probability against any-colour noise beside other members.
+    """Return the stretches' probability against noise of any colour beside other members.
 
     Noise is measured beside members [`Bank.measure`], with parameter cost and prior odds.
     """

@@ -33,7 +33,6 @@ class Edges:
     """Edges of stretches.
 
     Attributes:
-        count: within recordings.
         at_turns: at starts, stops or reversals.
         share: of time there, strictly between 0 and 1.
     """
@@ -46,7 +45,7 @@ class Edges:
     def pushed(self) -> float:
         """Return the probability that edges ignore the motion, against a wrong law at turns.
 
-        [binomial likelihood, uniform prior], prior odds of one in twenty for the latter.
+        Binomial likelihood, uniform prior; prior odds of a wrong law are one in twenty.
         """
         turns, others = self.at_turns + 1.0, self.count - self.at_turns + 1.0
         anywhere = self.at_turns * np.log(self.share) + (self.count - self.at_turns) * np.log1p(-self.share)
@@ -56,11 +55,7 @@ class Edges:
 
 
 def edges_of(recordings: Recordings, parts: Sequence[CausePart]) -> Edges:
-    """Where stretches of time begin and end.
-
-    Args:
-        parts: from `pulse_parts`.
-    """
+    """Return where stretches of time begin and end."""
     times = np.array([edge for part in parts for edge in part.t_s or ()])
     times = times[(times > recordings.time_s[0]) & (times < recordings.time_s[-1])]
     every = np.concatenate([one.turns[one.kept[0] : one.kept[-1]] for one in recordings.signals])
@@ -81,11 +76,7 @@ def _at_turns(recordings: Recordings, times: NDArray[np.float64]) -> NDArray[np.
 
 
 def distinct_pushes(parts: Sequence[CausePart]) -> int:
-    """Return the number of distinct sizes.
-
-    Args:
-        parts: from `pulse_parts`.
-    """
+    """Return the number of distinct sizes."""
     return distinct_sizes(_sizes_of(parts))
 
 
@@ -113,9 +104,6 @@ def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[CausePa
     """Return stretches whose force differs from their surroundings.
 
     Overlapping stretches become levels; neighbours within `APART` standard uncertainties merge.
-
-    Args:
-        names: stretches of the best hypothesis.
     """
     # Neighbouring levels have most of their uncertainty in common, which factors for each of them would not know.
     settled, recordings = explained.settled, explained.drive.recordings

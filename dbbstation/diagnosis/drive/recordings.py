@@ -54,7 +54,7 @@ class Recordings:
 
     @cached_property
     def blocks(self) -> tuple[slice, ...]:
-        """Rows of each recording."""
+        """Return rows of each recording."""
         ends = np.cumsum([0, *(len(one.kept) for one in self.signals)])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
@@ -65,15 +65,12 @@ class Recordings:
 
     @cached_property
     def motion(self) -> NDArray[np.float64]:
-        """Return band acceleration [m/s²] and speed [m/s], shape (m, 2), from the unfiltered position."""
+        """Return band acceleration [m/s²] and speed [m/s] from the unfiltered position, shape (m, 2)."""
         return self.compared(lambda s: np.column_stack(derivatives(s.measured_m, s.rate_hz)[::-1]))
 
     @cached_property
     def lost_share(self) -> float:
-        """Return the acceleration's loss by finite differences.
-
-        Over one and two samples it is (w h)²/12 and (2 w h)²/12.
-        """
+        """Return the acceleration's loss by finite differences, (w h)²/12 and (2 w h)²/12 over one and two samples."""
         over_one = self.motion[:, 0]
         over_two = self.compared(lambda s: acceleration_over_two(s.measured_m, s.rate_hz))
         return max(float(over_one @ (over_one - over_two)) / 3.0 / max(float(over_one @ over_one), 1e-300), 0.0)
@@ -96,7 +93,7 @@ class Recordings:
 
     @cached_property
     def scale(self) -> Scale:
-        """Sizes."""
+        """Return sizes over all recordings."""
         return Scale(
             force_n=float(np.sqrt(np.mean(self.force_n**2))),
             speed_m_s=float(np.abs(self.at(lambda s: s.speed_m_s)).max()),
@@ -190,5 +187,5 @@ def _refuse_wrong_sign(one: Recordings) -> None:
 
 
 def with_waves(scale: Scale, waves_per_m: tuple[float, ...], tried: float) -> Scale:
-    """Return sizes with waves of a first look."""
+    """Return sizes with waves of a first search."""
     return replace(scale, waves_per_m=waves_per_m, waves_tried=tried)

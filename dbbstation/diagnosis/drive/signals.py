@@ -1,10 +1,10 @@
 """Speed and acceleration from position, in the band of comparison.
 
 Inverse dynamic identification by least squares: zero-phase low-pass, central differences, and a common second low-pass
-with decimation for force and columns. Here force also passes the position's filter, so edges beyond the band cancel.
-[Gautier, Dynamic identification of robots with power model, ICRA 1997; Janot, Vandanjon and Gautier, A generic
-instrumental variable approach for industrial robot identification, IEEE TCST 22 (2014), sec. II-C] Friction reverses at
-once, so speed is read at full rate, and samples of standing drives or stuck channels have zero weight.
+with decimation for force and columns. [Gautier, Dynamic identification of robots with power model, ICRA 1997; Janot,
+Vandanjon and Gautier, A generic instrumental variable approach for industrial robot identification, IEEE TCST 22
+(2014), sec. II-C] Force also passes the position's filter, so edges beyond the band cancel. Friction reverses at once,
+so speed is computed at full rate. Samples at standstill or with stuck force have zero weight.
 """
 
 from __future__ import annotations
@@ -79,10 +79,9 @@ FEWEST = 60
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """An evenly sampled recording with its derivatives, and the way to the samples that are compared.
+    """An evenly sampled recording with derivatives and compared samples.
 
     Attributes:
-        t_s: shape (n,).
         position_m: by a local parabola.
         speed_m_s: its slope.
         acceleration_m_s2: of the low-passed position.
@@ -236,7 +235,6 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
 
 
 def _rests(standing: NDArray[np.bool_], force_n: NDArray[np.float64], rate_hz: float, step: int) -> list[str]:
-    """Return a note on rests longer than the filter."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(np.int64)))
     long = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > RESTS * step]
     if not long:
@@ -269,13 +267,11 @@ def acceleration_over_two(position_m: NDArray[np.float64], rate_hz: float) -> ND
 
 
 def _noise_floor(position_m: NDArray[np.float64], rate_hz: float) -> float:
-    """Return position noise per hertz [m²/Hz], from the upper quarter spectrum."""
     frequency, power = _spectrum(position_m, rate_hz)
     return float(np.median(power[frequency > 0.375 * rate_hz]))
 
 
 def _spectrum(position_m: NDArray[np.float64], rate_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return frequencies [Hz] and power [m²/Hz]."""
     frequency, power = welch(position_m, rate_hz, "hann", min(len(position_m), 4096))
     return np.asarray(frequency), np.asarray(power)
 
@@ -286,7 +282,7 @@ def _acceleration_noise(floor: float, cutoff_hz: float | NDArray[np.float64]) ->
 
 
 def _chosen_cutoff(position_m: NDArray[np.float64], rate_hz: float, floor: float) -> float:
-    """Return the widest band with significant acceleration [Hz], else one of a hundred samples."""
+    """Return the widest band with significant acceleration [Hz], else that of a hundred samples."""
     frequency, power = _spectrum(position_m, rate_hz)
     widest = min(rate_hz * WIDEST, HIGHEST_HZ)
     tried = np.geomspace(min(2.0, 0.5 * widest), widest, 40)

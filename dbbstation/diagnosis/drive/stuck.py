@@ -24,12 +24,7 @@ MOST_STUCK = 0.3
 def stuck_samples(
     force_n: NDArray[np.float64], t_s: NDArray[np.float64], moving: NDArray[np.bool_], name: str
 ) -> tuple[NDArray[np.bool_], list[str]]:
-    """Return samples with a stuck force, shape (n,), and notes; rest does not count.
-
-    Args:
-        force_n: shape (n,).
-        t_s: shape (n,).
-        moving: shape (n,).
+    """Return samples with a stuck force, shape (n,), and notes; standstill does not count.
 
     Raises:
         CalibrationError: the force never changes, or is stuck mostly.

@@ -24,18 +24,14 @@ def retreat_m(noise_m: float, resolution_m: float) -> float:
     """Return the retreat that is a turn [m].
 
     Args:
-        noise_m: of position, jitter at speed included.
-        resolution_m: rounding step, zero if unknown; below a step per sample it is no white noise.
+        noise_m: of position, including jitter at speed.
+        resolution_m: rounding step, zero if unknown; a step above the travel per sample is not white noise.
     """
     return RETREAT_SIGMA * noise_m + 1.5 * resolution_m
 
 
 def resolution_of(position: NDArray[np.float64]) -> float:
-    """Return the position's rounding step, zero if none.
-
-    Args:
-        position: shape (n,).
-    """
+    """Return the position's rounding step, zero if none."""
     steps = np.abs(np.diff(position))
     steps = steps[steps > 0.0]
     if not len(steps):
@@ -48,12 +44,7 @@ def resolution_of(position: NDArray[np.float64]) -> float:
 
 
 def turning_points(position_m: NDArray[np.float64], retreat: float) -> NDArray[np.int64]:
-    """Return turning samples, rising, shape (t,).
-
-    Args:
-        position_m: shape (n,).
-        retreat: [m].
-    """
+    """Return turning samples, rising, shape (t,)."""
     found: list[int] = []
     way = 0
     highest = lowest = 0
@@ -75,11 +66,7 @@ def turning_points(position_m: NDArray[np.float64], retreat: float) -> NDArray[n
 
 
 def ways(position_m: NDArray[np.float64], turns: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return direction, +1 or -1, shape (n,); zero without motion.
-
-    Args:
-        position_m: shape (n,).
-    """
+    """Return direction, +1 or -1, shape (n,); zero without motion."""
     ends = np.concatenate([[0], turns, [len(position_m) - 1]])
     signs = np.sign(np.diff(position_m[ends]))
     return np.repeat(signs, np.diff(np.concatenate([[0], turns, [len(position_m)]])))

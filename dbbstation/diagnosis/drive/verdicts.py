@@ -35,11 +35,9 @@ PREDICTS = frozenset({Verdict.IDENTIFIED, Verdict.HAPPENED})
 
 
 class Verdicts:
-    """Everything that is said of causes, named and unnamed.
+    """All verdicts on causes, named and unnamed.
 
     Args:
-        levels: whether a cause predicts is read off these.
-        several_speeds: Coulomb and viscous friction are separable.
         held: held-out predictions; None: not tested.
     """
 
@@ -62,7 +60,7 @@ class Verdicts:
     def named(self) -> list[str]:
         """Return the best hypothesis's named members by force.
 
-        Bayes factors would rank a newton of ripple above slower five newtons.
+        Bayes factors would rank a newton of ripple above five newtons of slow force.
         """
         best = self._explained.settled.best
         faint = {f.name for f in self._raw if f.rms < self._least_n}
@@ -78,7 +76,7 @@ class Verdicts:
     def predicting(self) -> list[str]:
         """Return members of `named` for prediction, largest first.
 
-        Of equivalent causes one predicts; causes ambiguous by themselves are fitted but do not predict.
+        One of several equivalent causes predicts; causes ambiguous by themselves are fitted but do not predict.
         """
         sure = {f.name for f in self.findings() if f.verdict in PREDICTS or f.ambiguous_with}
         return [name for name in self.named if self.source_of(name) in sure]
@@ -111,7 +109,6 @@ class Verdicts:
         return tuple(sorted(found, key=lambda e: -e.rms_n))
 
     def _source(self, finding: CauseFinding) -> str:
-        """Return a finding's source; empty without one."""
         return source_of(self._drive, self._explained.settled.bank.patterns, finding.name)
 
     def _finding(self, source: DriveSource) -> DriveFinding:
@@ -183,7 +180,7 @@ class Verdicts:
         return {name: f"{low:.3g} to {high:.3g}" for name, (low, high) in ends}
 
     def _as_sure_as_it_is(self, finding: CauseFinding) -> CauseFinding:
-        """Return a finding with values as certain as stretches and bands agree."""
+        """Return a finding with uncertainties widened until stretches and bands agree."""
         if finding.verdict is Verdict.IDENTIFIED and finding.family is Family.PULSES:
             return self._as_sure_as_its_edges(finding)
         if finding.verdict is not Verdict.IDENTIFIED or finding.name not in self._drive.of_law:
@@ -201,7 +198,7 @@ class Verdicts:
         return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
 
     def _as_sure_as_its_edges(self, finding: CauseFinding) -> CauseFinding:
-        """Return stretches that are few, no noise, and independent of motion."""
+        """Return stretches if they are few, not noise, and independent of motion."""
         if not self._pulses:
             why = "None of its stretches stands out of those beside it."
             return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
@@ -236,7 +233,6 @@ class Verdicts:
 
     @cached_property
     def _pulses(self) -> tuple[CausePart, ...]:
-        """Return levels of stretches independent of direction."""
         names = [
             f.name for f in self._raw if f.family is Family.PULSES and f.verdict in CLAIMS and f.name in self.named
         ]
@@ -264,7 +260,6 @@ class Verdicts:
         return tuple(sorted(names))
 
     def _could_be(self, one: str, other: str) -> bool:
-        """Return whether a law could replace another at its size."""
         laws = self._drive.of_law
         inside, outside = (one, other) if one in self._explained.settled.best.names else (other, one)
         if outside not in laws or inside not in laws or inside not in self._explained.settled.best.names:
@@ -305,7 +300,6 @@ class Verdicts:
         return Verdict.RULED_OUT, refused[0] if refused else not_needed
 
     def _hidden(self, source: DriveSource, own: Sequence[CauseFinding]) -> str:
-        """Return why a cause was invisible, or an empty text."""
         scale = self._drive.scale
         if faint := [f for f in own if self._is_member(f)]:
             return f"What it would explain, {faint[0].rms:.2g} N rms, is less than filters and differences leave of a perfect drive."

@@ -56,7 +56,7 @@ class RefittedOfSimulator:
         corrected: with the found terms.
         shift_over_u: in standard uncertainties of the first; None if unknown.
         confounded: R² on the found terms; zero without.
-        not_told_apart_from: indistinguishable parameters, or None.
+        not_told_apart_from: indistinguishable parameters.
     """
 
     name: str
@@ -72,7 +72,7 @@ class RefittedOfSimulator:
 
 @dataclass(frozen=True, eq=False)
 class SimulatorComparison:
-    """What is said of a simulator and its recordings.
+    """The answer on a simulator and its recordings.
 
     Attributes:
         findings: present or possible terms, present first.
@@ -80,9 +80,6 @@ class SimulatorComparison:
         held_out: None if not tested.
         as_simulated: measured less simulated at stated parameters, shape (n,).
         nonlinear: departure from linearity per standard uncertainty, by term; nan without budget.
-        not_asked: with reasons.
-        separations: proposals.
-        stopped: may be empty.
     """
 
     model: Model
@@ -101,7 +98,7 @@ class SimulatorComparison:
 
     @property
     def work(self) -> SimulationRuns:
-        """Simulations."""
+        """Return the number of simulations."""
         return self.base.work
 
     @property
@@ -111,7 +108,7 @@ class SimulatorComparison:
 
     @property
     def is_there(self) -> bool:
-        """Return whether anything is missing, with an unfinished search's next term."""
+        """Return whether anything is missing, including an unfinished search's next term."""
         next_in = bool(self.stopped) and bool(self.found.settled.best.members)
         return bool(self.terms) or not self.left.is_noise or next_in
 
@@ -139,7 +136,6 @@ def find(
     """Find what a simulator lacks, and at which port.
 
     Args:
-        own: own physics.
         hold_out: choose anew without each part; takes most of the time.
         matters: size of interest, in the first output's unit; None: the refitted residual.
 
@@ -167,7 +163,6 @@ def find(
 
 
 def _scales(work: SimulationRuns, stated: FittedState) -> NDArray[np.float64]:
-    """Return divisors that equalise outputs' noise, by neighbouring residuals."""
     residual, outputs = work.residuals([stated])[0], len(work.model.outputs)
     noise = []
     for k in range(outputs):
@@ -226,7 +221,7 @@ def _said(
 def _judged(
     one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, float], open_to: Mapping[str, Challenge]
 ) -> CauseFinding:
-    """Return a finding with the term's values, unclaimed if nonlinear or beaten by a curve."""
+    """Return a finding with the term's values; not named if nonlinear or beaten by a curve."""
     inside = {c.name: (c, term) for c, term in zip(found.node.inside, found.state.terms, strict=True)}
     if one.name not in inside:
         if one.verdict.rank < Verdict.AMBIGUOUS.rank:
@@ -247,7 +242,7 @@ def _judged(
 
 
 def _why_open(name: str, found: SearchOutcome, nonlinear: float, curve: Challenge | None) -> str:
-    """Return why a term is unclaimed; may be empty."""
+    """Return why a term stays open; may be empty."""
     farthest = max(moves(found.node, found.settled).items(), key=lambda pair: pair[1], default=("", 0.0))
     if farthest[1] > MOST_ASKED:
         it = "it" if farthest[0] == name else farthest[0]

@@ -48,8 +48,6 @@ class Candidate:
 
     Attributes:
         term: zero amplitude, mid-grid.
-        names: amplitudes, then shape.
-        grids: of its shape.
         positive: amplitudes that cannot be negative.
         tried: sizes for forms that replace a signal; else empty.
         driven: signals that result from the simulation.
@@ -66,7 +64,7 @@ class Candidate:
 
     @property
     def name(self) -> str:
-        """Of the term."""
+        """Return the term's name."""
         return self.term.name
 
 
@@ -76,11 +74,10 @@ def candidates(
     own: Sequence[PortSource] = (),
     times: NDArray[np.float64] | None = None,
 ) -> tuple[Candidate, ...]:
-    """Every form at every port.
+    """Return every form at every port.
 
     Args:
         signals: by port and name with `t`, of all calls, shape (calls,).
-        own: own physics.
         times: of the longest run, rising, shape (n,), for time constants.
     """
     found: list[Candidate] = []
@@ -110,13 +107,12 @@ def candidates(
 
 
 def _weighed(one: Candidate, members: int, results: Collection[tuple[str, str]]) -> Candidate:
-    """A candidate with its prior odds among so many of its form; what results from what is simulated comes after others."""
+    """Return a candidate with its prior odds among others of its form; signals that result from the simulation rank lower."""
     driven = frozenset(signal for signal in one.term.signals if (one.term.port, signal) in results)
     return replace(one, log_odds=log_odds(members) + (DRIVEN_ODDS if driven else 0.0), driven=driven)
 
 
 def _span(times: NDArray[np.float64]) -> tuple[float, float]:
-    """Return a time axis's median step and length."""
     steps = np.diff(np.unique(times))
     return float(np.median(steps)), float(times.max() - times.min())
 

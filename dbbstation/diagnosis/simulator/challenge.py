@@ -1,6 +1,6 @@
-"""Refitted terms' worth, and names against curves.
+"""Value of refitted terms, and named laws against curves.
 
-A curve contains most terms of its signal, so it must refute each alone and in pairs.
+A curve contains most terms of its signal, so it must refute each of them alone and in pairs.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ WORTH = math.log(SURE / ABSENT)
 def cost(nodes: Nodes, node: Node, settled: Settled) -> float:
     """Return a refitted node's negative log posterior in its own noise.
 
-    A comparison's noise is beside linear answers. Slack of forms is averaged over.
+    A comparison measures noise beside linear answers. Slack of forms is averaged over.
     """
     work, fitted, channel = nodes.work, node.fitted, settled.channel
     state, residual = fitted.state, fitted.residual
@@ -62,9 +62,9 @@ def cost(nodes: Nodes, node: Node, settled: Settled) -> float:
 
 
 def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
-    """Return a node with one or two names for a curve, unless odds of 19 favour it; or None.
+    """Return a node with one or two named laws in a curve's place, unless odds of 19 favour the curve.
 
-    A curve tests the form of a name and is no own cause.
+    A curve tests a law's form and is no cause itself.
     """
     for one in node.inside:
         if one.term.form is not TermForm.CURVE:

@@ -30,13 +30,12 @@ class Simulator(ABC):
     ) -> Mapping[str, NDArray[np.float64]]:
         """Return outputs at recording times, shape (n,), in their units.
 
-        Call `ports.NAME(t, signals)` at every step and add its value, which is zero until tried. Steps may repeat or go
-        back.
+        Call `ports.NAME(t, signals)` at every step and add its value, zero unless a term is tried. Steps may repeat or
+        go back.
 
         Args:
             inputs: `t` [s] and inputs by name, shape (n,).
             parameters: with initial states, by name.
-            ports: by name.
         """
 
 

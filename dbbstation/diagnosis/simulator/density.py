@@ -1,7 +1,4 @@
-"""Predictive density of unused rows after a refit.
-
-Noise counts with its memory; uncertain numbers are averaged over.
-"""
+"""Predictive density of unused rows after a refit, with correlated noise and parameter uncertainty."""
 
 from __future__ import annotations
 
@@ -30,9 +27,7 @@ def log_density(
     """Return log density of rows under a refit to others [Good, J. R. Stat. Soc. B 14 (1952) 107]; long-tailed noise uses Student's t.
 
     Args:
-        channel: refitted to its kept rows.
         rows: predicted, shape (n,).
-        residual: scaled, all rows, shape (n,).
         columns: of fitted numbers, shape (n, m).
     """
     bank = noise_left(work, residual, columns, rows=channel)

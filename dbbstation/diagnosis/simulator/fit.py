@@ -48,7 +48,6 @@ class SimulatorFit:
     """A refit.
 
     Attributes:
-        residual: shape (n,).
         columns: per fitted number, shape (n, m).
         curved: difference of two doses, shape (m,).
         squares: weighted, with priors.
@@ -112,8 +111,7 @@ def fit(
 
     Args:
         weigh: such as whitening, to deviation `sigma`.
-        sigma: 0: priors against the start's residual.
-        several: further starts.
+        sigma: 0: priors are relative to the start's residual.
     """
     begun = work.residuals([start])[0]
     sigma = sigma or rms(weigh(begun)) or 1.0
@@ -191,7 +189,6 @@ def _weighed(
 
 
 def _known(parameters: Sequence[SimulatorParameter], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return priors as rows, shape (p, m), and right side, shape (p,)."""
     known = [(k, p) for k, p in enumerate(parameters) if p.uncertainty is not None]
     rows = np.zeros((len(known), max(count, len(parameters))))
     for row, (k, p) in enumerate(known):
@@ -209,7 +206,6 @@ def _squares(work: SimulationRuns, weigh: Weigh, sigma: float, states: Sequence[
 def _elsewhere(
     work: SimulationRuns, start: FittedState, squares: Callable[[Sequence[FittedState]], list[float]]
 ) -> list[FittedState]:
-    """Return the best of states spread over parameters."""
     parameters = work.model.parameters
     if not parameters:
         return []
@@ -268,12 +264,7 @@ SMALLEST = 0.1
 
 
 def not_told_apart(names: Sequence[str], columns: NDArray[np.float64]) -> list[tuple[str, tuple[str, ...]]]:
-    """Return indistinguishable parameters with their substitutes.
-
-    Args:
-        names: shape (k,).
-        columns: weighted, shape (n, k).
-    """
+    """Return indistinguishable parameters with their substitutes."""
     norm = np.linalg.norm(columns, axis=0)
     found: list[tuple[str, tuple[str, ...]]] = []
     for k, name in enumerate(names):

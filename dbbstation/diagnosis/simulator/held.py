@@ -1,6 +1,6 @@
 """Held-out error of a simulator: omit, choose anew, simulate.
 
-Simulations run through the part. Linear answers are about all rows; predicting values are from other rows.
+Simulations run through the omitted part. Linear answers use all rows; predicting values use the other rows.
 """
 
 from __future__ import annotations
@@ -36,11 +36,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PredictedPart(Fold):
-    """One part, and what classes of signals bring there.
+    """One part, with gains of classes of signals there.
 
     Attributes:
         where: shape (n,).
-        of_classes: by followed signals, log density with less without, and rms error without; all under no name.
+        of_classes: by followed signals, log density (with minus without) and rms error without; all under an empty
+            name.
     """
 
     where: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
@@ -80,11 +81,11 @@ class PredictedGains:
         return ClassGain(gains, over_all([error for _, error in every]), over_all([part.after for part in self.parts]))
 
     def but_for(self, _ignored: Collection[str]) -> PredictedGains:
-        """Return the same: no term follows the time."""
+        """Return the same, because no term follows the time."""
         return self
 
     def errors_with(self, _wanted: Collection[str]) -> list[float]:
-        """Return the rms error of each part with all terms, which are put in together."""
+        """Return the rms error of each part with all terms."""
         return [part.after for part in self.parts]
 
 
@@ -112,13 +113,7 @@ def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:
 def predicted_parts(
     nodes: Nodes, base: Node, found: SearchOutcome, stated: FittedState, progress: Callable[[str, int, int], None]
 ) -> Iterator[PredictedPart]:
-    """Hold parts back in turn, limited by the simulation budget.
-
-    Args:
-        base: refitted simulator.
-        found: from all rows.
-        stated: reference parameters.
-    """
+    """Hold parts back in turn, limited by the simulation budget."""
     work, channel = nodes.work, found.node.channel
     as_simulated = work.residuals([stated])[0]
     every = parts(work)

@@ -1,6 +1,6 @@
 """Candidates as laws whose columns are simulated answers to small doses.
 
-Grid numbers are interpolated and later refitted by simulation. Replaced signals (delay, lag, play) are answered at
+Grid values are interpolated and later refitted by simulation. Replaced signals (delay, lag, play) are simulated at
 several sizes; the law gives size and share.
 """
 
@@ -46,7 +46,6 @@ def laws(
     """Return candidates as laws about a state, and reasons against others.
 
     Args:
-        size: rms residual.
         curved_most: relative difference of doses that excludes a candidate.
     """
     dosed = [one for one in found if not one.tried]
@@ -88,7 +87,7 @@ def departing(one: Candidate) -> tuple[str, TermForm, tuple[str, ...]]:
 
 
 def departures(work: SimulationRuns, state: FittedState, found: Sequence[Candidate], size: float) -> Departures:
-    """Return other terms' slack about a state; silent ones are omitted."""
+    """Return other terms' slack about a state; terms without effect are omitted."""
     points = [(one, point) for one in found for point in product(*(grid[::EVERY] for grid in one.grids))]
     answers = work.answers(state, [d for one, point in points for d in _directions(one, point)], size)
     off: dict[tuple[str, TermForm, tuple[str, ...]], list[NDArray[np.float64]]] = {}
@@ -113,7 +112,6 @@ EVERY = 2
 
 
 def _off(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return forms' slack from columns over a grid, shape (points, n, p)."""
     return of_unit_size(list(columns[::EVERY]))
 
 
@@ -151,7 +149,6 @@ def _directions(one: Candidate, point: tuple[float, ...]) -> list[PerturbedParam
 
 
 def _law(one: Candidate, columns: NDArray[np.float64], size: float, off: Departures) -> Law:
-    """Return a law from columns over a grid, shape (points, n, p)."""
     rms = np.sqrt(np.mean(np.square(columns), axis=(0, 1)))
     return Law(
         name=one.name,
@@ -172,7 +169,7 @@ def _law(one: Candidate, columns: NDArray[np.float64], size: float, off: Departu
 
 
 def _in_place(work: SimulationRuns, state: FittedState, one: Candidate, size: float) -> Law | None:
-    """Return a replaced signal's law by share and size; None if silent."""
+    """Return a replaced signal's law by share and size; None without effect."""
     before = work.residuals([state])[0]
     states = [PerturbedParameter((one.name,), 0.0, 0, one.term).at(state, value) for value in one.tried]
     answers = [before - after for after in work.residuals(states, strict=False)]
@@ -221,7 +218,6 @@ MOST_ANSWER = 100.0
 def _between(
     grids: tuple[tuple[float, ...], ...], columns: NDArray[np.float64]
 ) -> Callable[[tuple[float, ...]], NDArray[np.float64]]:
-    """Return columns interpolated from grid points, shape (points, n, p)."""
     table = columns.reshape(*(len(grid) for grid in grids), *columns.shape[1:])
 
     def at(point: tuple[float, ...]) -> NDArray[np.float64]:

@@ -21,8 +21,7 @@ class SimulatorParameter:
 
     Attributes:
         name: unique; initial states have the run's number from 1.
-        unit: may be empty.
-        uncertainty: prior standard; None: unknown.
+        uncertainty: prior standard uncertainty; None: unknown.
         run: from 0; None: all.
     """
 
@@ -43,7 +42,7 @@ class SimulatorParameter:
 
 @dataclass(frozen=True)
 class SimulatorPort:
-    """A place of the simulator where something may act.
+    """A place in the simulator where a term may act.
 
     Attributes:
         name: in `simulate`.
@@ -90,11 +89,7 @@ class SimulatorRecording:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A simulator with its recordings.
-
-    Attributes:
-        parameters: with each run's initial states.
-    """
+    """A simulator with its recordings."""
 
     name: str
     parameters: tuple[SimulatorParameter, ...]
@@ -110,7 +105,7 @@ class Model:
 
 @dataclass(frozen=True, eq=False)
 class TrialInput:
-    """Inputs that nobody recorded yet.
+    """Inputs that were not recorded yet.
 
     Attributes:
         inputs: `t` [s] and inputs, shape (n,).
@@ -126,8 +121,6 @@ class SimulationRequest:
     """One simulation.
 
     Attributes:
-        run: whose inputs it takes.
-        terms: at the ports.
         records: return port signals.
         trial: other inputs, or None.
     """
@@ -141,7 +134,7 @@ class SimulationRequest:
 
 @dataclass(frozen=True, eq=False)
 class SimulationOutcome:
-    """What came of one simulation.
+    """The outcome of one simulation.
 
     Attributes:
         outputs: in model order, shape (o, n); not finite if it ran away.

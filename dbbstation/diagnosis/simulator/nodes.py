@@ -1,6 +1,6 @@
 """Refitted simulators with terms, and channels about them.
 
-Columns are answers with present terms; the residual adds these back, so that sets without them compete.
+Columns are answers with present terms. The residual adds these back, so that sets without them compete.
 """
 
 from __future__ import annotations
@@ -54,7 +54,6 @@ class Node:
 
     Attributes:
         size: rms without terms, a bound of explanation.
-        own: own physics.
     """
 
     work: SimulationRuns
@@ -65,7 +64,7 @@ class Node:
 
     @property
     def names(self) -> frozenset[str]:
-        """Of the terms."""
+        """Return the terms' names."""
         return frozenset(one.name for one in self.inside)
 
     @cached_property
@@ -84,7 +83,7 @@ class Node:
 
     @cached_property
     def asked(self) -> tuple[list[Law], dict[str, str]]:
-        """Return outside laws, and reasons against others."""
+        """Return laws not inserted, and reasons against others."""
         return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST)
 
     @cached_property
@@ -113,7 +112,7 @@ class Node:
 
     @cached_property
     def alone(self) -> Channel:
-        """Return the channel of inserted terms without rivals and slack, without simulations."""
+        """Return the channel of inserted terms without rivals and slack; needs no simulation."""
         return self._channel({}, ())
 
     def _channel(self, off: Departures, others: Sequence[Law]) -> Channel:
@@ -141,7 +140,6 @@ class Node:
         return replace(self.channel, laws=laws_left)
 
     def _law(self, one: Candidate, columns: NDArray[np.float64], numbers: Sequence[float], off: Departures) -> Law:
-        """Return an inserted term's law, all numbers as amplitudes."""
         amplitudes, rms = len(one.term.amplitudes), np.sqrt(np.mean(np.square(columns), axis=0))
         usual = self.size / np.maximum(rms, 1e-300)
         usual[amplitudes:] = np.abs(numbers[amplitudes:])
@@ -191,7 +189,7 @@ CURVED_MOST = 3.0 * AGREE
 
 @dataclass(frozen=True)
 class Challenge:
-    """Names against a curve.
+    """Named laws against a curve.
 
     Attributes:
         log_odds: for the curve, with all costs.
@@ -207,7 +205,6 @@ class Nodes:
     """Visited nodes by terms.
 
     Attributes:
-        own: own physics.
         begun: starts already used.
         bettered: terms with a later better minimum.
         challenges: of the current search.
@@ -316,7 +313,7 @@ class Nodes:
     ) -> Node | None:
         """Refit plainly, then in own noise until stable.
 
-        A comparison's noise is beside linear answers. None if more than `most` remains: a wrong minimum.
+        None if the residual exceeds `most`: a wrong minimum.
         """
         fitted, before = fit(self.work, state), None
         if _rms(fitted.residual) > most:
@@ -340,7 +337,6 @@ def _left(node: Node) -> float:
 
 
 def _rms(values: NDArray[np.float64]) -> float:
-    """Return the rms; not finite after a runaway."""
     with np.errstate(over="ignore", invalid="ignore"):
         return float(np.sqrt(np.mean(np.square(values))))
 

@@ -21,12 +21,7 @@ if TYPE_CHECKING:
 
 
 def channel_of(work: SimulationRuns, residual: NDArray[np.float64], base: Base, laws: Sequence[Law] = ()) -> Channel:
-    """Channel of all rows of a simulator's recordings.
-
-    Args:
-        residual: scaled, shape (n,).
-        base: refitted with every hypothesis.
-    """
+    """Return the channel of all rows of a simulator's recordings."""
     outputs = work.model.outputs
     return Channel(
         residual=residual,
@@ -53,8 +48,6 @@ def noise_left(
     """Return a refit's noise, measured beside all fitted columns.
 
     Args:
-        residual: shape (n,).
-        columns: per fitted number, shape (n, m).
         off: slack of unit size, shape (n, q); None: none.
         rows: channel of kept rows; None: all.
     """
@@ -79,7 +72,6 @@ def log_probability_of(bank: Bank, residual: NDArray[np.float64], off: NDArray[n
     """Return rows' log probability with parameter cost [Schwarz's criterion], up to a constant.
 
     Args:
-        residual: shape (n,).
         off: slack of unit size, averaged over, shape (n, q).
     """
     rows = bank.whitened(residual) / bank.noise.innovation

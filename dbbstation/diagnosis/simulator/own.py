@@ -26,8 +26,4 @@ class PortSource(ABC):
 
     @abstractmethod
     def value(self, t: float, signals: Mapping[str, float], parameters: Mapping[str, float]) -> float:
-        """Return what acts at the port, in its unit.
-
-        Args:
-            t: [s].
-        """
+        """Return what acts at the port, in its unit."""

@@ -20,7 +20,7 @@ class SimulationFault(Exception):  # noqa: N818 - a fault of the user's simulato
 
 
 class Ports:
-    """`ports.NAME(t, signals)` returns what acts there, for numbers or arrays of rows."""
+    """`ports.NAME(t, signals)` returns the terms' value, for numbers or arrays of rows."""
 
     def __init__(
         self, ports: Sequence[SimulatorPort], acting: Mapping[str, Sequence[Evaluate]], *, records: bool

@@ -44,16 +44,11 @@ STILL = 0.1
 
 @dataclass(frozen=True, eq=False)
 class SearchOutcome:
-    """What a search ended at.
+    """The end of a search.
 
     Attributes:
-        node: with findings, refitted.
-        settled: about it.
-        state: values for those rows.
-        residual: shape (n,).
-        is_settled: all moves below a tenth of uncertainty, and nothing further wanted.
+        is_settled: all moves are below a tenth of the uncertainty, and no further term is wanted.
         refuted: rejected terms with reasons.
-        stopped: may be empty.
         withstood: curves replaced by names.
     """
 
@@ -73,13 +68,13 @@ def compared(channel: Channel, progress: Callable[[str], None] = lambda _: None)
 
 
 def compared_quickly(channel: Channel, beginning: Beginning) -> Settled:
-    """Compare fast from one beginning or beside everything, which may miss large gaps."""
+    """Compare quickly from one start or beside everything; may miss large effects."""
     beginnings = tuple(dict.fromkeys((beginning, Beginning.EVERYTHING)))
     return settle(channel, look=False, static=False, most_expanded=0, thorough=False, beginnings=beginnings)
 
 
 def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, refits: bool = True) -> SearchOutcome:
-    """Insert missing terms one by one; unworthy ones are rejected about the same terms.
+    """Insert missing terms one by one; unneeded ones are rejected about the same terms.
 
     Args:
         refits: refit in own noise until stable; False for held-back rows.
@@ -165,8 +160,8 @@ def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Ma
 def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str]:
     """Return members smaller than the slack of others at their port.
 
-    Real objects depart from forms in any shape. Absorbed parts are excluded; joint effects count, since similar ones may
-    cancel.
+    Real objects depart from forms in any shape. Absorbed parts are excluded; effects are taken jointly, since similar
+    ones may cancel.
     """
     every = {one.name: one for one in (*node.inside, *node.outside)}
     members = [every[member.cause.name] for member in settled.best.members]
@@ -192,11 +187,6 @@ def _within_forms_refitted(node: Node, but_for: Collection[str]) -> list[str]:
 
 
 def _less(members: Sequence[Candidate], size: Callable[[Sequence[str]], float], names: Sequence[str]) -> list[str]:
-    """Return members smaller than others' slack, alone or together.
-
-    Args:
-        size: joint rms.
-    """
     ports = {one.name: one.term.port for one in members}
     off = {one.name: form_uncertainty(one) * size([one.name]) for one in members}
 
@@ -256,7 +246,6 @@ def _said(node: Node, settled: Settled) -> dict[tuple[str, str], tuple[float, fl
 def _still(
     before: Mapping[tuple[str, str], tuple[float, float]], after: Mapping[tuple[str, str], tuple[float, float]]
 ) -> bool:
-    """Return whether comparisons about two refits agree."""
     return before.keys() == after.keys() and all(
         abs(after[key][0] - before[key][0]) < STILL * after[key][1] for key in after
     )

@@ -37,7 +37,7 @@ class SeparatingInput:
         part: stretch of largest difference.
         sigmas: difference there in standard deviations.
         repeats: of that stretch until distinguished.
-        input: best input in words; None if no tried one beats the recorded.
+        input: best input in words; None if no tried input beats the recorded one.
         input_sigmas: difference under it, for equal length.
     """
 
@@ -67,7 +67,7 @@ def _text(one: SeparatingInput) -> str:
 def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> tuple[SeparatingInput, ...]:
     """Return proposals for indistinguishable pairs.
 
-    Both answers are compared beside parameters by stretch, until `OUT` standard deviations, and under trial inputs.
+    Their answers are compared beside parameters, by stretch and under trial inputs, up to `OUT` standard deviations.
     """
     settled = found.settled
     base = settled.bank.whitened(settled.channel.base.samples) / settled.noise.innovation
@@ -131,7 +131,7 @@ def _repeated(repeats: int) -> str:
 
 
 def _column(found: SearchOutcome, name: str) -> NDArray[np.float64]:
-    """Return a term's effect over all rows, actual or in a best replacement."""
+    """Return a term's effect over all rows, simulated or in a best replacement."""
     settled, best = found.settled, found.settled.best
     if name in best.names:
         return settled.effect([name])

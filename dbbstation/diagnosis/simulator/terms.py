@@ -56,13 +56,11 @@ MEMORIES = frozenset({TermForm.MEMORY, TermForm.SLIP, TermForm.DELAY, TermForm.L
 
 @dataclass(frozen=True)
 class Term:
-    """What acts at a port.
+    """A term at a port.
 
     Attributes:
-        amplitudes: shape (p,).
         shape: nonlinear numbers, shape (s,).
         fixed: knots, or period and order.
-        own: own physics.
         bounds: of the shape, shape (s, 2); may be empty.
     """
 

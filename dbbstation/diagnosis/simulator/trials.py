@@ -1,4 +1,4 @@
-"""Trial inputs from recorded ones, simulated with each of two terms."""
+"""Trial inputs made from recorded ones, simulated with each of two terms."""
 
 from __future__ import annotations
 
@@ -75,11 +75,7 @@ def trial_inputs(model: Model) -> list[TrialInput]:
 def apart(
     work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Sequence[Term], noise: NDArray[np.float64]
 ) -> float:
-    """Return the standardised difference of two terms under an input.
-
-    Args:
-        noise: per independent row of each output, shape (o,).
-    """
+    """Return the standardised difference of two terms under an input."""
     model = work.model
     own = [k for k, p in enumerate(model.parameters) if p.run in {None, trial.run}]
     parameters = tuple(replace(p, run=None if p.run is None else 0) for p in (model.parameters[k] for k in own))

@@ -1,7 +1,7 @@
 """Residuals and derivatives of simulations.
 
-Doses h and 2 h give (4 f(h) - f(2h) - 3 f(0)) / 2h, second order [Abramowitz and Stegun, eq. 25.3.4 for one side]; doses
-answer with a hundredth of the residual, or less if they disagree.
+Doses h and 2 h give (4 f(h) - f(2h) - 3 f(0)) / 2h, second order [Abramowitz and Stegun, eq. 25.3.4 for one side]. The
+dose's effect is a hundredth of the residual, or less if both disagree.
 """
 
 from __future__ import annotations
@@ -52,11 +52,7 @@ UNSEEN = 1e-9
 
 @dataclass(frozen=True)
 class FittedState:
-    """Values of all fitted numbers.
-
-    Attributes:
-        values: of model parameters, shape (k,).
-    """
+    """Values of all fitted numbers."""
 
     values: tuple[float, ...]
     terms: tuple[Term, ...] = ()
@@ -101,7 +97,6 @@ class SimulationRuns:
     """Simulations of a model.
 
     Attributes:
-        run: simulates, cached.
         scales: of residuals by output, shape (o,).
         doses: suitable ones by number.
         trial: inputs of the model's only run, or None.
@@ -124,7 +119,7 @@ class SimulationRuns:
 
     @property
     def size(self) -> int:
-        """Rows of all runs and outputs."""
+        """Return rows of all runs and outputs."""
         return len(self.time)
 
     def simulated(self, states: Sequence[FittedState], *, strict: bool = True) -> list[NDArray[np.float64]]:
@@ -177,11 +172,7 @@ class SimulationRuns:
         }
 
     def answers(self, state: FittedState, directions: Sequence[PerturbedParameter], size: float) -> Answers:
-        """Return answers to small doses.
-
-        Args:
-            size: rms residual.
-        """
+        """Return answers to small doses."""
         before = self.residuals([state])[0]
         floor = UNSEEN * float(np.std(self.measured / self.scale))
         wanted = max(ANSWER * size, 100.0 * floor)
@@ -236,7 +227,7 @@ class PerturbedParameter:
     term: Term | None = None
 
     def at(self, state: FittedState, dose: float) -> FittedState:
-        """State with the dose."""
+        """Return the state with the dose."""
         if self.term is None:
             return state.moved(self.place, dose)
         numbers = list(self.term.numbers)
@@ -261,5 +252,5 @@ def sizes(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, float]:
 
 
 def rms(values: NDArray[np.float64]) -> float:
-    """Root mean square."""
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))

@@ -39,9 +39,4 @@ class TableSource(ABC):
 
     @abstractmethod
     def columns(self, variables: Mapping[str, NDArray[np.float64]], shapes: Mapping[str, float]) -> NDArray[np.float64]:
-        """Return one of each amplitude, shape (n, p), in the measured unit.
-
-        Args:
-            variables: by name, shape (n,), in time order by run.
-            shapes: parameters with a `grid`, by name.
-        """
+        """Return one of each amplitude, shape (n, p), in the measured unit."""

@@ -34,14 +34,11 @@ class Table:
     Attributes:
         measured: shape (n,).
         simulated: shape (n,).
-        unit: may be empty.
         derivatives: of the simulated value by parameter name, shape (n,).
         columns: numeric, by name, shape (n,).
         blocks: rows of each.
-        clock: ordering variable, or None.
         in_row_order: measured in row order.
         known: prior standard uncertainty by name.
-        free: without prior.
         has_offset: a constant difference is allowed.
     """
 
@@ -80,11 +77,7 @@ class Table:
         return REFITTED * off / moves if moves > 0.0 and off > 0.0 else np.inf
 
     def channel(self, sources: Sequence[TableSource] = ()) -> Channel:
-        """Channel of measured less simulated.
-
-        Args:
-            sources: own physics with its columns.
-        """
+        """Return the channel of measured minus simulated values."""
         columns = {OFFSET: np.ones(len(self)), **self.derivatives} if self.has_offset else dict(self.derivatives)
         samples = np.column_stack([np.zeros((len(self), 0)), *columns.values()])
         simulated = Variable(self.simulated_name, self.unit, Kind.ANY, self.simulated)
@@ -160,7 +153,7 @@ def _sizes_of_noise(
 
 
 def step_of(values: NDArray[np.float64]) -> float:
-    """Return the least difference, of which values, shape (n,), are multiples."""
+    """Return the largest step of which all values, shape (n,), are multiples."""
     steps = np.diff(np.unique(values))
     steps = steps[steps > EQUAL * np.ptp(values)]
     return float(steps.min()) if len(steps) else 0.0

@@ -1,4 +1,4 @@
-"""Whether simulation and recording differ, by which variable, form and size."""
+"""Whether simulation and recording differ, and by which variable, form and size."""
 
 from __future__ import annotations
 
@@ -63,11 +63,10 @@ class RefittedParameter:
 
     Attributes:
         before: base alone, ordinary least squares, correlation-adjusted.
-        after: with findings.
         confounded: R² on findings.
         known: prior standard uncertainty; None if free.
-        stated: by the user; else twice the simulated difference.
-        far: whether derivative or prior must be renewed after so large a change.
+        stated: by the user; otherwise twice the simulated difference.
+        far: whether so large a change needs a new derivative or prior.
     """
 
     name: str
@@ -90,15 +89,12 @@ def refitted(
 
 @dataclass(frozen=True, eq=False)
 class Mismatch:
-    """What is said of a table.
+    """The answer on a table.
 
     Attributes:
         levels: existence, variables and law of a difference.
         is_worse_here: than simulated, on the rows.
         held_out: None if not tested.
-        lacking: physics not tested, with reasons.
-        texts: of own physics.
-        cancelling: or None.
     """
 
     table: Table
@@ -135,7 +131,7 @@ class Mismatch:
 
     @property
     def stopped(self) -> str:
-        """Why the search ended early; empty where it did not."""
+        """Return why the search ended early; empty if it did not."""
         return "the search reached its limit of work" if self.settled.stopped else ""
 
     @property
@@ -150,7 +146,7 @@ class Mismatch:
 
     @property
     def parameters(self) -> tuple[RefittedParameter, ...]:
-        """Parameters of the simulation."""
+        """Return parameters of the simulation."""
         return tuple(one for one in self.fitted if one.name != OFFSET)
 
     @property
@@ -160,7 +156,7 @@ class Mismatch:
 
     @property
     def correction(self) -> NDArray[np.float64]:
-        """What follows variables, base parameters included, over all rows, shape (n,)."""
+        """Return effects over variables, with base parameters, over all rows, shape (n,)."""
         return self.settled.channel.residual - left_with(self.settled, self.levels.corrects)
 
     @property
@@ -188,8 +184,6 @@ def find_mismatch(
     """Compare measured with simulated values.
 
     Args:
-        table: all blocks.
-        sources: own physics with its columns.
         hold_out: repeat for each held-out part; takes most of the time.
         lacking: physics not tested, with reasons.
         matters: size of interest, in the table's unit; None: the refitted residual.
@@ -247,7 +241,7 @@ def _found(
 
 
 def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progress: Callable[..., None]) -> HeldOutError:
-    """Return the held-out error against simulated values (and a constant); choices go to `chosen`."""
+    """Return the held-out error against simulated values and a constant; choices are appended to `chosen`."""
     residual = settled.channel.residual
     parts = iter(parts_of(settled.channel))
 
@@ -268,13 +262,12 @@ def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progres
 def choose_without(
     channel: Channel, rows: NDArray[np.bool_], *, beginning: Beginning = Beginning.EVERYTHING
 ) -> Settled:
-    """Repeat the selection without rows, shape (n,), less widely, which can only raise the error."""
+    """Repeat the selection without rows, shape (n,), in a smaller search, which can only raise the error."""
     kept = channel.without(rows).thinned(FOLD_ROWS)
     return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,), most_work=MOST_WORK_WITHOUT)
 
 
 def _cancelling(settled: Settled, unit: str) -> Cancelling | None:
-    """Return cancelling effects and parameters."""
     base = settled.channel.base
     parameters = zip(base.names, settled.base_values(), strict=True)
     of_base = {n: base.samples[:, k] * v for k, (n, v) in enumerate(parameters)}
@@ -314,7 +307,6 @@ def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple
 
 
 def _noise_alone(channel: Channel) -> float:
-    """Return white noise of equal effect on the base alone."""
     left = channel.target - channel.base.samples[channel.kept] @ channel.refitted()
     runs = [left[rows] for rows in channel.stretches] if channel.time is not None else [left]
     found = noise_of(runs, channel.base.samples.shape[1])

@@ -11,10 +11,9 @@ from dbbstation.inference.variables import Kind
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a column is.
+    """Meaning of a column.
 
     Attributes:
-        unit: may be empty.
         period: of an angle's turn, else None.
         driven: results from the simulation, as a motor's torque.
     """

@@ -24,7 +24,6 @@ _OF_THE_CMM = ("bore", "holder", "uncertainty_um")
 
 
 def _spaced(bores: dict[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
-    """Refuse bores closer than any holder is wide: metres, or one bore twice."""
     names = list(bores)
     for place, bore in enumerate(names):
         for other in names[:place]:
@@ -104,11 +103,10 @@ def parse_jig(path: Path, faults: list[Problem]) -> JigFile | None:
 
 
 def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Problem]) -> None:  # noqa: ANN401
-    """Check bores and holders of balls on the raw data, so that other faults hide nothing.
+    """Check bores and holders of balls on the raw data, independently of other faults.
 
     Args:
         jig: mapping with the bores; None without a plate.
-        holders: mapping, or names.
     """
     bores = _plain_bores(jig)
     for location, ball in document.entries("balls"):
@@ -191,9 +189,6 @@ _USUAL = ("placed", BY_CMM)
 
 def checked_jig(text: str, file: str) -> JigFile:
     """Return the checked jig of a text.
-
-    Args:
-        file: source of the text, for messages.
 
     Raises:
         InputError: whatever a jig file must not hold.

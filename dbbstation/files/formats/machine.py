@@ -34,7 +34,6 @@ _UNIT_WITHIN = 0.01
 
 
 def _direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Refuse what is no unit vector."""
     length = math.hypot(*vector)
     if abs(length - 1.0) > _UNIT_WITHIN:
         raise PydanticCustomError(

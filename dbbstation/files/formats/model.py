@@ -174,7 +174,6 @@ class _Sources:
         return Fitted(source, values, shared)
 
     def _check_value(self, location: Location, source: ErrorSource, parameter: Parameter, value: float) -> None:
-        """Add a fault for a value that no machine has."""
         size = Quantity(parameter.unit, 0.0, parameter.largest, signed=True)
         if not size.fits(value):
             what = f"{source.name} {parameter.name}: {value:g} {parameter.unit} is not plausible, expected {size.range}"
@@ -301,7 +300,6 @@ def _source_data(fitted: Fitted, machine: Machine) -> dict[str, object]:
 
 
 def _lists(value: Any) -> Any:  # noqa: ANN401 - what fits report is theirs
-    """Return the report with lists as written, not tuples."""
     if isinstance(value, dict):
         return {key: _lists(item) for key, item in value.items()}
     return [_lists(item) for item in value] if isinstance(value, tuple) else value

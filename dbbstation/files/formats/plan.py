@@ -269,7 +269,7 @@ def _merged(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) 
 
 
 def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem]) -> None:
-    """Check tests against balls and each other on the raw data, so that other faults hide nothing."""
+    """Check tests against balls and each other on the raw data, independently of other faults."""
     tests = document.entries("tests")
     names = [test.get("name") for _, test in tests]
     for index in twice(names):
@@ -292,7 +292,7 @@ def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem])
 
 
 def _check_file_names(document: YamlDocument, names: list[Any], faults: list[Problem]) -> None:
-    """Refuse names of tests that cannot all be files on Windows: runs and programs are called after them."""
+    """Refuse test names that cannot all be file names on Windows, since runs and programs use them."""
     seen: dict[str, str] = {}
     for (location, _), name in zip(document.entries("tests"), names, strict=True):
         if not isinstance(name, str):

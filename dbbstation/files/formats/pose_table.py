@@ -104,9 +104,7 @@ def write_poses(
     """Write poses with uncertainties and further columns, and a provenance file beside them.
 
     Args:
-        poses: shape (n, 6) [mm, deg].
         uncertainty_mm: of X, Y and Z, shape (n, 3); NaN, written as an empty cell, if not known.
-        others: texts of further columns by name.
         warning: objection to the model, or empty.
 
     Raises:

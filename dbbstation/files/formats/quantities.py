@@ -57,7 +57,7 @@ class Quantity:
         )
 
     def guess(self, value: float) -> str:
-        """Return the unit that a value looks like, or an empty text."""
+        """Return the unit that a value suggests, or an empty text."""
         for unit, factor in _MISTAKEN.get(self.unit, ()):
             if self.fits(value * factor):
                 return f" (it looks like {unit})"
@@ -89,7 +89,7 @@ Point = tuple[Coordinate, Coordinate, Coordinate]
 
 @dataclass(frozen=True)
 class Reach:
-    """Greatest plausible distance of a point from the origin; it detects metres."""
+    """Greatest plausible distance of a point from the origin; detects metres."""
 
     distance: Quantity
 

@@ -116,7 +116,6 @@ def _read(path: Path, faults: list[Problem]) -> tuple[SettingsFile, YamlDocument
 
 
 def _flat(file: SettingsFile, path: Path) -> Iterable[tuple[str, Any]]:
-    """Return values by dotted key, with the protocol's path from the settings' folder."""
     data = file.model_dump(exclude_unset=True, exclude_none=True, exclude={"format", "tolerances"})
     for key, value in data.items():
         if isinstance(value, dict):

@@ -93,12 +93,12 @@ class PortSchema(Schema):
 
     @property
     def units(self) -> dict[str, str]:
-        """Units of the signals."""
+        """Return units of the signals."""
         return {name: one if isinstance(one, str) else one.unit for name, one in self.signals.items()}
 
     @property
     def results(self) -> frozenset[str]:
-        """Signals that result from what is simulated."""
+        """Return signals that result from the simulation."""
         return frozenset(name for name, one in self.signals.items() if not isinstance(one, str) and one.result)
 
 
@@ -236,7 +236,6 @@ def _called(tree: ast.AST, ports: str) -> dict[str, int]:
 
 
 def _computed(tree: ast.AST, ports: str) -> bool:
-    """Return whether ports are passed on or looked up by computed names."""
     plain = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)}
     return any(isinstance(n, ast.Name) and n.id == ports and id(n) not in plain for n in ast.walk(tree))
 

@@ -1,4 +1,4 @@
-"""Change on purpose what was sealed: the former file is kept, and the session notes the change."""
+"""Change a seal deliberately: the former file is kept, and the session notes the change."""
 
 from __future__ import annotations
 
@@ -44,8 +44,7 @@ def amend(
     """Accept a session as it is now, with another plan or machine if given, and note why.
 
     Args:
-        made: with its zone.
-        plan: replaces the session's plan, jig inlined; None: unchanged.
+        plan: replaces the session's plan, with its jig inline; None: unchanged.
 
     Returns:
         What was changed.
@@ -120,7 +119,6 @@ def _copied(folder: Path, name: str, sha256: str) -> str:
 
 
 def _whole(folder: Path, plan: Path | None, machine: Path | None) -> tuple[SessionFolder, Seal]:
-    """Return the session with the new files, and its seal."""
     faults: list[Problem] = []
     instead = {key: path for key, path in (("plan", plan), ("machine", machine)) if path is not None}
     session = parse_session(folder, faults, as_sealed=False, instead=instead)

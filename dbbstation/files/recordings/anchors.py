@@ -28,11 +28,7 @@ def links_of(folder: Path) -> tuple[str, ...]:
 
 
 def anchor_told(folder: Path, anchor: str) -> Problem:
-    """Return what a noted anchor proves about a session, with a remedy if it changed.
-
-    Args:
-        anchor: at least `SHORTEST` digits.
-    """
+    """Return the changes since a noted anchor, with a remedy."""
     log = read_event_log(folder, [])
     events = () if log is None else log.events
     for number, event in enumerate(events, start=1):

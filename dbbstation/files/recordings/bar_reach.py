@@ -14,7 +14,6 @@ def unlike_bar(length_mm: float, stroke_mm: float | None, plan: Plan) -> tuple[s
     """Return fault and remedy if tests need another bar, or None.
 
     Args:
-        length_mm: calibrated distance between the ball centres.
         stroke_mm: travel of the gauge either way; None if not known.
     """
     stroke = USUAL_STROKE_MM if stroke_mm is None else stroke_mm

@@ -81,7 +81,6 @@ class _Coordinate(NamedTuple):
 def _gathered(
     table: TableFile, names: Mapping[str, str | None], unit: str, faults: list[Problem]
 ) -> dict[str, dict[str, _Coordinate]]:
-    """Return coordinates by ball and axis; `faults` grows by bad or double ones."""
     balls: dict[str, dict[str, _Coordinate]] = {}
     for k, line in enumerate(table.lines.tolist()):
         of = {key: "" if name is None else table.cells[name][k] for key, name in names.items()}
@@ -111,7 +110,6 @@ def _gathered(
 
 
 def _axis(cell: str) -> str | None:
-    """Return the axis of a cell such as `X`, `X-Value` or `xValue`, or None."""
     found = _AXIS_CELL.fullmatch(cell.strip().strip('"'))
     return found[1].lower() if found else None
 

@@ -38,7 +38,7 @@ class Measured:
         bore: None if not stated.
         holder: empty if not stated.
         centre_mm: x, y, z; z is NaN if not stated.
-        uncertainty_um: standard uncertainty per axis, root mean square over the axes; None if not stated.
+        uncertainty_um: standard uncertainty, rms over the axes; None if not stated.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """Measured points in the output of a CMM in DMIS [ISO 22093]: `FA(NAME)=FEAT/SPHERE,OUTER,CART,x,y,z,d` and `FEAT/POINT,CART,x,y,z,i,j,k`.
 
-Read are actual features (`FA`) in cartesian coordinates, `UNITS/`, comments (`$$`) and lines continued by `$`. The text of the standard
-was not at hand; the statements are as manuals of CMM programs describe them (PTC Creo, Supported DMIS Commands).
+Read are actual features (`FA`) in cartesian coordinates, `UNITS/`, comments (`$$`) and lines continued by `$`. The
+statements follow manuals of CMM programs (PTC Creo, Supported DMIS Commands); the standard's text was not available.
 """
 
 from __future__ import annotations
@@ -24,11 +24,7 @@ _FRAME = re.compile(r"(D\(.*\)\s*=\s*)?(DATSET|TRANS|ROTATE|RECALL|LOCATE)\s*/",
 
 @dataclass(frozen=True)
 class DmisPoint:
-    """One actual feature.
-
-    Attributes:
-        centre_mm: x, y, z in the frame set there.
-    """
+    """One actual feature."""
 
     name: str
     centre_mm: tuple[float, float, float]

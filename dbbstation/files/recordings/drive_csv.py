@@ -39,7 +39,7 @@ class DriveFile:
         line: number of the header line.
         numbers: known columns by name, each of shape (n,), in the unit of the name.
         others: texts of further columns by name.
-        warnings: findings that do not spoil it.
+        warnings: findings that do not invalidate it.
     """
 
     file: str
@@ -153,7 +153,6 @@ def _check_names(names: list[str], file: str, line: int, faults: list[Problem]) 
 def _numbers(
     rows: list[tuple[int, str]], names: list[str], known: list[str], file: str, faults: list[Problem]
 ) -> dict[str, NDArray[np.float64]]:
-    """Return known columns, shape (n,) each; line by line only to name faults."""
     text = io.StringIO("\n".join(line for _, line in rows))
     places = [names.index(name) for name in known]
     try:

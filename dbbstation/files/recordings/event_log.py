@@ -1,11 +1,11 @@
 """The event log of a session: every verdict, reason, condition and amendment, one line each, chained.
 
-    7c3f…  {"at": "2026-11-20T08:06:02Z", "what": "rejected", "runs": [{"test": "a", …}]}
+7c3f…  {"at": "2026-11-20T08:06:02Z", "what": "rejected", "runs": [{"test": "a", …}]}
 
-A line begins with its link, 64 hex digits: the SHA-256 of the link of the line before it (nothing for the first), a line feed,
-the JSON text of the line and a line feed, in UTF-8. Lines are only appended. What the session file says is the sum of all lines:
-who edits it disagrees with the log, who edits the log breaks the chain, and a session file that was spoilt can be written anew.
-A line is on the disk before the session file says what it says.
+A line begins with its link of 64 hex digits: the SHA-256 of the previous link (empty for the first line), a line feed,
+the line's JSON text and a line feed, in UTF-8. Lines are only appended. The session file equals the sum of all lines,
+so that a damaged one can be rebuilt. An edited session file differs from the log, and an edited log has a broken chain.
+Each line reaches the disk before the session file changes.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class LoggedEvent:
 
     Attributes:
         what: in a word or two, such as `rejected`.
-        at: None for a session made at once, such as a simulated one.
+        at: None for a computed session, such as a simulated one.
         set_to: new values of session keys; None for removed ones.
         runs: entries that replace those of the same test, direction and repeat, or follow all others.
         all_runs: the whole list if it was rearranged, else None.
@@ -77,7 +77,7 @@ class EventLog:
 
     @property
     def links(self) -> tuple[str, ...]:
-        """Link of every event."""
+        """Return the link of every event."""
         return tuple(event.link for event in self.events)
 
     def state(self, count: int | None = None) -> dict[str, object]:
@@ -174,9 +174,7 @@ def line_of(before: str, what: str, at: datetime | None, members: Mapping[str, A
 
 
 def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str, Any]) -> EventLog:
-    """Append an event, synced to disk; arguments as of `line_of`.
-
-    An unfinished last line is cut off.
+    """Append an event, synced to disk; arguments as of `line_of`. An unfinished last line is removed.
 
     Raises:
         OutputError: the log has changed since it was read, or the disk refuses; it is restored.
@@ -220,9 +218,6 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
 
 def _parted(log: EventLog, handle: int) -> int:
     """Part a log from hard links of its file, such as a backup, which keep their content.
-
-    Returns:
-        The file that has the log's name now, open; the former one is closed.
 
     Raises:
         OutputError: the disk refuses; the log is restored.
@@ -307,7 +302,7 @@ def runs_told(event: LoggedEvent) -> str:
 
 
 def keys_told(event: LoggedEvent) -> Sequence[str]:
-    """Return the keys of an event beside the runs, without those that change with every run."""
+    """Return the keys of an event beside the runs, except those that change with every run."""
     return [key for key in event.set_to if key != "seal" or event.what not in _OF_RUNS]
 
 

@@ -56,7 +56,6 @@ class ForeignTable:
         units: below the column names, by name; else empty.
         comments: `key: value` lines above the names, keys in small letters.
         data: the whole file.
-        repeated: lines that repeat the column names, one per run.
     """
 
     table: TableFile
@@ -122,13 +121,11 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
 
 
 def _looked_at(lines: list[str], language: NumberLanguage, file: str) -> tuple[list[list[str]], int | None]:
-    """Return cells of the lines that show the table's form, and its first line; None if there is none."""
     rows = [_cells(line, language, file, number) for number, line in enumerate(lines[:_LOOKED_AT], start=1)]
     return rows, next((k for k in range(len(rows)) if _is_row(rows[k], language) and _goes_on(rows, k, language)), None)
 
 
 def _no_table(lines: list[str], language: NumberLanguage, file: str, stated: str) -> Problem:
-    """Return the fault of a missing table, at the line nearest to a row."""
     groups = [len(re.findall(r"\d+", line)) for line in lines[:_LOOKED_AT]]
     most = max(groups, default=0)
     if most < 2:  # noqa: PLR2004 - a row has two numbers
@@ -173,7 +170,6 @@ def _heads_taken_out(body: list[str], names: int, language: NumberLanguage) -> t
 
 
 def _without_end(lines: list[str]) -> list[str]:
-    """Return lines without an end mark, as Calypso writes it."""
     last = next((k for k in range(len(lines) - 1, -1, -1) if lines[k].strip()), None)
     return lines if last is None or not re.fullmatch(r"\s*(END|EOF|ENDE)\s*", lines[last]) else lines[:last]
 
@@ -225,7 +221,7 @@ def _encoding(data: bytes) -> str:
 
 
 def _language(lines: list[str], file: str) -> NumberLanguage:
-    """Return the way of writing with most numbers, less cells that were not split."""
+    """Return the number format with most numbers, minus cells that were not split."""
 
     def fit(language: NumberLanguage) -> int:
         rows = [_cells(line, language, file, k) for k, line in enumerate(lines[:_LOOKED_AT], start=1)]
@@ -246,7 +242,6 @@ def _count(row: list[str], language: NumberLanguage) -> int:
 
 
 def _whole(row: list[str], language: NumberLanguage) -> int:
-    """Return how many cells hold digits beside a separator or decimal comma but are no numbers."""
     others = [cell for cell in row if any(sign in cell for sign in _SIGNS) and any(map(str.isdigit, cell))]
     return len(others) - _count(others, language)
 
@@ -256,7 +251,7 @@ def _is_row(row: list[str], language: NumberLanguage) -> bool:
 
 
 def _goes_on(rows: list[list[str]], k: int, language: NumberLanguage) -> bool:
-    """Return whether the next line is a row too: a single line of numbers may be a date."""
+    """Return whether the next line is a row too, because a single line of numbers may be a date."""
     following = next((row for row in rows[k + 1 :] if row), None)
     return following is not None and len(following) == len(rows[k]) and _is_row(following, language)
 

@@ -31,10 +31,6 @@ def former_sessions(
 
     Both are real or both virtual, with the same nominal machine and serial number. Every accepted test of this session,
     else of its plan, was run there at the same place.
-
-    Args:
-        under: searched with subfolders.
-        tests: required there; None: as above.
     """
     accepted = now.in_state(RunState.ACCEPTED)
     began = min((run.started for run in accepted if run.started is not None), default=None)

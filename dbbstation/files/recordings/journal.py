@@ -1,7 +1,7 @@
-"""The journal of a run: samples reach the file as they arrive, and the disk once a second.
+"""The journal of a run: samples are written as they arrive, and synced once a second.
 
-Each line carries its CRC-32, because a power cut may mix pages. The file ends in `.csv.part` until it is sealed. Nothing
-is ever overwritten.
+Each line has its CRC-32, because a power cut may mix pages. The file ends in `.csv.part` until it is sealed. Nothing is
+ever overwritten.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def run_header(test: str, direction: Direction, repeat: int, names: Sequence[str
 def run_foot(counts: Counts) -> bytes:
     """Return the last lines of a sealed run file, with its counts.
 
-    A file without them was broken off.
+    A file without them was interrupted.
     """
     lines = [f"# received: {counts.received}", f"# lost: {counts.lost}"]
     lines += [f"# rejected {reason}: {count}" for reason, count in counts.rejected.items()]
@@ -94,7 +94,6 @@ class RunWriter:
     """Appends samples to one run; a context that leaves the `.part` unless sealed.
 
     Args:
-        repeat: must be free.
         names: in order, without the checksum, with `t_s` and `length_mm`.
 
     Raises:
@@ -132,14 +131,11 @@ class RunWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close the file; an unsealed one stays a `.part`."""
+        """Close the file; an unsealed one remains a `.part`."""
         self.close()
 
     def append(self, values: Sequence[float | str]) -> None:
         """Write one sample, and sync if the last sync is old.
-
-        Args:
-            values: one per column.
 
         Raises:
             OutputError: the disk refuses; earlier samples stay.
@@ -174,7 +170,6 @@ class RunWriter:
         self._synced_at = self._clock()
 
     def _put_back(self) -> None:
-        """Write a removed file anew through the open handle."""
         try:
             there = self.path.lstat()
         except FileNotFoundError:

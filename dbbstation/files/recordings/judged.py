@@ -42,7 +42,6 @@ def judge_session(
     """Judge runs of a session.
 
     Args:
-        wanted: runs with recordings, in order of recording.
         model: None: only usual sizes of machine errors are known.
     """
     runs = runs_of(session, wanted, model)
@@ -64,11 +63,7 @@ def run_of(
     model: IdentifiedModel | None,
     planned: tuple[Planned, ...],
 ) -> Run:
-    """Return one run prepared for judging.
-
-    Args:
-        model: None: only usual sizes of machine errors are known.
-    """
+    """Return one run prepared for judging."""
     circle, recording = session.circle(run), replace(recording, name=run.label)
     # A compensated program is there to put the circle where it is planned. That is where it is expected.
     of_it = None if run.program is not None else model
@@ -126,7 +121,7 @@ def _ideal(circle: Circle) -> RawCircle:
 def _expected(
     session: SessionFolder, run: RunEntry, recording: Recording, model: IdentifiedModel | None
 ) -> Expected | None:
-    """Return where the circle should lie; None without a circle, or if the machine cannot take it."""
+    """Return the expected place of the circle; None without a circle, or if the machine cannot reach it."""
     try:
         return _expected_of(session, run, cut(recording, session.circle(run)), model)
     except (TraceError, MachineError):

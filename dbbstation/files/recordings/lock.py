@@ -1,7 +1,7 @@
-"""One writer for each session folder, by a lock of the operating system.
+"""One writer per session folder, by a lock of the operating system.
 
-The lock ends with its process, so that a power cut leaves nothing to clean up. The file names its last holder. Without
-locks on the file system, the session is written without one and reports so.
+The lock ends with its process, so a power cut leaves none. The file names its last holder. On a file system without
+locks, the session is written without one and reports so.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ class FinishedRun:
     Attributes:
         columns: by name, each of shape (n,), in the columns' units.
         mounting: number of the ball's set-up; None: one per test.
-        started: first sample; None if that means nothing.
+        started: first sample; None for a computed run.
         program: name and bytes of the NC program; None for the plan's circle.
         reason: of a rejection; else empty.
         texts: text columns such as `status`, n each.
@@ -74,10 +74,6 @@ def write_session(
     more: Mapping[str, str | bytes] | None = None,
 ) -> None:
     """Write a whole session at once, all or nothing.
-
-    Args:
-        runs: in order.
-        more: further files by relative path.
 
     Raises:
         OutputError: the folder exists, lies in another session, or cannot be written.
@@ -122,7 +118,7 @@ def make_session_folder(
 
     Args:
         files: content by relative path, besides machine, plan and session file.
-        at: for the log; None for a computed session, which then has the same bytes.
+        at: for the log; None for a computed session, which then always has the same bytes.
 
     Raises:
         InputError: what no session may note.
@@ -146,11 +142,7 @@ def make_session_folder(
 
 
 def _check_details(text: str, folder: Path, plan: InlinePlan) -> None:
-    """Check a session's notes against format and plan before writing.
-
-    Raises:
-        InputError: whatever a session must not note, such as a length in metres.
-    """
+    """Check a session's notes against format and plan before writing."""
     faults: list[Problem] = []
     document = parse_yaml(text, str(folder / SESSION_FILE), faults)
     session = None if document is None else validate(document, SessionFile, faults)

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 def rebuild(folder: Path) -> tuple[str, int]:
     """Write the session file from the log; the former one is kept.
 
-    Returns:
-        Where the former session file is kept, empty where there was none; how many events there are.
-
     Raises:
         InputError: there is no log, or it does not fit the session's files.
         OutputError: another process writes into the session, or the disk refuses.

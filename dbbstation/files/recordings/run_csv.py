@@ -39,7 +39,7 @@ class RunFile:
         header: `# key: value` lines, by key.
         unknown_columns: texts by name, one per sample.
         status: the instrument's per sample; empty if not noted.
-        warnings: findings that do not spoil the run.
+        warnings: findings that do not invalidate the run.
     """
 
     recording: Recording
@@ -101,7 +101,7 @@ def sha256_of(path: Path) -> str:
 
 
 def sealed_or_part(path: Path) -> Path:
-    """Return a run's file, which may have been sealed just before the station died."""
+    """Return a run's file, which may have been sealed just before the program ended."""
     sealed = path.with_suffix("") if path.suffix == PART else path
     return sealed if not path.exists() and sealed.exists() else path
 
@@ -116,7 +116,7 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
     """Parse the bytes of a run file into a checked recording.
 
     Args:
-        sha256: passed on.
+        sha256: stored in the result.
         partial: return the good lines and warn of the others.
 
     Raises:
@@ -126,7 +126,6 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
 
 
 def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
-    """Parse a run file in blocks, keeping only numbers and distinct texts."""
     faults: list[Problem] = []
     warnings: list[Problem] = []
     numbers = Numbers()

@@ -36,7 +36,7 @@ _MOST_KNOWN = 10_000
 
 @dataclass(frozen=True)
 class Lines:
-    """A run file, or a piece of it, as lines.
+    """A run file, or a part of it, as lines.
 
     Attributes:
         header: `# key: value` lines read so far, by key.
@@ -64,11 +64,7 @@ class Lines:
         return replace(self, rows=self.rows[rows], numbers=self.numbers[rows], ended=True)
 
     def texts(self, name: str, known: dict[bytes, str] | None = None) -> list[str]:
-        """Return one column as text.
-
-        Args:
-            known: distinct texts so far; grows.
-        """
+        """Return one column as text."""
         at = self.columns.index(name)
         cells = [row.split(b",")[at] for row in self.rows]
         seen = {} if known is None or len(known) > _MOST_KNOWN else known
@@ -108,7 +104,6 @@ def pieces_of(
     """Yield a run file's usable lines in pieces; nothing more after a fault.
 
     Args:
-        blocks: cut anywhere.
         faults: grows by what makes the file useless.
         warnings: grows by unknown columns, a cut last line, lines left out.
         partial: yield only the good lines of an interrupted recording, in one piece: they may be out of order.
@@ -236,7 +231,6 @@ def split_head(path: Path, faults: list[Problem]) -> tuple[str, ...]:
 
 
 def _said(line: bytes) -> dict[str, str]:
-    """Return a `# key: value` line's content."""
     key, colon, value = line.decode("utf-8", "replace").lstrip("\ufeff#").partition(":")
     return {key.strip(): value.strip()} if colon else {}
 
@@ -257,7 +251,7 @@ def _check_columns(names: tuple[str, ...], file: str, line: int, faults: list[Pr
 
 
 def _without_cut_line(lines: Lines, warnings: list[Problem]) -> Lines:
-    """Drop a last line without end unless its CRC is right: digits may be missing."""
+    """Drop a last line without end unless its CRC is right, because digits may be missing."""
     if lines.ended or not lines.rows:
         return lines
     number, last = lines.numbers[-1], lines.rows[-1]
@@ -302,8 +296,8 @@ def _fault_of_fields(fields: list[bytes], names: tuple[str, ...]) -> tuple[str, 
 def good_lines(lines: Lines) -> tuple[Lines, list[Problem]]:
     """Return trusted rows of an interrupted recording in time order, and faults of the others.
 
-    A power cut may leave pages empty, stale or in another order. The checksum decides; without one, readable rows with
-    rising time count.
+    A power cut may leave pages empty, stale or reordered. The checksum decides; without one, readable rows with rising
+    time count.
     """
     kept: list[tuple[bytes, int]] = []
     problems: list[Problem] = []

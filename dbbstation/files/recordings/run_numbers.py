@@ -89,7 +89,6 @@ class Numbers:
 
 
 def _parsed(lines: Lines) -> dict[str, NDArray[np.float64]] | None:
-    """Parse all rows of a piece; None if one is faulty."""
     if not lines.regular() or lines.bad_crc():
         return None
     names = [name for name in lines.columns if name in columns.COLUMNS]

@@ -1,8 +1,8 @@
 """The seal of a session: hashes of machine, plan and jig, and a chain through its runs.
 
-Every sealed run's entry has a link: the SHA-256 of the previous link and of what the entry says of the recording.
-Removing, exchanging or changing an entry breaks a link; the seal's count and last link reveal removed ends. Copies in the
-folder `sealed` show which key has changed. The seal reveals mistakes; it cannot prevent a whole new seal.
+Every sealed run's entry has a link: the SHA-256 of the previous link and of the entry's content. Removing, exchanging
+or changing an entry breaks a link; the seal's count and last link reveal removed ends. Copies in the folder `sealed`
+show which key changed. The seal reveals mistakes; it cannot prevent a new seal of everything.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class Amendment:
 
     @property
     def text(self) -> str:
-        """The change in words."""
+        """Return the change in words."""
         kept = f"; as it was: {self.former}" if self.former else ""
         return f"{self.what} was changed on purpose, {self.made:%Y-%m-%d %H:%M %Z}: {self.reason}{kept}"
 
@@ -100,11 +100,7 @@ def amendment_entry(entry: AmendmentSchema) -> Amendment:
 
 
 def sealed_names(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the sealed files' paths: machine, plan and the plan's jig file.
-
-    Args:
-        names: paths of machine and plan, in this order.
-    """
+    """Return the sealed files' paths: machine, plan and the plan's jig file."""
     plan = load_yaml(folder / names[1], [])
     jig = plan.data.get("jig") if plan is not None and isinstance(plan.data, dict) else None
     beside = names[1].rpartition("/")[0]
@@ -127,9 +123,6 @@ def copy_name(name: str, sha256: str) -> str:
 def keep_copies(folder: Path, sealed: Mapping[str, str]) -> None:
     """Keep a copy of every sealed file, and repair damaged copies.
 
-    Args:
-        sealed: SHA-256 by path in the folder.
-
     Raises:
         OutputError: the disk refuses.
     """
@@ -149,11 +142,7 @@ def is_copy(name: str) -> bool:
 
 
 def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> Iterator[Problem]:
-    """Yield faults of kept copies: damaged, missing, or unknown.
-
-    Args:
-        amendments: name further copies.
-    """
+    """Yield faults of kept copies: damaged, missing, or unknown."""
     if (folder / SEALED).is_symlink():  # it may lead to a whole disk
         what = f"{SEALED} is a link: the copies of what was sealed are part of the session"
         yield Problem(str(folder / SEALED), 0, 0, what, "put the folder itself there")
@@ -189,9 +178,9 @@ def fits_name(name: str, digest: str) -> bool:
 def link(before: str, run: RunEntry) -> str:
     """Return the link of a sealed run in the chain.
 
-    The SHA-256 of these lines in UTF-8, each with a line end, empty if there is nothing: link of the previous sealed run,
-    test, direction, repeat, mounting, start in UTC (ISO 8601), SHA-256 of run file, program and its model, x, y and z of
-    the centre as programmed [mm].
+    It is the SHA-256 of these lines in UTF-8, each with a line end, empty if absent: link of the previous sealed run,
+    test, direction, repeat, mounting, start in UTC (ISO 8601), SHA-256 of run file, program and its model, x, y and z
+    of the centre as programmed [mm].
     """
     program = ("", "") if run.program is None else (run.program.sha256, run.program.model_sha256)
     started = "" if run.started is None else run.started.astimezone(UTC).isoformat()
@@ -201,11 +190,7 @@ def link(before: str, run: RunEntry) -> str:
 
 
 def chained(runs: Sequence[RunEntry]) -> tuple[RunEntry, ...]:
-    """Return runs with links added for new sealed ones, behind all that have one.
-
-    Args:
-        runs: in the order of the list.
-    """
+    """Return runs with links added for new sealed ones, behind all that have one."""
     done = [run for run in runs if run.chain_sha256]
     behind = runs.index(done[-1]) if done else -1
     kept = [run for run in runs if not (run.sha256 and not run.chain_sha256 and runs.index(run) < behind)]
@@ -224,11 +209,7 @@ def sealed_over(files: Mapping[str, str], runs: Sequence[RunEntry]) -> Seal:
 
 
 def seal_faults(folder: Path, file: Path, seal: Seal, names: Sequence[str], runs: Sequence[RunEntry]) -> list[Problem]:
-    """Return changes since sealing: files with their keys, and runs.
-
-    Args:
-        names: paths of machine and plan, in this order.
-    """
+    """Return changes since sealing: files with their keys, and runs."""
     faults = [*_file_faults(folder, file, seal, names)]
     faults += [Problem(str(file), 0, 0, what, remedy) for what, remedy in chain_faults(folder, seal, runs)]
     return faults
@@ -257,7 +238,6 @@ def _from(folder: Path, name: str, stored: str) -> str:
 
 
 def _changed_keys(before: Path, after: Path) -> str:
-    """Return the changed keys of a file; empty if unknown."""
     documents = load_yaml(before, []), load_yaml(after, [])
     if documents[0] is None or documents[1] is None:
         return ""

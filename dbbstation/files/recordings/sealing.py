@@ -50,7 +50,6 @@ class Sealing:
         chained: text with hashes and chain, and the old seal.
         files: run files that get a hash.
         linked: runs that join the chain.
-        before: text of the session file now.
         logged: whether the session has an event log.
         copies: damaged or missing copies.
     """
@@ -78,9 +77,6 @@ class Sealing:
 def seal_session(folder: Path) -> Sealing:
     """Seal a session: hashes, event log and copies.
 
-    Returns:
-        What was done.
-
     Raises:
         InputError: as of `sealing`.
         OutputError: another process writes into the session, or the disk refuses; the session file is restored.
@@ -104,9 +100,9 @@ def _marked(seal: Seal, said: Mapping[str, Any]) -> Seal:
 
 
 def sealing(folder: Path) -> Sealing:
-    """Find what a session file lacks of its seal, and its complete text, without writing.
+    """Return the missing parts of a seal, and the complete text of the session file, without writing.
 
-    Comments, order and spelling stay. Runs being recorded get no hash.
+    Comments, order and spelling are kept. Runs being recorded get no hash.
 
     Raises:
         InputError: no session file, no list of runs, a missing file, or a change of what was sealed.
@@ -234,7 +230,6 @@ def _added(text: str, additions: Sequence[tuple[int, str]]) -> str:
 
 
 def _entry(node: Node | None, key: str) -> Node | None:
-    """Return a mapping's value, or None."""
     if not isinstance(node, MappingNode):
         return None
     return next((value for name, value in node.value if name.value == key), None)

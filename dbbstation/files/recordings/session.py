@@ -73,7 +73,7 @@ class SessionFolder(SessionDetails):
     Attributes:
         machine: nominal, as the controller had it.
         runs: in starting order, of every state.
-        keeps: recordings that were read stay, for a command that needs them more than once.
+        keeps: recordings stay in memory, for a command that needs them repeatedly.
     """
 
     name: str
@@ -108,19 +108,11 @@ class SessionFolder(SessionDetails):
         return circle if run.centre_mm is None else replace(circle, centre_mm=run.centre_mm)
 
     def bar_temp_c(self, logged: Mapping[str, NDArray[np.float64]]) -> float | None:
-        """Return the bar's temperature by its thermometer, else the shop's; None if unknown.
-
-        Args:
-            logged: temperatures by sensor, shape (n,) each [degC].
-        """
+        """Return the bar's temperature by its thermometer, else the shop's; None if unknown."""
         return float(np.mean(logged["bar"])) if "bar" in logged else self.ambient_temp_c
 
     def setup(self, run: RunEntry, logged: Mapping[str, NDArray[np.float64]] = MappingProxyType({})) -> Setup:
-        """Return ball, mounting and bar of a run under names unique among sessions.
-
-        Args:
-            logged: temperatures by sensor, shape (n,) each [degC].
-        """
+        """Return ball, mounting and bar of a run under names unique among sessions."""
         ball = self.plan.tests[run.test].ball
         mounted = mounted_name(self.plan, run.test, run.mounting)
         long_mm, uncertainty_mm = (
@@ -251,9 +243,6 @@ def read_session(path: Path, *, keeps: bool = False) -> SessionFolder:
 
     Hashes of all files are checked here; runs when they are loaded.
 
-    Args:
-        keeps: as of `SessionFolder`.
-
     Raises:
         InputError: every fault of session, machine and plan, every missing or changed file.
     """
@@ -267,12 +256,12 @@ def read_session(path: Path, *, keeps: bool = False) -> SessionFolder:
 
 
 def opened(session: Path | SessionFolder) -> SessionFolder:
-    """Return a session, read where it is not yet; raises as `read_session`."""
+    """Return a session, reading it if necessary; raises as `read_session`."""
     return session if isinstance(session, SessionFolder) else read_session(session)
 
 
 def no_session(folder: Path) -> Problem:
-    """Return what is wrong with a folder without a session, with sessions nearby."""
+    """Return the fault of a folder without a session, with sessions nearby."""
     if (folder / EVENTS_FILE).is_file():
         what = f"the session file {SESSION_FILE} is gone, its event log is there"
         return Problem(str(folder), 0, 0, what, REBUILD.format(folder=folder))
@@ -285,7 +274,7 @@ def no_session(folder: Path) -> Problem:
 
 
 def _other_than_session(path: Path) -> Problem | None:
-    """Return why a path is evidently no session."""
+    """Return why a path evidently has no session."""
     if path.is_dir():
         return None if (path / SESSION_FILE).exists() else no_session(path)
     if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:  # such as the log beside them, by `shop/*`
@@ -365,7 +354,7 @@ def parse_session(
 
 
 def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Problem]) -> list[RunEntry]:
-    """Return runs that were recording when the station died before noting them."""
+    """Return runs whose recording was interrupted before they were listed."""
     listed = {run.path.name for run in entries}
     found = []
     for path in sorted(folder.glob(f"runs/*.csv{PART}"), key=lambda one: natural(one.name)):

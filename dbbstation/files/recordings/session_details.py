@@ -1,4 +1,4 @@
-"""What a session notes beside its runs."""
+"""A session's notes beside its runs."""
 
 from __future__ import annotations
 
@@ -14,14 +14,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SessionDetails:
-    """What a session notes beside its runs; everything optional.
+    """A session's notes beside its runs; all optional.
 
     Attributes:
         bar_waiver: why the bar has no fresh calibration; empty if it has.
         set_up_errors: micrometer readings of balls under the spindle.
-        amendments: oldest first.
         notes: oldest first.
-        job: job or order number.
         instrument: at the beginning; None: not noted.
     """
 

@@ -75,7 +75,7 @@ def mounted_name(plan: Plan, test: str, mounting: int | None) -> str:
 
 
 def check_set_up_errors(document: YamlDocument, plan: Plan | None, faults: list[Problem]) -> None:
-    """Check readings against runs, plan and each other on the raw data, so that other faults hide nothing."""
+    """Check readings against runs, plan and each other on the raw data, independently of other faults."""
     mountings: dict[str, list[Any]] = {}
     for _, run in document.entries("runs"):
         test = run.get("test")

@@ -64,11 +64,7 @@ class Stands(Enum):
 
 @dataclass(frozen=True)
 class Standing:
-    """Relation of a session file to its event log.
-
-    Attributes:
-        differences: in words, if they are unlike.
-    """
+    """Relation of a session file to its event log."""
 
     stands: Stands
     differences: tuple[str, ...] = ()
@@ -79,7 +75,6 @@ def standing(data: Mapping[str, Any], log: EventLog | None, *, but_runs: bool = 
     """Compare a session file with its event log.
 
     Args:
-        log: None if there is none.
         but_runs: skip the list of runs, whose chain is checked already.
     """
     mark, state = mark_of(data), session_state(data)
@@ -106,7 +101,6 @@ def _log_fault(count: int, log: EventLog | None) -> str:
 
 
 def _unmarked(state: Mapping[str, Any], log: EventLog) -> Standing:
-    """Judge a log unknown to its file: the writer died at the start, or the seal was removed."""
     first = log.state(1)
     if len(log.events) == 1 and log.events[0].what == SEALED and not differences(_unsealed(first), _unsealed(state)):
         return Standing(Stands.BEHIND)
@@ -139,7 +133,6 @@ def differences(before: Mapping[str, Any], after: Mapping[str, Any], *, but_runs
 
 
 def _by_run(state: Mapping[str, Any]) -> dict[str, object]:
-    """Return the state with runs by name, for messages."""
     runs = state.get("runs", ())
     if not runs:
         return dict(state)

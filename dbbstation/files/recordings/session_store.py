@@ -1,7 +1,7 @@
 """Read and write a session file and its event log together, under the session's lock.
 
-An event reaches the disk before the session file. If a writer died in between, the file is brought up to its log. A file
-is replaced only if it is the one that was read.
+An event reaches the disk before the session file. If a writer ended in between, the file is completed from its log. A
+file is replaced only if it is unchanged since it was read.
 """
 
 from __future__ import annotations
@@ -67,12 +67,7 @@ def marked(state: Mapping[str, Any], log: EventLog) -> dict[str, object]:
 
 
 def first_log(data: Mapping[str, Any], at: datetime | None) -> tuple[bytes, dict[str, object]]:
-    """Return the log of a new session and its session file's content.
-
-    Args:
-        data: without the log's position.
-        at: None if that means nothing.
-    """
+    """Return the log of a new session and its session file's content."""
     state: Mapping[str, Any] = session_state(data)
     line = line_of("", "created", at, change({}, state))
     return line, _with_mark(data, state, 1, line[:64].decode())
@@ -86,7 +81,7 @@ def _with_mark(data: Mapping[str, Any], state: Mapping[str, Any], events: int, s
 def document_in_force(file: Path, faults: list[Problem]) -> tuple[YamlDocument | None, EventLog | None]:
     """Read a session file and its log; no document, with faults added to `faults`, if unreadable.
 
-    A file behind its log is brought up to it.
+    A file behind its log is completed from it.
     """
     found: list[Problem] = []
     document = read_document(file, SessionFile, found)
@@ -108,7 +103,6 @@ def log_faults(file: Path, data: Mapping[str, Any], log: EventLog | None, *, but
     """Return differences of a session file and its event log.
 
     Args:
-        log: None if there is none.
         but_runs: skip the list of runs, whose chain is checked already.
     """
     stands = standing(data, log, but_runs=but_runs)
@@ -129,13 +123,12 @@ class SessionStore:
     A damaged, missing or outdated session file is written anew from the log; what was there is kept.
 
     Args:
-        clock: time with its zone, for the log.
         anew: write the session file from the log in any case.
 
     Attributes:
         log: empty if the session has none yet.
         sha256: of the session file at the last reading or writing.
-        put_aside: where a replaced session file is kept; empty if it was missing, None if none was replaced.
+        put_aside: place of a replaced session file; empty if it was missing, None if none was replaced.
 
     Raises:
         InputError: there is no session, or neither file nor log is readable.
@@ -166,10 +159,6 @@ class SessionStore:
 
     def write(self, data: Mapping[str, Any], what: str, text: Callable[[Mapping[str, Any]], str] = text_of) -> None:
         """Log what has changed, then write the session file.
-
-        Args:
-            data: without the log's position.
-            what: in a word or two.
 
         Raises:
             OutputError: the file has changed since it was read, or the disk refuses; both are restored.
@@ -216,7 +205,7 @@ class SessionStore:
         self.state = self.log.state()
 
     def begin_anew(self) -> None:
-        """Remove an unreliable log, which the caller has kept elsewhere."""
+        """Remove an unreliable log that the caller has copied elsewhere."""
         (self._file.parent / EVENTS_FILE).unlink(missing_ok=True)
         self.log = EventLog(self._file.parent / EVENTS_FILE)
 
@@ -239,9 +228,6 @@ class SessionStore:
 
     def accept_readings(self, data: Mapping[str, Any]) -> None:
         """Accept a session file into which somebody wrote readings only.
-
-        Args:
-            data: from `changed_meanwhile`.
 
         Raises:
             OutputError: something else was changed too.

@@ -22,12 +22,7 @@ if TYPE_CHECKING:
 def session_data(
     folder: Path, names: Sequence[str], details: SessionDetails, runs: Sequence[RunEntry]
 ) -> dict[str, object]:
-    """Return a session file's content without its format.
-
-    Args:
-        names: paths of machine and plan, in this order.
-        runs: in the order of the list.
-    """
+    """Return a session file's content without its format."""
     bar, seal = details.bar, details.seal
     data: dict[str, object] = {
         "machine": names[0],

@@ -1,4 +1,4 @@
-"""Keep a session file true while runs are recorded and judged."""
+"""Keep a session file correct while runs are recorded and judged."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 class SessionWriter:
     """Keeps one session folder while runs are recorded.
 
-    Every step survives a crash: the `.part` exists before the session file names it, and is sealed before it is called
-    complete. Readings that somebody saves meanwhile are taken over. If they are wrong, the next step raises InputError
-    and leaves the file.
+    Every step survives a crash: the `.part` exists before the session file names it, and is sealed before it is marked
+    complete. Readings saved by a user meanwhile are accepted. If they are wrong, the next step raises InputError and
+    leaves the file.
     """
 
     def __init__(self, folder: Path, lock: SessionLock, clock: Callable[[], datetime]) -> None:
@@ -74,9 +74,6 @@ class SessionWriter:
     ) -> Self:
         """Make a session folder with machine and plan and no runs.
 
-        Args:
-            clock: time with its zone, for the log.
-
         Raises:
             InputError: what no session may note.
             OutputError: the folder exists, lies in another session, or cannot be written.
@@ -86,7 +83,6 @@ class SessionWriter:
 
     @classmethod
     def _locked(cls, folder: Path, patience_s: float, clock: Callable[[], datetime]) -> Self:
-        """Lock, then read."""
         lock = SessionLock(folder, patience_s)
         try:
             writer = cls(folder, lock, clock)
@@ -103,8 +99,7 @@ class SessionWriter:
         A damaged session file is written anew from the log.
 
         Args:
-            patience_s: how long to wait for another writer.
-            clock: time with its zone, for the log.
+            patience_s: waiting time for another writer.
 
         Raises:
             InputError: every fault of the session.
@@ -160,9 +155,7 @@ class SessionWriter:
         """Start a test's next repeat: make its `.part` and note it as `recording`.
 
         Args:
-            columns: as `RunWriter` takes them.
             started: first sample, with its zone.
-            mounting: number of the ball's set-up.
             program: from `add_program`; None: the plan's circle.
             centre_mm: as programmed; None: as planned.
             instrument: None: not noted.
@@ -282,7 +275,6 @@ class SessionWriter:
         self._session = replace(session, runs=runs, seal=sealed_over(found, runs))
 
     def _put(self, entry: RunEntry) -> RunEntry:
-        """Put an entry at its place or at the end and return it."""
         key = (entry.test, entry.direction, entry.repeat)
         runs = tuple(({(run.test, run.direction, run.repeat): run for run in self.runs} | {key: entry}).values())
         seal = self._session.seal
@@ -293,7 +285,6 @@ class SessionWriter:
         return next(run for run in runs if (run.test, run.direction, run.repeat) == key)
 
     def _write(self, what: str) -> None:
-        """Log and write the session; on failure restore the last state."""
         try:
             self._take_readings()
             session = self._session

@@ -202,7 +202,6 @@ def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: i
 
 
 def _plain(cells: Sequence[str], values: NDArray[np.float64], language: NumberLanguage) -> tuple[str, ...]:
-    """Return cells with a decimal point; texts unchanged."""
     return tuple(
         cell.replace(language.decimal, PLAIN.decimal) if np.isfinite(value) else cell
         for cell, value in zip(cells, values, strict=True)
@@ -210,7 +209,6 @@ def _plain(cells: Sequence[str], values: NDArray[np.float64], language: NumberLa
 
 
 def _numbers(cells: Sequence[str], language: NumberLanguage) -> NDArray[np.float64]:
-    """Return numbers of cells; NaN for others."""
     plain: Sequence[str] = cells
     if language.decimal != PLAIN.decimal and not any(PLAIN.decimal in cell for cell in cells):
         plain = [cell.replace(language.decimal, PLAIN.decimal) for cell in cells]

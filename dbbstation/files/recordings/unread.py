@@ -1,4 +1,4 @@
-"""Recognise files that are no tables, and columns separated by spaces."""
+"""Recognise files that are not tables, and columns separated by spaces."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LOOKED_AT = 4_000
 
 
 def kind_of(data: bytes) -> tuple[str, str] | None:
-    """Return kind and remedy of a file that is no table, or None."""
+    """Return kind and remedy of a file that is not a table, or None."""
     for beginning, what, remedy in _BEGINNINGS:
         if data.startswith(beginning):
             return what, remedy

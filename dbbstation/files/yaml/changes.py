@@ -40,7 +40,6 @@ def _is_list(value: object) -> TypeGuard[Sequence[object]]:
 
 
 def _by_name(entries: Sequence[object]) -> dict[str, object] | None:
-    """Return entries by name; None if names lack or repeat."""
     named: dict[str, object] = {
         str(entry["name"]): entry for entry in entries if isinstance(entry, Mapping) and "name" in entry
     }

@@ -1,4 +1,4 @@
-"""Common base of schemas, strict and frozen; complaints become placed problems."""
+"""Common base of schemas, strict and frozen; complaints become problems with a place."""
 
 import difflib
 from collections.abc import Iterator
@@ -145,7 +145,6 @@ def _in_words(kind: str, given: object, context: dict[str, Any], message: str) -
 
 
 def _place(document: YamlDocument, detail: ErrorDetails) -> tuple[int, int]:
-    """Return line and column of a pydantic complaint."""
     location = _known_part(document, detail["loc"])
     return document.key_places.get(location) or document.value_places.get(location, (0, 0))
 
@@ -173,7 +172,6 @@ def _shown(value: object) -> str:
 
 
 def _known_part(document: YamlDocument, location: tuple[int | str, ...]) -> Location:
-    """Drop union members and `[key]` from a pydantic location."""
     known: Location = ()
     for step in location:
         if (*known, step) in document.value_places:

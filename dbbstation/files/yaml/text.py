@@ -58,7 +58,7 @@ class YamlDocument:
         return Problem(self.file, *self.value_places.get(around, (1, 1)), what, remedy)
 
     def entries(self, *location: str | int) -> list[tuple[Location, dict[Any, Any]]]:
-        """Return the mappings in a sequence or mapping; nothing for other types.
+        """Return the mappings in a sequence or mapping; empty for other types.
 
         Checks across entries thus work on files with other faults.
         """

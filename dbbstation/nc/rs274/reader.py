@@ -541,11 +541,7 @@ class _Interpreter:
             )
 
     def _target(self, block: ProgramBlock, *, in_machine: bool = False, through: bool = False) -> NDArray[np.float64]:
-        """Return the pose that a block leads to in machine coordinates, shape (6,).
-
-        Args:
-            through: of a reference point: an axis that is not known may stay so.
-        """
+        """Return the pose that a block leads to in machine coordinates, shape (6,)."""
         target: list[float] = self._state.pose.tolist()  # six numbers are sooner done without arrays
         offset = (0.0,) * 6 if in_machine else self._state.offset
         for axis, letter in enumerate(AXES):

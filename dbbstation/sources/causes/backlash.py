@@ -34,10 +34,10 @@ class Backlash(SourceWithHistory):
     """After a reversal a strut lags by its play until the drive has travelled through it.
 
     With commanded travel x and play w, y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2. The error y - x is -w/2 while
-    growing and +w/2 while shrinking. Wind-up against friction has the same ends over a longer travel: `_WoundUp`.
+    growing and +w/2 while shrinking. Wind-up against friction reaches the same limits over a longer travel: `_WoundUp`.
 
-    A run begins in a movement under way. Negative w is an overshoot, with the sign of |w|'s effect inverted, so that a
-    fit may pass zero.
+    A run begins in motion. Negative w is an overshoot, with the sign of |w|'s effect inverted, so that a fit may pass
+    zero.
     """
 
     name = "backlash"
@@ -61,18 +61,12 @@ class Backlash(SourceWithHistory):
     )
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
-        """The law of wind-up."""
         return (_WoundUp(),)
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: it stays behind")
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
-        """Return the end of its play that each strut leans on.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
         self.require(motion)
         return leaning(motion.struts(machine).length_mm)
 
@@ -83,18 +77,12 @@ class Backlash(SourceWithHistory):
         return Effect(strut_mm=lag), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Each strut answers to its own play; analytic except at pick-up samples.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
         _, by_width, _ = self._lag(motion, machine, values, self.begin(motion, machine, values))
         return Effect(strut_mm=MM_PER_UM * by_width[:, :, None] * np.eye(STRUTS))
 
     def _lag(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
-        """Return lag [mm] and its derivative by width [mm/mm], shapes (n, 6), and the last state."""
         lag, by_width, behind = followed(motion.struts(machine).length_mm, MM_PER_UM * np.abs(values), state)
         return np.where(values < 0.0, -lag, lag), by_width, behind
 
@@ -126,7 +114,6 @@ class _WoundUp(SourceWithHistory):
 
     @property
     def simpler_law(self) -> str:
-        """Play: wind-up without travel."""
         return Backlash().law
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
@@ -135,11 +122,6 @@ class _WoundUp(SourceWithHistory):
         return (*widths, Parameter("wind_up_length_mm", "mm", 0.05, meaning, LENGTHS_MM))
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> WoundState:  # noqa: ARG002
-        """Return struts wound up by their movement.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
         self.require(motion)
         return wound(motion.struts(machine).length_mm)
 
@@ -150,11 +132,6 @@ class _WoundUp(SourceWithHistory):
         return Effect(strut_mm=side * MM_PER_UM * values[:STRUTS]), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By each strut's width, and by the length.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
         length, is_stated = _lengths(values)
         width = MM_PER_UM * values[:STRUTS]
         start = self.begin(motion, machine, values)
@@ -165,6 +142,5 @@ class _WoundUp(SourceWithHistory):
 
 
 def _lengths(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return each strut's wind-up length [mm], and where it is the stated one, shape (6,)."""
     least = np.maximum(AHEAD * MM_PER_UM * np.abs(values[:STRUTS]), 1e-9)
     return np.maximum(values[STRUTS], least), values[STRUTS] >= least

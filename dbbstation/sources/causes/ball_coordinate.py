@@ -35,12 +35,10 @@ class BallCoordinate(LinearSource):
         return tuple(Parameter(f"{axis}_mm", "mm", 0.001, f"ball actual minus CMM {axis.upper()}") for axis in "xyz")
 
     def shared_by(self, motion: Motion) -> str:
-        """Runs of one CMM entry share its error."""
         return "" if motion.setup is None else motion.setup.ball
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         return Effect(fixed_ball_mm=np.eye(3))
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
-        """Return the CMM's uncertainty per axis."""
         return None if motion.setup is None else np.full(3, motion.setup.ball_uncertainty_mm)

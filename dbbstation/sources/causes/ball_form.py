@@ -20,11 +20,11 @@ ORDERS = (2, 3, 4, 5)
 
 
 class BallForm(LinearSource):
-    """The fixed ball stands proud by h under the bar and lowers the reading by h.
+    """The fixed ball rises by h under the bar and lowers the reading by h.
 
-    With n from fixed to moving ball, h = Re sum (a_k - i b_k) (n_x + i n_y)^k, k = 2 ... 5, sectoral spherical harmonics:
-    a_k cos k theta + b_k sin k theta for a level bar. The ball's mark gives the same orientation in every mounting. Level
-    circles see the moving ball from all sides too, so both balls' forms are found together.
+    With n from fixed to moving ball, h = Re sum (a_k - i b_k) (n_x + i n_y)^k, k = 2 ... 5, sectoral spherical
+    harmonics: a_k cos k theta + b_k sin k theta for a level bar. The ball's mark gives the same orientation in every
+    mounting. Level circles also touch the moving ball from all sides, so both balls' forms are found together.
     """
 
     name = "ball-form"
@@ -57,7 +57,6 @@ class BallForm(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Harmonics of the bar's direction; zero for unmeasured poses."""
         if motion.setup is None:
             return Effect(reading_mm=np.zeros((len(motion), 2 * len(ORDERS))))
         away = motion.poses[:, :3] - motion.setup.fixed_ball_mm

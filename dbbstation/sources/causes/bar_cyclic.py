@@ -47,7 +47,6 @@ class BarCyclic(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Sine, cosine and signal period; usual encoders interpolate to a hundredth of their period."""
         return (
             Parameter("sine_um", "µm", 0.2, "sine of the reading's error along the encoder's scale"),
             Parameter("cosine_um", "µm", 0.2, "cosine of the reading's error along the encoder's scale"),
@@ -67,20 +66,10 @@ class BarCyclic(ErrorSource):
         return bool(np.median(swept) >= MM_PER_UM * nonlinear[0])
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Return the wave in the reading.
-
-        Raises:
-            ModelError: the motion has no reading.
-        """
         waves, _ = self._waves(motion, values[2])
         return Effect(reading_mm=MM_PER_UM * waves @ values[:2])
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By sine, cosine and period.
-
-        Raises:
-            ModelError: the motion has no reading.
-        """
         waves, by_period = self._waves(motion, values[2])
         sine, cosine = waves.T
         period = by_period * (values[0] * cosine - values[1] * sine)

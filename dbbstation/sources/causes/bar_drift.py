@@ -47,25 +47,14 @@ class BarDrift(ErrorSource):
         return warm_up_parameters(Parameter("drift_um", "µm", 2.0, meaning), "pause_loss_um", 1800.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Return the drift.
-
-        Raises:
-            ModelError: the motion has no time.
-        """
         self.require(motion)
         return Effect(reading_mm=MM_PER_UM * grown(motion, values))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the law's three parameters.
-
-        Raises:
-            ModelError: the motion has no time.
-        """
         self.require(motion)
         return Effect(reading_mm=MM_PER_UM * grown_by(motion, values))
 
     def by_temperature(self) -> ErrorSource:
-        """The bar by its thermometer."""
         return _ByTemperature()
 
 

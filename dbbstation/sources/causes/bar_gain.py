@@ -47,7 +47,7 @@ class BarGain(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """The commanded way; zero without calibrated length or ball place."""
+        """Return the commanded way; zero without calibrated length or ball place."""
         setup = motion.setup
         if setup is None or setup.bar_length_mm is None or not setup.place_known:
             return Effect(reading_mm=np.zeros((len(motion), 1)))

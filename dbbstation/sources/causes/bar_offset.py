@@ -35,5 +35,4 @@ class BarOffset(LinearSource):
         return Effect(reading_mm=np.ones(1))
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
-        """Return the calibrator's uncertainty."""
         return None if motion.setup is None else np.array([motion.setup.bar_uncertainty_mm])

@@ -51,11 +51,6 @@ class BarScale(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the bow.
-
-        Raises:
-            ModelError: the motion has no reading.
-        """
         self.require(motion)
         reading = reading_without_noise_mm(motion)
         way = (reading - np.round(np.median(reading))) / REACH_MM

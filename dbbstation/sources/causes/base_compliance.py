@@ -42,11 +42,6 @@ class BaseCompliance(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return two compliances.
-
-        Raises:
-            ModelError: the machine file has no masses.
-        """
         platform_masses(self.name, machine)
         return tuple(
             Parameter(f"{way}_um_kn", "µm/kN", 3.0, f"{way} shift of a base joint per {way} force on it", positive=True)
@@ -54,12 +49,6 @@ class BaseCompliance(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Shift of each base joint per compliance.
-
-        Raises:
-            ModelError: the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         frames, struts = motion.frames(machine), motion.struts(machine)
         force = base_loads(struts, stated_tensions(self.name, machine, frames, struts), machine.strut_masses)
         horizontal, vertical = np.diag([1.0, 1.0, 0.0]), np.diag([0.0, 0.0, 1.0])

@@ -37,7 +37,6 @@ class BaseJoints(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Eighteen coordinates; their usual size is the machine file's joint tolerance where it has one."""
         stated = machine.joint_tolerance_mm
         return tuple(
             Parameter(

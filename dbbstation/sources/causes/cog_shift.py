@@ -46,11 +46,6 @@ class CogShift(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return three coordinates.
-
-        Raises:
-            ModelError: the machine file has no masses.
-        """
         platform_masses(self.name, machine)
         counted = for_such_struts(machine)
         return tuple(
@@ -59,22 +54,10 @@ class CogShift(LinearSource):
         )
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Return the effect of the whole shift at once.
-
-        Raises:
-            ModelError: the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         stretch, tension = self._of_a_shift(motion, machine, values)
         return Effect(strut_mm=stretch, load_n=tension)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each coordinate its own moment.
-
-        Raises:
-            ModelError: the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         each = [self._of_a_shift(motion, machine, axis) for axis in np.eye(3)]
         stretch, tensions = (np.stack(one, axis=-1) for one in zip(*each, strict=True))
         return Effect(strut_mm=stretch, load_n=tensions)
@@ -82,7 +65,6 @@ class CogShift(LinearSource):
     def _of_a_shift(
         self, motion: Motion, machine: Machine, shift_mm: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return stretch [mm] and tension [N] of struts, shape (n, 6) each, by a platform-frame shift, shape (3,)."""
         weight_n = platform_masses(self.name, machine).platform_kg * GRAVITY_M_S2
         struts = motion.struts(machine)
         x, y, _ = (motion.frames(machine).rotation @ shift_mm).T

@@ -38,15 +38,15 @@ MOTOR_OF_GAIN = {of_motor(motor, PER_MOTOR[0]): motor for motor in range(1, STRU
 
 
 class DriveFriction(ErrorSource):
-    """A motor's current holds its load, and drive friction helps or hinders it.
+    """A motor's current balances its load; drive friction helps or opposes it.
 
-    I = k (F - s (F_c + e |F|) - b v - a): load F, positive if the platform pulls; speed v and direction s, positive while
-    growing. e is the screw's loss, 1 / efficiency - 1 against the load and 1 - efficiency with it. a is half the
+    I = k (F - s (F_c + e |F|) - b v - a): load F, positive if the platform pulls; speed v and direction s, positive
+    while growing. e is the screw's loss, 1 / efficiency - 1 against the load and 1 - efficiency with it. a is half the
     asymmetry of Coulomb friction, or an offset of the current's zero.
 
     The load follows from the machine file's weights, the centre of gravity and struts' weights at the actual pose. Only
-    the product of gain and weight is known; the weight is taken as stated. After a reversal friction turns linearly
-    within TURNED_OVER_MM, where readings mean nothing. Bars and poses do not depend on this source.
+    the product of gain and weight is determined; the weight is taken as stated. After a reversal friction changes sign
+    linearly within TURNED_OVER_MM, where readings are unusable. Bars and poses do not depend on this source.
     """
 
     name = "drive-friction"
@@ -70,11 +70,6 @@ class DriveFriction(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return five parameters for each motor.
-
-        Raises:
-            ModelError: the machine file has no masses.
-        """
         platform_masses(self.name, machine)
         found = []
         for motor in range(1, STRUTS + 1):
@@ -93,20 +88,10 @@ class DriveFriction(ErrorSource):
         return tuple(found)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Currents of the motors.
-
-        Raises:
-            ModelError: the motion has no time; the machine file has no masses.
-        """
         carried, _ = _carried(self._driven(motion, machine), values)
         return Effect(current_a=_by_motor(values)[0] / N_PER_KN * carried)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Each motor answers to its own parameters.
-
-        Raises:
-            ModelError: the motion has no time; the machine file has no masses.
-        """
         carried, frictions = _carried(self._driven(motion, machine), values)
         gain = _by_motor(values)[0][:, None] / N_PER_KN
         answers = np.concatenate([carried[:, :, None] / N_PER_KN, -gain * frictions], axis=2)
@@ -116,11 +101,6 @@ class DriveFriction(ErrorSource):
         return Effect(current_a=by_parameter.reshape(len(answers), STRUTS, -1))
 
     def current_per_load(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gain, less friction's share of a growing load.
-
-        Raises:
-            ModelError: the motion has no time; the machine file has no masses.
-        """
         gain, share = _by_motor(values)[[0, 3]] / N_PER_KN
         load, direction, _ = self._driven(motion, machine)
         answer: NDArray[np.float64] = gain * (1.0 - share * direction * np.sign(load))
@@ -129,7 +109,6 @@ class DriveFriction(ErrorSource):
     def _driven(
         self, motion: Motion, machine: Machine
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return load [N], direction from -1 to 1, positive while growing, and speed [mm/s] of struts, (n, 6)."""
         if motion.time_s is None:
             self.require(motion)
         time_s, length, place = driven_in_time(motion, machine)
@@ -158,14 +137,12 @@ def driven_directions(motion: Motion, machine: Machine) -> NDArray[np.float64]:
 
 
 def _by_motor(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return parameters by kind and motor, shape (5, 6)."""
     return values.reshape(STRUTS, len(PER_MOTOR)).T
 
 
 def _carried(
     driven: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the load carried by current, shape (n, 6) [N], and frictions per parameter, shape (n, 6, 4)."""
     load, direction, speed = driven
     frictions = np.stack([direction, speed, direction * np.abs(load) / N_PER_KN, np.ones_like(load)], axis=-1)
     return load - np.einsum("nik,ki->ni", frictions, _by_motor(values)[1:]), frictions

@@ -54,31 +54,18 @@ class Gravity(LinearSource):
     )
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
-        """The one with contacts that stiffen."""
         return (_Contacts(),)
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return one compliance, of the design's size if stated.
-
-        Raises:
-            ModelError: the machine file has no masses.
-        """
         platform_masses(self.name, machine)
         usual = strut_compliance(machine).at_1000mm_mm_per_n / MM_PER_N
         meaning = "elongation of a strut of 1000 mm per force that pulls it, positive"
         return (Parameter("strut_compliance_um_kn", "µm/kN", usual, meaning, positive=True),)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Elongation of each strut per compliance.
-
-        Raises:
-            ModelError: the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         return Effect(strut_mm=_stretched(motion, machine)[1][:, :, None])
 
     def found_compliance(self, machine: Machine, values: NDArray[np.float64]) -> Compliance | None:
-        """Return the fitted compliance; None while zero."""
         if values[0] == 0.0:
             return None
         return replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N * float(values[0]))
@@ -93,9 +80,9 @@ EACH e->strut[i] += stretch(at, i, 1e-6 * v[0]) * t[i];"""
 
 
 class _Contacts(Gravity):
-    """Struts on contacts, each e-fold of whose load takes h off their compliance: c(L) T - h T ln(hypot(T, 0.1 kN) / 1 kN).
+    """Struts on contacts whose compliance falls by h per e-fold of load: c(L) T - h T ln(hypot(T, 0.1 kN) / 1 kN).
 
-    So rollers do, and a contact by a power of its load does nearly so.
+    Rollers behave so; a power law of the load nearly so.
     """
 
     @property
@@ -103,36 +90,19 @@ class _Contacts(Gravity):
         return "contacts"
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
-        """None beside the one it belongs to."""
         return ()
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return the compliance at 1 kN, and how it falls.
-
-        Raises:
-            ModelError: the machine file has no masses.
-        """
         (compliance,) = super().parameters(machine)
         meaning = "compliance that a strut loses as its force grows 2.72 times; the other value is that at 1 kN"
         return (compliance, Parameter("stiffening_um_kn", "µm/kN", STIFFENING * compliance.plausible, meaning))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the compliance, and by what contacts take off it.
-
-        Raises:
-            ModelError: the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         tension, stretch = _stretched(motion, machine)
         return Effect(strut_mm=np.stack([stretch, -MM_PER_N * tension * _folds(tension, ACROSS_N)], axis=2))
 
     def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By another load across, and by contacts that are softer where the strut is longer, as all of it is.
-
-        Raises:
-            ModelError: the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
+        """Return effects of another load across, and of contacts softer where the strut is longer."""
         tension, stretch = _stretched(motion, machine)
         own, folds = MM_PER_N * tension, _folds(tension, ACROSS_N)
         changes = [own * (folds - _folds(tension, 3.0 * ACROSS_N)), (own - stretch) * folds]
@@ -144,7 +114,6 @@ class _Contacts(Gravity):
 
 
 def _folds(tension: NDArray[np.float64], across_n: float) -> NDArray[np.float64]:
-    """Return e-folds of contact loads above 1 kN, shape (n, 6)."""
     return np.log(PER_KN * np.hypot(tension, across_n))
 
 
@@ -156,7 +125,6 @@ STIFFENING = 0.1
 
 
 def _stretched(motion: Motion, machine: Machine) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return tensions [N] and elongations per compliance [mm per µm/kN], shape (n, 6)."""
     masses = platform_masses(Gravity.name, machine)
     frames, struts = motion.frames(machine), motion.struts(machine)
     tension = strut_tensions(struts, platform_weight(frames, masses))

@@ -24,8 +24,8 @@ MOST_RUNS = 120
 class JigBump(ErrorSource):
     """From one run on, all balls on the table are shifted alike.
 
-    Many badly seated balls in one direction are less probable than one bump. A bump between a test's directions shows at
-    once.
+    One bump is more probable than many badly seated balls in one direction. A bump between a test's two directions is
+    visible at once.
     """
 
     name = "jig-bump"
@@ -59,36 +59,23 @@ class JigBump(ErrorSource):
         )
 
     def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:
-        """Return whether runs lie before and after it."""
         after = [_is_after(motion, nonlinear[0]) for motion in motions]
         return any(after) and not all(after)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Return the ball's shift.
-
-        Raises:
-            ModelError: the motion has no time.
-        """
         self.require(motion)
         return Effect(fixed_ball_mm=MM_PER_UM * values[:3] * float(_is_after(motion, values[3])))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the shift; the number of runs before it is not fitted.
-
-        Raises:
-            ModelError: the motion has no time.
-        """
         self.require(motion)
         return Effect(fixed_ball_mm=MM_PER_UM * np.eye(3, 4) * float(_is_after(motion, values[3])))
 
 
 def _is_after(motion: Motion, runs: float) -> bool:
-    """Return whether a motion comes after so many runs, to within rounding."""
     return _number(motion) > runs - 0.5
 
 
 def _number(motion: Motion) -> int:
-    """Return the run's number in its session, from 0; 0 if unknown."""
     if motion.setup is None or motion.time_s is None or not motion.setup.moving_s:
         return 0
     begins = [begin for begin, _ in motion.setup.moving_s]

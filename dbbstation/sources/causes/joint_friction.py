@@ -78,22 +78,12 @@ class JointFriction(SourceWithHistory):
         return of_each_strut("strut_{}_n", "N", 10.0, meaning, positive=True)
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
-        """Return each joint's direction of swing about its axes.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
         self.require(motion)
         return leaning(joint_angles(motion.struts(machine), outer_axes(machine.hexapod)).angle_rad)
 
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[Effect, PlayState]:
-        """Return the stretch of all struts.
-
-        Raises:
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         struts = motion.struts(machine)
         drag, behind = friction_drag(struts, outer_axes(machine.hexapod), state)
         tension = strut_tensions(struts, transverse_load(struts, values[:, None] * drag))
@@ -102,7 +92,7 @@ class JointFriction(SourceWithHistory):
     def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Return effects of the outer axis alone, of either axis as the strut leans over, and of other wind-up angles.
 
-        The two bearings differ, and their load changes with inclination. Wind-up shows only where a joint hardly swings.
+        Bearings differ, and their load changes with inclination. Wind-up is visible only where a joint hardly swings.
         """
         struts, axes = motion.struts(machine), outer_axes(machine.hexapod)
         joints = joint_angles(struts, axes)
@@ -123,12 +113,6 @@ class JointFriction(SourceWithHistory):
         return Effect(strut_mm=np.stack([stretch_mm(struts, compliance, tension) for tension in tensions], axis=-1))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Stretch of all struts per friction of each joint.
-
-        Raises:
-            ModelError: the motion is no path.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         struts = motion.struts(machine)
         drag, _ = friction_drag(struts, outer_axes(machine.hexapod), self.begin(motion, machine, values))
         by_joint = []
@@ -164,11 +148,7 @@ class JointAngles:
 
 
 def joint_angles(struts: Struts, axes: NDArray[np.float64]) -> JointAngles:
-    """Return the joints' angles along a path.
-
-    Args:
-        axes: outer, shape (6, 3) [1].
-    """
+    """Return the joints' angles along a path."""
     unit = struts.unit
     aside = np.einsum("nij,ij->ni", unit, axes)  # sine of the second angle
     round_axis = np.cross(axes, unit)
@@ -189,11 +169,6 @@ def friction_drag(
 ) -> tuple[NDArray[np.float64], PlayState]:
     """Return forces on platform joints for 1 N m of friction about each base axis, (n, 6, 3) [N].
 
-    Args:
-        struts: in time order.
-        axes: outer, shape (6, 3) [1].
-        state: of all axes before the first row; None at the path's begin.
-
     Returns:
         The forces, and the state behind the last row.
     """
@@ -204,11 +179,7 @@ def friction_drag(
 
 
 def drags(joints: JointAngles, acting: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return forces on platform joints for acting shares of 1 N m, (n, 6, 3) [N].
-
-    Args:
-        acting: outer, then inner axes, shape (n, 12).
-    """
+    """Return forces on platform joints for acting shares of 1 N m, (n, 6, 3) [N]."""
     return (
         LEVER_MM * acting[:, :STRUTS, None] * joints.by_first,
         LEVER_MM * acting[:, STRUTS:, None] * joints.by_second,

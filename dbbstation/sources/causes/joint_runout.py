@@ -1,4 +1,4 @@
-"""Joints that are no points."""
+"""Joints that are not points."""
 
 from __future__ import annotations
 
@@ -30,24 +30,23 @@ USUAL_UM = 20.0
 class JointRunout(LinearSource):
     """The axes of a joint do not meet, or its ball is not round: the strut's length changes as the joint swings.
 
-    Let the second axis of a universal joint pass the first at the distance e, towards the strut. Swung by the angle
-    beta about the second axis, the strut reaches e cos(beta) beyond the first, which the controller takes for its
-    end: dL = e (cos(beta) - 1) = -e/2 sin²(beta) for small angles, with sin(beta) = u a, u the strut's direction and a
-    the first axis. An offset that is fixed in the strut is another length.
+    The second axis of a universal joint passes the first at distance e, towards the strut. Swung by beta about the
+    second axis, the strut reaches e cos(beta) beyond the first, which the controller takes as its end: dL = e
+    (cos(beta) - 1) = -e/2 sin²(beta) for small angles. sin(beta) = u a, with strut direction u and first axis a. An
+    offset fixed in the strut is a length error.
 
-    Where the axes point need not be known. With d the strut's direction in base or platform, less what it is in the
-    middle of the travel, along v (in the strut's vertical plane) and h (level), both across the strut there,
+    The axes' directions need not be known. d is the strut's direction in base or platform, minus that at mid-travel,
+    along v (in the strut's vertical plane) and h (level), both across the strut there:
 
-        dL = -1/2 (e_vv d_v² + e_hh d_h² + 2 e_vh d_v d_h),
+    dL = -1/2 (e_vv d_v² + e_hh d_h² + 2 e_vh d_v d_h).
 
-    which holds for a universal joint whose first axis a lies across the strut there (e_vv = e a_v² and so on), and for an
-    oval ball, whose radius is another quadratic form of the direction; all to second order in the swing. Three numbers
-    for each of the twelve joints.
+    This holds to second order for a universal joint whose first axis a is across the strut there (e_vv = e a_v² and so
+    on), and for an oval ball, whose radius is another quadratic form of the direction: three numbers for each of twelve
+    joints.
 
-    Where the strut's end is offset across the strut and goes round the first axis with it, as a crank does, its length
-    changes in the first order, dL = f_v d_v + f_h d_h: what a joint in another place does. In the base that is a part
-    of `base-joints` and left to it; in the platform two numbers more for each strut, and these tests can hardly tell
-    them from `platform-joints`.
+    If the strut's end is offset across the strut and turns about the first axis like a crank, dL = f_v d_v + f_h d_h,
+    equal to a displaced joint. In the base this belongs to `base-joints`. In the platform it needs two more numbers per
+    strut, which tests hardly separate from `platform-joints`.
     """
 
     name = "joint-runout"
@@ -86,7 +85,6 @@ class JointRunout(LinearSource):
         return tuple(found)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Return the effect of each strut's offsets; most of the derivative is zero."""
         lengths = motion.once(self.name, machine, lambda: _per_offset(motion, machine))
         return Effect(strut_mm=MM_PER_UM * np.einsum("nkp,kp->nk", lengths, values.reshape(STRUTS, -1)))
 

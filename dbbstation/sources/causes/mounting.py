@@ -1,4 +1,4 @@
-"""The seat of a holder in one mounting."""
+"""The position of a holder in one mounting."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 
 class Mounting(LinearSource):
-    """The ball is off its place differently in each mounting [CAL III-B].
+    """The ball is displaced differently in each mounting [CAL III-B].
 
-    Usual scatter and a bad seat are one cause of different size.
+    Usual scatter and a bad mounting are one cause of different size.
     """
 
     name = "mounting"
@@ -38,5 +38,4 @@ class Mounting(LinearSource):
         return Effect(fixed_ball_mm=np.eye(3))
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
-        """Return the holder's repeatability per axis."""
         return None if motion.setup is None else np.zeros(3) + motion.setup.mounting_repeatability_mm

@@ -41,7 +41,6 @@ class PlatformJoints(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Eighteen coordinates; their usual size is that of base joints, which are assembled alike."""
         usual = machine.joint_tolerance_mm or 0.2
         return tuple(
             Parameter(

@@ -49,14 +49,14 @@ SHAKING_N = (25.0, 50.0, 100.0, 200.0, 400.0)
 
 
 class Play(SourceWithHistory):
-    """The load closes a strut's play; only friction that holds the load makes it lag.
+    """The load closes a strut's play; it lags only where friction exceeds the load.
 
     With play w, tension T and friction R behind the play: pulled by more than R, the strut is longer by w/2; pushed by
-    more, shorter by w/2, and reversals do nothing. For |T| < R it is `backlash`. Tensions are nominal at commanded poses,
-    with the machine file's weights.
+    more, shorter by w/2, and reversals have no effect. For |T| < R it is `backlash`. Tensions are nominal at commanded
+    poses, with the machine file's weights.
 
-    A run begins in a movement under way. Negative w is the mirror image. The friction is searched among stated values,
-    since the error changes with it only at single samples.
+    A run begins in motion. Negative w is the mirror image. The friction is searched among stated values, because the
+    error changes with it only at single samples.
     """
 
     name = "play"
@@ -83,48 +83,25 @@ class Play(SourceWithHistory):
     )
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
-        """The one of a strut that is shaken."""
         return (_Shaken(),)
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return six plays, full width, and one friction.
-
-        Raises:
-            ModelError: the machine file has no masses.
-        """
         platform_masses(self.name, machine)
         plays = of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: load closes it")
         meaning = "force in a strut below which friction holds it, all struts alike"
         return (*plays, Parameter("friction_n", "N", 100.0, meaning, FRICTION_N))
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
-        """Return the end of its play that each friction-held strut leans on.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
         self.require(motion)
         return leaning(motion.struts(machine).length_mm)
 
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[Effect, PlayState]:
-        """Return the strut's place in its play.
-
-        Raises:
-            ModelError: the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         place, _, behind = self._places(motion, machine, values, state)
         return Effect(strut_mm=place), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Each strut answers to its own play, not to the friction.
-
-        Raises:
-            ModelError: the motion is no path, or the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         _, by_width, _ = self._places(motion, machine, values, self.begin(motion, machine, values))
         by_play = MM_PER_UM * by_width[:, :, None] * np.eye(STRUTS)
         return Effect(strut_mm=np.concatenate([by_play, np.zeros((*by_width.shape, 1))], axis=2))
@@ -132,7 +109,6 @@ class Play(SourceWithHistory):
     def _places(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
-        """Return errors [mm] and derivatives by width [mm/mm], shapes (n, 6), and the last state."""
         tension, width = _tensions(motion, machine), MM_PER_UM * values[:STRUTS]
         friction = max(float(values[STRUTS]), 0.0)
         place, by_width, behind = settled(motion.struts(machine).length_mm, tension, np.abs(width), friction, state)
@@ -140,10 +116,10 @@ class Play(SourceWithHistory):
 
 
 class _Shaken(ErrorSource):
-    """Play of a strut that its drive shakes: it crosses little by little while the load changes from pull to push.
+    """Play of a strut that its drive shakes: it crosses gradually while the load changes from pull to push.
 
-    The force in the strut is the load's T and that of the shaking, which is Gaussian with standard deviation N. The strut lies at
-    one end of its play or at the other as the sum pulls or pushes; on the average it is longer by w/2 erf(T / (sqrt(2) N)).
+    The strut's force is the load's T plus Gaussian shaking with standard deviation N. The strut is at either end of its
+    play as the sum pulls or pushes; on average it is longer by w/2 erf(T / (sqrt(2) N)).
     """
 
     name, belongs_to, texts = Play.name, Play.belongs_to, Play.texts
@@ -153,41 +129,22 @@ class _Shaken(ErrorSource):
 
     @property
     def law(self) -> str:
-        """Of the two of play."""
         return "shaken"
 
     @property
     def simpler_law(self) -> str:
-        """Play that nothing shakes."""
         return Play().law
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Six plays, full width, and one shaking force.
-
-        Raises:
-            ModelError: the machine file has no masses.
-        """
         plays = Play().parameters(machine)[:STRUTS]
         meaning = "standard deviation of the force that shakes a strut across its play, all struts alike"
         return (*plays, Parameter("shaking_n", "N", 100.0, meaning, SHAKING_N))
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Where each strut lies in its play, on the average.
-
-        Raises:
-            ModelError: the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         share = erf(_tensions(motion, machine) / _spread_n(values))
         return Effect(strut_mm=0.5 * MM_PER_UM * values[:STRUTS] * share)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By the plays, each strut its own, and by the shaking force.
-
-        Raises:
-            ModelError: the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         ratio = _tensions(motion, machine) / _spread_n(values)
         by_play = 0.5 * MM_PER_UM * erf(ratio)[:, :, None] * np.eye(STRUTS)
         steep = -np.sqrt(2.0) / _spread_n(values) * 2.0 / np.sqrt(np.pi) * ratio * np.exp(-np.square(ratio))
@@ -210,12 +167,11 @@ LEAST_N = 1.0
 
 
 def _spread_n(values: NDArray[np.float64]) -> float:
-    """Root of two times the shaking force [N]."""
     return float(np.sqrt(2.0) * max(values[STRUTS], LEAST_N))
 
 
 def _tensions(motion: Motion, machine: Machine) -> NDArray[np.float64]:
-    """Forces that the drives hold, positive where the load pulls, shape (n, 6) [N]."""
+    """Return forces on the drives, positive if the load pulls, shape (n, 6) [N]."""
     masses = platform_masses(Play.name, machine)
     frames, struts = motion.frames(machine), motion.struts(machine)
     load = platform_weight(frames, masses)
@@ -232,12 +188,6 @@ def settled(
     state: PlayState,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
     """Follow each column through its play.
-
-    Args:
-        travel: x, in time order, shape (n, m).
-        tension: positive if the load pulls, shape (n, m).
-        width: not negative, shape (m,).
-        friction: holds a column up to this tension.
 
     Returns:
         Error y - x and its derivative by the width, shapes (n, m), and the state behind the last row.

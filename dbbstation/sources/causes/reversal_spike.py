@@ -40,15 +40,15 @@ seven sessions, not at all; with 1.2 and 1.1 it was found in all of them."""
 class ReversalSpike(ErrorSource):
     """A reversing strut sticks and is drawn back: -s a (1 - exp(-d / c|a|)) exp(-sqrt(d / l)).
 
-    d is the way since the turning point, s the new sign. The position loop compensates friction with exp(-t / T); with d
-    = A t^2 / 2 that is exp(-sqrt(d / l)), l = A T^2 / 2, which needs no clock. At another feed l changes with the square
-    of the feed.
+    d is the way since the turning point, s the new sign. The position loop compensates friction with exp(-t / T); with
+    d = A t^2 / 2 that is exp(-sqrt(d / l)), l = A T^2 / 2, which needs no clock. At another feed l changes with the
+    square of the feed.
 
-    The rise exists because no strut lags more than its drive has moved: c = 1 is full sticking. With c = `RISE` the sum
-    of travel and error grows and can be compensated. At a = 0 the error is proportional to a.
+    The rise limits the lag to the drive's motion: c = 1 is full sticking. With c = `RISE` the sum of travel and error
+    grows and can be compensated. At a = 0 the error is proportional to a.
 
-    There is no spike before a run's first turning point. A straight path turns at the outermost row, a smooth one between
-    rows (`laws.turning`). A remaining spike fades over c|a| at the next turn. Turns back by less than a micrometre do not
+    A run has no spike before its first turning point. A straight path turns at the outermost row, a smooth one between
+    rows (`laws.turning`). A remaining spike fades over c|a| at the next turn. Returns of less than a micrometre do not
     count.
     """
 
@@ -81,19 +81,9 @@ class ReversalSpike(ErrorSource):
         return (*heights, Parameter("decay_mm", "mm", 0.02, meaning, DECAY_MM))
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Return each strut's spikes.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
         return Effect(strut_mm=self._along(motion, machine, values)[0])
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:  # noqa: ARG002
-        """Return the state of unturned struts.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
         self.require(motion)
         return _NOTHING
 
@@ -104,11 +94,6 @@ class ReversalSpike(ErrorSource):
         return Effect(strut_mm=spike), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By each strut's height, and by the decay length.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
         _, by_height, by_length = self._along(motion, machine, values)
         own = MM_PER_UM * by_height[:, :, None] * np.eye(STRUTS)
         return Effect(strut_mm=np.concatenate([own, by_length[:, :, None]], axis=2))
@@ -116,7 +101,6 @@ class ReversalSpike(ErrorSource):
     def _along(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return a run's spikes [mm] and derivatives by height [1] and decay length [1], shapes (n, 6)."""
         self.require(motion)
         travel = motion.struts(machine).length_mm
         if motion.straight:
@@ -127,14 +111,12 @@ class ReversalSpike(ErrorSource):
 
 
 def _sizes(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Return heights, shape (6,), and decay length [mm]."""
     return MM_PER_UM * values[:STRUTS], float(values[STRUTS])
 
 
 def _straight(
     travel: NDArray[np.float64], values: NDArray[np.float64], state: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return spikes [mm], derivatives by height [1] and decay length [1], shapes (n, 6), and the last state."""
     spike, by_height, by_length = (np.empty_like(travel) for _ in range(3))
     behind = state.copy()
     _go_on(np.ascontiguousarray(travel), *_sizes(values), TURNED_MM, behind, spike, by_height, by_length)
@@ -216,7 +198,6 @@ def _go_on(  # noqa: C901 - what is remembered decides in one pass
     by_height: NDArray[np.float64],
     by_length: NDArray[np.float64],
 ) -> None:
-    """Continue spikes along a straight stretch; `memory`, shape (6, 13), is updated."""
     count, columns = travel.shape
     for i in range(columns):
         m = memory[i]

@@ -1,4 +1,4 @@
-"""Where a run's turn begins, found from feed-in and feed-out."""
+"""Begin of a run's turn, found from feed-in and feed-out."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SAME_DEG = 1e-9
 class RunStart(ErrorSource):
     """All angles of one run are too small by d: the machine was ahead by d along its circle.
 
-    About a ball in the centre an exact machine shows nothing; an actual one's figure is turned. Each run has its own d,
+    About a centred ball an exact machine shows no effect; an actual machine's figure is turned. Each run has its own d,
     sized by its sampling, so it is a random effect; `time-skew` is the common part.
     """
 
@@ -52,11 +52,10 @@ class RunStart(ErrorSource):
         return (Parameter("late_deg", "deg", USUAL_DEG, "angle along the travel by which the turn began earlier"),)
 
     def shared_by(self, motion: Motion) -> str:
-        """Every run has its own."""
         return "" if motion.setup is None else motion.setup.run
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
-        """Return what edge sampling leaves open [deg]; zero with recorded angles."""
+        """Return the uncertainty from edge sampling [deg]; zero with recorded angles."""
         return np.array([0.0 if motion.setup is None else motion.setup.start_uncertainty_deg])
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
@@ -89,7 +88,6 @@ def _along(motion: Motion, length: NDArray[np.float64]) -> _Travelled:
 
 
 def _travelled_deg(motion: Motion) -> NDArray[np.float64]:
-    """Return the angle travelled about the fixed ball, shape (n,) [deg]; zero without ball or motion."""
     if motion.setup is None:
         return np.zeros(len(motion))
     away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]

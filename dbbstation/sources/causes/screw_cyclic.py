@@ -23,10 +23,10 @@ MM_PER_UM = 1e-3
 
 
 class ScrewCyclic(LinearSource):
-    """A strut's error waves once per screw turn: dL = a sin(2 pi L / p) + b cos(2 pi L / p).
+    """A strut's error has one wave per screw turn: dL = a sin(2 pi L / p) + b cos(2 pi L / p).
 
-    p is the lead. A second harmonic, and an amplitude that grows as a bent screw extends, are own laws: `_TwoHarmonics`,
-    `_AlongTheScrew`. The phase counts from length zero, so only the amplitude is meaningful.
+    p is the lead. A second harmonic, and an amplitude that grows as a bent screw extends, are laws of their own:
+    `_TwoHarmonics`, `_AlongTheScrew`. The phase counts from length zero, so only the amplitude is meaningful.
     """
 
     name = "screw-cyclic"
@@ -47,15 +47,9 @@ class ScrewCyclic(LinearSource):
     )
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
-        """The one with a second harmonic, and the one whose amplitude changes along the screw."""
         return (_TwoHarmonics(), _AlongTheScrew())
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return sine and cosine of each strut, first harmonics first.
-
-        Raises:
-            ModelError: the machine file has no screw lead.
-        """
         lead_mm = screw_lead_mm(self.name, machine)
         return tuple(
             Parameter(
@@ -71,27 +65,12 @@ class ScrewCyclic(LinearSource):
         )
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
-        """Return the lead over the highest harmonic.
-
-        Raises:
-            ModelError: the machine file has no screw lead.
-        """
         return screw_lead_mm(self.name, machine) / max(self.harmonics)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each strut answers to its own waves.
-
-        Raises:
-            ModelError: the machine file has no screw lead.
-        """
         return Effect(strut_mm=self.waves_mm(motion, machine))
 
     def waves_mm(self, motion: Motion, machine: Machine) -> NDArray[np.float64]:
-        """Return each strut's error by amplitude, shape (n, 6, p) [mm/µm].
-
-        Raises:
-            ModelError: the machine file has no screw lead.
-        """
         turned_rad = 2.0 * np.pi / screw_lead_mm(self.name, machine) * motion.struts(machine).length_mm
         own = []
         for order in self.harmonics:
@@ -119,7 +98,6 @@ class _TwoHarmonics(ScrewCyclic):
     harmonics = (1, 2)
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
-        """None beside the one it belongs to."""
         return ()
 
     @property
@@ -144,42 +122,21 @@ class _AlongTheScrew(ErrorSource):
 
     @property
     def simpler_law(self) -> str:
-        """The same at every length."""
         return _TwoHarmonics().law
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return two harmonics of each strut, and one change along the screw.
-
-        Raises:
-            ModelError: the machine file has no screw lead.
-        """
         meaning = "change of the amplitude along the screw, of that at the middle of the travel"
         growth = Parameter("growth_percent_m", "percent/m", 200.0, meaning, GROWTHS_PERCENT_M)
         return (*_TwoHarmonics().parameters(machine), growth)
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:
-        """Return the second harmonic's period.
-
-        Raises:
-            ModelError: the machine file has no screw lead.
-        """
         return _TwoHarmonics().shortest_period_mm(machine, values)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Return each strut's error.
-
-        Raises:
-            ModelError: the machine file has no screw lead.
-        """
         waves = _TwoHarmonics().waves_mm(motion, machine)
         return Effect(strut_mm=(waves @ values[:-1]) * (1.0 + values[-1] * _out(motion, machine)))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By each strut's amplitudes, and by the change.
-
-        Raises:
-            ModelError: the machine file has no screw lead.
-        """
         waves, out = _TwoHarmonics().waves_mm(motion, machine), _out(motion, machine)
         by_growth = out * (waves @ values[:-1])
         return Effect(

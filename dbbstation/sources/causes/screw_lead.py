@@ -45,7 +45,6 @@ class ScrewLead(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return six lead errors; usual size: tolerance grade 3, 12 µm over 300 mm [ISO 3408-3]."""
         zero = f"strut {{}} travels more than counted; zero at {_middle_mm(machine):g} mm"
         return of_each_strut("strut_{}_um_m", "µm/m", 40.0, zero)
 
@@ -59,5 +58,4 @@ class ScrewLead(LinearSource):
 
 
 def _middle_mm(machine: Machine) -> float:
-    """Return the length without error [mm]."""
     return sum(machine.travel.strut_mm) / 2.0

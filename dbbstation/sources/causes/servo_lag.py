@@ -24,12 +24,12 @@ S_PER_MS = 1e-3
 class ServoLag(ErrorSource):
     """A strut follows its command as a position loop of gain 1/tau: tau_i dy_i/dt = x_i - y_i.
 
-    The error is y - x = -tau dx/dt + tau² d²x/dt² - ..., a lag and a shortened path. A run begins in a movement under
-    way. Negative tau leads, as feed-forward does. Along a straight program the loop is solved from rows (`laws.loop`),
-    and a leading strut by -tau dx/dt.
+    The error is y - x = -tau dx/dt + tau² d²x/dt² - ..., a lag and a shortened path. A run begins in motion. Negative
+    tau leads, as feed-forward does. Along a straight program the loop is solved from rows (`laws.loop`), and a leading
+    strut by -tau dx/dt.
 
-    A common lag equals `time-skew` to first order. About a ball in the centre it shows only as shrinkage, (v tau)² / 2R:
-    0.2 µm at 1000 mm/min, 150 mm and 15 ms; with detected feed-in it leaves no trace. A fit therefore holds the mean of
+    A common lag equals `time-skew` to first order. About a centred ball it appears only as shrinkage, (v tau)² / 2R:
+    0.2 µm at 1000 mm/min, 150 mm and 15 ms; with detected feed-in it is invisible. A fit therefore holds the mean of
     the six times at zero and reports it.
     """
 
@@ -60,19 +60,9 @@ class ServoLag(ErrorSource):
         return of_each_strut("strut_{}_ms", "ms", 1.0, "time by which strut {} is late; negative: it is ahead")
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Return each strut's lag.
-
-        Raises:
-            ModelError: the motion is no path or has no time.
-        """
         return Effect(strut_mm=self._lag(motion, machine, values)[0])
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> LoopState:  # noqa: ARG002
-        """Return standing struts.
-
-        Raises:
-            ModelError: the motion is no path or has no time.
-        """
         self.require(motion)
         return STANDING
 
@@ -86,23 +76,16 @@ class ServoLag(ErrorSource):
     def undone(
         self, motion: Motion, reached: Motion, machine: Machine, values: NDArray[np.float64], state: LoopState
     ) -> NDArray[np.float64]:
-        """By the reached speed."""
         commanded, wanted = motion.struts(machine).length_mm, reached.struts(machine).length_mm
         return undone(commanded, wanted, np.asarray(motion.time_s), S_PER_MS * values, state)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Each strut answers to its own time.
-
-        Raises:
-            ModelError: the motion is no path or has no time.
-        """
         by_constant = self._lag(motion, machine, values)[1]
         return Effect(strut_mm=S_PER_MS * by_constant[:, :, None] * np.eye(STRUTS))
 
     def _lag(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return errors [mm] and derivatives by time constant [mm/s], shapes (n, 6)."""
         self.require(motion)
         if motion.straight:
             length = motion.struts(machine).length_mm
@@ -120,13 +103,7 @@ class ServoLag(ErrorSource):
 def followed(
     speed: NDArray[np.float64], step_s: NDArray[np.float64], constant_s: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return errors e of loops, tau de/dt = -e - tau dx/dt, and derivatives by tau, shapes (m, k).
-
-    Args:
-        speed: dx/dt, linear in between, shape (m, k) [mm/s].
-        step_s: from row to row, shape (m - 1,).
-        constant_s: tau, not negative, shape (k,).
-    """
+    """Return errors e of loops, tau de/dt = -e - tau dx/dt, and derivatives by tau, shapes (m, k)."""
     lag, by_constant = np.zeros_like(speed), np.zeros_like(speed)
     _follow(np.ascontiguousarray(speed), np.ascontiguousarray(step_s), constant_s, lag, by_constant)
     return lag, by_constant

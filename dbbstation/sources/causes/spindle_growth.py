@@ -31,8 +31,8 @@ _OUT_OF_THE_SPINDLE = np.array([0.0, 0.0, -1.0])
 class SpindleGrowth(ErrorSource):
     """The tool tip moves along the spindle by g(t) of `warm_up`, plus earlier growth.
 
-    It had grown by a share b of what is still to come; b = -1 for a warm spindle that cools. Upright level circles do not
-    see it; tilted ones are shifted by (g + b a) sin(tilt).
+    Earlier growth is a share b of the remaining growth; b = -1 for a warm spindle that cools. Upright level circles do
+    not show it; tilted ones are shifted by (g + b a) sin(tilt).
     """
 
     name = "spindle-growth"
@@ -61,22 +61,12 @@ class SpindleGrowth(ErrorSource):
         return (*warm_up_parameters(growth, "pause_loss_um", 1800.0), begun)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Return the tool tip's shift.
-
-        Raises:
-            ModelError: the motion has no time.
-        """
         self.require(motion)
         growth, *_, percent = values
         out_um = grown(motion, values[:-1]) + percent / 100.0 * growth
         return Effect(tool_tip_mm=MM_PER_UM * out_um[:, None] * _OUT_OF_THE_SPINDLE)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the law's three parameters, and by earlier growth.
-
-        Raises:
-            ModelError: the motion has no time.
-        """
         self.require(motion)
         growth, *_, percent = values
         law = grown_by(motion, values[:-1])
@@ -85,7 +75,6 @@ class SpindleGrowth(ErrorSource):
         return Effect(tool_tip_mm=_OUT_OF_THE_SPINDLE[:, None] * by[:, None, :])
 
     def by_temperature(self) -> ErrorSource:
-        """The spindle by the machine's thermometer."""
         return _ByTemperature()
 
 

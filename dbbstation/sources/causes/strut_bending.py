@@ -24,17 +24,16 @@ by 0.38 mm."""
 
 
 class StrutBending(LinearSource):
-    """A strut sags across its axis, and the straight line between its joints is shorter than the bent strut.
+    """A strut sags across its axis, so the straight line between its joints is shorter than the bent strut.
 
     A strut of mass m and bending stiffness E I, pinned at both ends, carries q = m g_across / L per length. Its
-    deflection w = q x (L³ - 2 L x² + x³) / (24 E I) takes half the integral of w'² off its length:
+    deflection w = q x (L³ - 2 L x² + x³) / (24 E I) shortens it by half the integral of w'²:
 
-        shortening = 17/40320 (m g_across)² L⁵ / (E I)² = 2.487 f² / L, with f the sag in the middle.
+    shortening = 17/40320 (m g_across)² L⁵ / (E I)² = 2.487 f² / L, with f the sag in the middle.
 
-    One number says how much that is for a level strut of 1000 mm; it goes with the square of the cosine of the strut's
-    inclination and the fifth power of its length, at an unchanged mass and stiffness. The axial force, which makes a
-    pushed strut sag more and a pulled one less, is left out: 4 kN, a twentieth of the buckling load of a bar of 30 mm
-    diameter, change its shortening by a tenth.
+    The parameter is the shortening of a level strut of 1000 mm. It scales with the squared cosine of inclination and
+    the fifth power of length, at constant mass and stiffness. The axial force is neglected: 4 kN, a twentieth of the
+    buckling load of a 30 mm bar, change the shortening by a tenth.
     """
 
     name = "strut-bending"

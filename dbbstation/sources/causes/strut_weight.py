@@ -28,8 +28,8 @@ class StrutWeight(LinearSource):
     """Struts hang between base and platform, pull across their axes and stretch [GRAV eq 2, 3].
 
     Both joints carry a strut's weight; the platform's part changes all forces. Masses of strut, motor and screw are
-    common to all struts; their lengths are the machine file's, and parts without length are left out. Stretch uses the
-    compliance of the source gravity, else of the machine file. Motors hold what moves with the strut.
+    common to all struts; their lengths are the machine file's, and parts without length are omitted. Stretch uses the
+    compliance of the source gravity, else of the machine file. Motors carry the mass that moves with the strut.
     """
 
     name = "strut-weight"
@@ -72,11 +72,6 @@ class StrutWeight(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each mass its own forces.
-
-        Raises:
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         struts = motion.struts(machine)
         lengths = replace(machine.strut_masses or USUAL, strut_kg=0.0, motor_kg=0.0, screw_kg=0.0)
         stretch, loads = [], []

@@ -53,26 +53,15 @@ class ThermalFrame(ErrorSource):
         return warm_up_parameters(Parameter("growth_um_m", "µm/m", 15.0, meaning), "pause_loss_um_m", 7200.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Return each base joint's shift.
-
-        Raises:
-            ModelError: the motion has no time.
-        """
         self.require(motion)
         return Effect(base_joint_mm=grown(motion, values)[:, None, None] * _per_growth_mm(machine))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By the law's three parameters.
-
-        Raises:
-            ModelError: the motion has no time.
-        """
         self.require(motion)
         law = grown_by(motion, values)
         return Effect(base_joint_mm=_per_growth_mm(machine)[:, :, None] * law[:, None, None, :])
 
     def by_temperature(self) -> ErrorSource:
-        """The base plate by its thermometer."""
         return _ByTemperature()
 
 
@@ -93,5 +82,4 @@ class _ByTemperature(FollowsTemperature, cause=ThermalFrame):
 
 
 def _per_growth_mm(machine: Machine) -> NDArray[np.float64]:
-    """Return each base joint's shift per µm/m, shape (6, 3) [mm]."""
     return MM_PER_UM_M * machine.hexapod.base_joints_mm

@@ -26,7 +26,7 @@ MM_PER_UM_M = 1e-6
 class ThermalStruts(ErrorSource):
     """All struts grow in proportion to length: dL_i = L_i g(t), g of `warm_up`.
 
-    Growth counts from the session's first sample; earlier growth is in the reference lengths. Cold and warm starts
+    Growth counts from the session's first sample; earlier growth is part of the reference lengths. Cold and warm starts
     therefore have different values, and a prediction starts as the fitted sessions did.
     """
 
@@ -54,25 +54,14 @@ class ThermalStruts(ErrorSource):
         return warm_up_parameters(Parameter("growth_um_m", "µm/m", 30.0, meaning), "pause_loss_um_m", 3600.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Return each strut's growth.
-
-        Raises:
-            ModelError: the motion has no time.
-        """
         per_growth = self._per_growth_mm(motion, machine)
         return Effect(strut_mm=grown(motion, values)[:, None] * per_growth)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By the law's three parameters.
-
-        Raises:
-            ModelError: the motion has no time.
-        """
         per_growth = self._per_growth_mm(motion, machine)
         return Effect(strut_mm=per_growth[:, :, None] * grown_by(motion, values)[:, None, :])
 
     def by_temperature(self) -> ErrorSource:
-        """Struts by their thermometers."""
         return _ByTemperature()
 
     def _per_growth_mm(self, motion: Motion, machine: Machine) -> NDArray[np.float64]:
@@ -97,5 +86,4 @@ class _ByTemperature(FollowsTemperature, cause=ThermalStruts):
 
 
 def _per_growth_mm(motion: Motion, machine: Machine) -> NDArray[np.float64]:
-    """Return each strut's growth per µm/m, shape (n, 6) [mm]."""
     return MM_PER_UM_M * motion.struts(machine).length_mm

@@ -22,14 +22,14 @@ USUAL_MS = 10.0
 
 
 class TimeSkew(ErrorSource):
-    """A reading is late by d against its pose: all struts had gone on, by x(t + d) - x(t), from cubic splines.
+    """A reading is late by d against its pose: all struts had moved on by x(t + d) - x(t), from cubic splines.
 
-    The fixed ball stands still; changes of other sources over d are omitted (parts in a thousand at 10 ms and 1000
-    mm/min). A wrong start of the turn by an angle a is a time a / omega. It turns the figure against the travel, opposite
-    in both directions.
+    The fixed ball is stationary; changes of other sources over d are omitted (parts in a thousand at 10 ms and 1000
+    mm/min). A wrong start of the turn by an angle a is a time a / omega. It turns the figure against the travel,
+    opposite in both directions.
 
-    About a ball in the centre an exact machine shows nothing: 10 ms turn 0.1 mm of centre offset into 0.1 µm. Common
-    `servo-lag` is the same with inverted sign but for shrinkage, and is modelled as this.
+    About a centred ball an exact machine shows no effect: 10 ms turn 0.1 mm of centre offset into 0.1 µm. Common
+    `servo-lag` is the same with inverted sign except for shrinkage, and is modelled as this.
     """
 
     name = "time-skew"
@@ -57,34 +57,20 @@ class TimeSkew(ErrorSource):
         )
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Return the struts' advance.
-
-        Raises:
-            ModelError: the motion is no path or has no time.
-        """
         gone, _ = self._gone_on(motion, machine, S_PER_MS * float(values[0]))
         return Effect(strut_mm=gone)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Speed of struts at the reading.
-
-        Raises:
-            ModelError: the motion is no path or has no time.
-        """
         _, speed = self._gone_on(motion, machine, S_PER_MS * float(values[0]))
         return Effect(strut_mm=S_PER_MS * speed[:, :, None])
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:  # noqa: ARG002
-        """Return its usual size [ms] as a random effect.
-
-        Exact circles do not see it, and a fit would otherwise hold it.
-        """
+        """Return its usual size [ms] as a random effect, because exact circles do not determine it."""
         return np.array([USUAL_MS])
 
     def _gone_on(
         self, motion: Motion, machine: Machine, late_s: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the way in that time [mm] and the speed at its end [mm/s], shapes (n, 6)."""
         self.require(motion)
         time_s, length, place = driven_in_time(motion, machine)
         if len(time_s) == 1:

@@ -27,9 +27,9 @@ ALONG = 0.05
 
 
 class UjointScrew(LinearSource):
-    """As joints swing, strut parts turn against each other, and the screw makes travel of it.
+    """As joints swing, strut parts turn against each other, and the screw converts this into travel.
 
-    A universal joint's second axis lies along a x u, with first axis a and strut u. psi is the angle about u between both
+    A universal joint's second axis is along a x u, with first axis a and strut u. psi is the angle about u between both
     second axes: dL = p psi / (2 pi), lead p, psi from the untilted middle pose. Ball joints turn freely.
     """
 
@@ -53,21 +53,11 @@ class UjointScrew(LinearSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return one lead, of the screws' size.
-
-        Raises:
-            ModelError: the machine file has no joint axes, or no screw lead.
-        """
         _axes(machine)
         meaning = "travel per turn of the platform end about the strut, seen along it clockwise; 0 where corrected"
         return (Parameter("lead_mm", "mm", screw_lead_mm(self.name, machine), meaning),)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Turns of the screws.
-
-        Raises:
-            ModelError: the machine file has no joint axes, or one that lies along its strut.
-        """
         axes = _axes(machine)
         here = _second_axes(axes, motion.struts(machine), motion.frames(machine))
         at_rest = middle(machine)
@@ -120,11 +110,6 @@ def _length(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _axes(machine: Machine) -> JointAxes:
-    """Return the axes of the machine's universal joints.
-
-    Raises:
-        ModelError: the machine file has none; names the key.
-    """
     if machine.joint_axes is None:
         raise ModelError(
             f"the error source {UjointScrew.name} needs the directions of the universal joints' axes, and the machine "

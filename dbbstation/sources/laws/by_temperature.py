@@ -1,9 +1,9 @@
-"""How a part grows with what a thermometer on it logged: what sources that grow with time do where one was there.
+"""Growth by a logged thermometer on the part, in place of a law of time.
 
-    g(t) = c (T(t) - T_0)
+g(t) = c (T(t) - T_0)
 
-T_0 is what it showed in the first run of the session, so that growth is counted as in `warm_up`, from a zero of each session's
-own. No law of time is needed: sun, an open door and pauses are in T.
+T_0 is the reading in the session's first run, so growth counts as in `warm_up`, from each session's own zero. T
+includes sun, open doors and pauses, so no law of time is needed.
 """
 
 from __future__ import annotations
@@ -69,11 +69,9 @@ class FollowsTemperature(LinearSource):
 
     @property
     def has_history(self) -> bool:
-        """Growth counts from the first row without a session."""
         return True
 
     def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Motion:  # noqa: ARG002
-        """Return the first row, the zero of growth."""
         return motion.stretch(slice(0, 1))
 
     def advance(
@@ -93,11 +91,6 @@ class FollowsTemperature(LinearSource):
         return any(np.ptp(degc) > FOLLOWED_K for degc in shown)
 
     def _columns(self, motion: Motion) -> tuple[str, ...]:
-        """Return its thermometers, equal in all runs of a session.
-
-        Raises:
-            ModelError: names missing ones.
-        """
         remedy = "give recordings with that column, or a model without this source"
         return self.chosen(known_thermometers(motion), "not every run of the session has", remedy)
 
@@ -136,7 +129,7 @@ def _logged(source: ErrorSource, motions: Iterable[Motion]) -> ErrorSource | Non
 
 
 def not_given(source: ErrorSource, motions: Iterable[Motion]) -> str:
-    """Return what motions lack for a source, moving thermometers included; may be empty."""
+    """Return missing data of motions for a source, including moving thermometers; may be empty."""
     try:
         for motion in motions:
             source.require(motion)

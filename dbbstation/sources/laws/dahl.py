@@ -33,11 +33,7 @@ class WoundState:
 
 
 def wound(travel: NDArray[np.float64]) -> WoundState:
-    """Return the state before a run that begins in motion.
-
-    Args:
-        travel: of the run or its begin, shape (n, m).
-    """
+    """Return the state before a run that begins in motion."""
     start = leaning(travel)
     return WoundState(start.place, start.side, np.zeros_like(start.side))
 
@@ -46,10 +42,6 @@ def wound_up(
     travel: NDArray[np.float64], length: NDArray[np.float64], state: WoundState
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], WoundState]:
     """Return wind-up z: dz = -(s/2 + z) |dx| / l, s the sign of dx.
-
-    Args:
-        travel: x, in time order, shape (n, m).
-        length: l, positive: 37 % of the rest remains after it, shape (m,).
 
     Returns:
         z and its derivative by l, shapes (n, m), and the state behind the last row.

@@ -18,9 +18,9 @@ CUBIC = 3
 
 
 def reading_without_noise_mm(motion: Motion) -> NDArray[np.float64]:
-    """Return the reading less most of its noise, shape (n,) [mm].
+    """Return the reading without most of its noise, shape (n,) [mm].
 
-    An error at noisy readings would resemble noise and be found wrongly.
+    An error at noisy readings would resemble noise and be identified wrongly.
     """
     return motion.once("reading without noise", None, lambda: _smoothed(motion))
 

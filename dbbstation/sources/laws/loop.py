@@ -1,14 +1,15 @@
-"""A position loop that is fed with a program: from row to row, with what it remembers.
+"""A position loop that follows a program, row by row.
 
-A program is straight between its rows and bends at them. The speed at a row is that of the parabola through it and the two rows
-before where the path goes on evenly, and that of the last straight piece where it bends or changes its feed:
+A program is straight between its rows and bends at them. If the path goes on evenly, the speed at a row is that of the
+parabola through it and the two rows before. At a bend or change of feed it is that of the last straight piece:
 
-    v = s + w (s - s') h / (h + h'),    w = max(0, s . s') / max(s . s, s' . s')
+v = s + w (s - s') h / (h + h'),    w = max(0, s . s') / max(s . s, s' . s')
 
-with s and s' the mean speeds of all struts over the last two steps h and h'. In a smooth path w is 1 within the step, so that v
-is right to its square; behind a stop or a corner of 90 degrees w is 0. The loop y + tau v(y) = x is solved with this speed of the output, as
-backward differences do [Gear, Numerical Initial Value Problems in Ordinary Differential Equations, 1971, ch. 11]: what
-to command for a wanted output follows from the output's speed, and does not swing from row to row.
+s and s' are the mean speeds of all struts over the last two steps h and h'. In a smooth path w is 1 within the step, so
+that v is exact to second order; behind a stop or a corner of 90 degrees w is 0. The loop y + tau v(y) = x is solved
+with this speed of the output, by backward differences [Gear, Numerical Initial Value Problems in Ordinary Differential
+Equations, 1971, ch. 11]. The command for a wanted output then follows from the output's speed, without oscillation
+between rows.
 """
 
 from __future__ import annotations
@@ -54,12 +55,8 @@ def driven(
     """Return errors y - x [mm], derivatives by tau [mm/s], shapes (n, 6), and the last state.
 
     Args:
-        length_mm: commanded, in time order, shape (n, 6).
         time_s: shape (n,); rows within `SHORTEST_S` are one.
         constant_s: tau, shape (6,); a negative one leads by -tau dx/dt.
-
-    Returns:
-        Errors [mm] and their derivatives by tau [mm/s], shapes (n, 6), and the state behind the last row.
     """
     lag, by_constant, memory = np.empty_like(length_mm), np.empty_like(length_mm), state.memory.copy()
     clock = np.array([state.rows, state.time_s, state.step_s])
@@ -79,9 +76,6 @@ def undone(
 
     Args:
         length_mm: a command near the solution, which shows bends, shape (n, 6).
-        reached_mm: y, shape (n, 6).
-        time_s: shape (n,).
-        constant_s: tau, shape (6,).
     """
     error = np.empty_like(length_mm)
     clock = np.array([state.rows, state.time_s, state.step_s])

@@ -30,9 +30,6 @@ def leaning(travel: NDArray[np.float64]) -> PlayState:
     """Return the state before a run that begins in motion.
 
     -1/2 for a growing column, +1/2 for a shrinking one, 0 for none.
-
-    Args:
-        travel: of the run or its begin, shape (n, m).
     """
     side = np.zeros(travel.shape[1])
     _lean(np.ascontiguousarray(travel), side)
@@ -43,10 +40,6 @@ def followed(
     travel: NDArray[np.float64], width: NDArray[np.float64], state: PlayState
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
     """Return the play operator: y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2.
-
-    Args:
-        travel: x, in time order, shape (n, m).
-        width: w, not negative, shape (m,).
 
     Returns:
         Lag y - x and its derivative by the width, shapes (n, m), and the state behind the last row.

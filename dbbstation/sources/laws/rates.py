@@ -19,10 +19,9 @@ SHORTEST_S = 1e-6
 def driven_in_time(
     motion: Motion, machine: Machine
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Commanded strut lengths at rising times.
+    """Return commanded strut lengths at rising times.
 
-    Args:
-        motion: a path with times.
+    Of rows at one time the last counts.
 
     Returns:
         Times, shape (m,) [s], lengths then, shape (m, 6) [mm], and for each row of the motion its place among them,

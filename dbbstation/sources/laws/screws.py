@@ -11,11 +11,7 @@ if TYPE_CHECKING:
 
 
 def screw_lead_mm(source: str, machine: Machine) -> float:
-    """Return a strut's travel per screw turn [mm].
-
-    Raises:
-        ModelError: the machine file has none; names source and key.
-    """
+    """Return a strut's travel per screw turn [mm]."""
     if machine.screw_lead_mm is None:
         raise ModelError(
             f"the error source {source} needs the lead of the struts' screws, and the machine {machine.name!r} has no "

@@ -52,7 +52,8 @@ def _parabola(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple
 def _vertex(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, bool]:
     """Return the turning point on the high (1.0) or low (-1.0) side, and whether row k is behind it.
 
-    It is at least the neighbouring parabola midway, lest it jump between nearly equal rows and a compensation oscillate.
+    The neighbouring parabola midway is a lower limit; otherwise it could jump between nearly equal rows and make a
+    compensation oscillate.
     """
     slope, bend, before, after = _parabola(travel, i, k, side)
     if bend <= 0.0:

@@ -1,13 +1,13 @@
-"""How a part warms up over a session: the law that all sources which grow with time share.
+"""Growth of a warming part over a session, the law of all sources that grow with time.
 
-A body of one time constant tau follows the heat that it gets. In a session that is the heat of work, which is the same on
-average from run to run, except in pauses:
+A body with one time constant tau follows its heat input. In a session that is the heat of work, equal on average from
+run to run except in pauses:
 
-    g(t) = a (1 - exp(-t / tau)) - b p(t),    tau dp/dt = [1 in a pause, else 0] - p,    p(0) = 0
+g(t) = a (1 - exp(-t / tau)) - b p(t),    tau dp/dt = [1 in a pause, else 0] - p,    p(0) = 0
 
-a is what the part still had to grow when the session began, and negative where it only cools. b is what a pause without
-end would take back: nothing where the drives stay warm, and not a, where the part was warm to begin with. Newton's law
-of cooling, solved for heat that is switched on and off.
+a is the growth still to come when the session begins, negative if the part only cools. b is the loss in an infinite
+pause: zero if the drives stay warm, and different from a if the part was warm at the start. This is Newton's law of
+cooling for heat that is switched on and off.
 """
 
 from __future__ import annotations
@@ -39,11 +39,7 @@ ORIGIN = "linear expansion of a body of one time constant (Newton's law of cooli
 
 
 def warm_up_parameters(growth: Parameter, pause_loss: str, usual_s: float) -> tuple[Parameter, ...]:
-    """Return the law's parameters: growth, time constant, pause loss.
-
-    Args:
-        growth: still to come at the first sample.
-    """
+    """Return the law's parameters: growth, time constant, pause loss."""
     meaning = "what a pause without end would take back; pauses count from ten minutes on"
     return (
         growth,
@@ -55,11 +51,7 @@ def warm_up_parameters(growth: Parameter, pause_loss: str, usual_s: float) -> tu
 
 
 def grown(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return growth at every sample, shape (n,), in its parameters' unit.
-
-    Args:
-        values: shape (3,).
-    """
+    """Return growth at every sample, shape (n,), in its parameters' unit."""
     growth, constant_s, loss = values
     law: NDArray[np.float64] = growth * warmed(_time_s(motion), constant_s) - loss * _paused(motion, constant_s, warmed)
     return law
@@ -78,9 +70,6 @@ def warmed(time_s: NDArray[np.float64], constant_s: float) -> NDArray[np.float64
     """Return the completed share of a warm-up, 1 - exp(-t / tau), shape (n,) [1].
 
     It is zero before t = 0; a constant of at most zero gives a step.
-
-    Args:
-        time_s: since heating began, shape (n,).
     """
     since = np.maximum(time_s, 0.0)
     if constant_s <= 0.0:

@@ -54,16 +54,7 @@ def platform_masses(source: str, machine: Machine) -> Masses:
 
 
 def stated_tensions(source: str, machine: Machine, frames: Frames, struts: Struts) -> NDArray[np.float64]:
-    """Return tensions under the machine file's weights, at platform joints, shape (n, 6) [N].
-
-    Args:
-        source: for the message.
-        machine: with masses, and strut masses if they count.
-
-    Raises:
-        ModelError: the machine file has no masses.
-        KinematicsError: a pose where the struts cannot hold the platform.
-    """
+    """Return tensions under the machine file's weights, at platform joints, shape (n, 6) [N]."""
     load = platform_weight(frames, platform_masses(source, machine))
     if machine.strut_masses is not None:
         load += transverse_load(struts, transverse_pull(struts, machine.strut_masses))
@@ -74,20 +65,14 @@ def stated_loads(source: str, machine: Machine, frames: Frames, hexapod: Hexapod
     """Return motor loads under the machine file's weights, shape (n, 6) [N].
 
     Args:
-        source: for the message.
-        machine: with masses, and strut masses if they count.
         hexapod: nominal or actual joints.
-
-    Raises:
-        ModelError: the machine file has no masses.
-        KinematicsError: a pose where the struts cannot hold the platform.
     """
     struts = inverse(hexapod, frames)
     return motor_loads(struts, stated_tensions(source, machine, frames, struts), machine.strut_masses)
 
 
 def masses_for_c(masses: StrutMasses | None) -> NDArray[np.float64]:
-    """Return a strut's masses and lengths as `strut_load` of `control/kernel.c` takes them, shape (5,) [kg, mm]; zeros for None."""
+    """Return a strut's masses and lengths as `strut_load` of `control/kernel.c` takes them, shape (5,) [kg, mm]."""
     none = StrutMasses(strut_kg=0.0, motor_kg=0.0, motor_length_mm=0.0)
     own = masses or none
     return np.array([own.strut_kg, own.motor_kg, own.motor_length_mm, own.screw_kg, own.screw_length_mm])

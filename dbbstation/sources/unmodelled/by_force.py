@@ -39,20 +39,9 @@ class UnexplainedByForce(LinearSource):
     texts = texts("axial force", "actual minus driven length = sum over points k of v_ik hat_k(T_i)")
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
-        """Return values at the points, by strut.
-
-        Raises:
-            ModelError: the machine file has no masses.
-        """
         return values_at(_points_n(self.name, machine), "N")
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """Each strut answers to the two values about its force.
-
-        Raises:
-            ModelError: the machine file has no masses.
-            KinematicsError: a pose where the struts cannot hold the platform.
-        """
         points = _points_n(self.name, machine)
         weight = platform_weight(motion.frames(machine), platform_masses(self.name, machine))
         return piecewise_linear(points, strut_tensions(motion.struts(machine), weight))

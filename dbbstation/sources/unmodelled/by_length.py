@@ -39,7 +39,6 @@ class UnexplainedByLength(LinearSource):
         return values_at(_points_mm(machine), "mm")
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
-        """One point up and its neighbours down."""
         return float(2.0 * np.diff(_points_mm(machine))[0])
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002

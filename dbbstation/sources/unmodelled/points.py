@@ -53,7 +53,7 @@ def piecewise_linear(points: NDArray[np.float64], values: NDArray[np.float64]) -
 
 
 def texts(variable: str, equation: str) -> Texts:
-    """Return texts of an error known only by its variable."""
+    """Return texts of an error with a known variable but unknown cause."""
     return Texts(
         what=f"An error of the struts that follows their {variable}; its cause is unknown.",
         shows=f"What a diagnosis leaves without a name repeats at the same {variable}, in every test and direction.",

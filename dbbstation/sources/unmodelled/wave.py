@@ -48,7 +48,6 @@ class UnexplainedWave(ErrorSource):
         return tuple(found)
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
-        """Return the shortest wave's period."""
         by_strut = values.reshape(STRUTS, 3)
         there = (by_strut[:, :2] != 0.0).any(axis=1) & (by_strut[:, 2] != 0.0)
         return float(np.abs(by_strut[there, 2]).min(initial=SMOOTH_MM))
@@ -79,7 +78,6 @@ class UnexplainedWave(ErrorSource):
 def _waves(
     motion: Motion, machine: Machine, period_mm: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return sine and cosine of each strut, shape (n, 6, 2), and their angle, shape (n, 6) [rad]; 0 for no period."""
     travel = motion.struts(machine).length_mm - sum(machine.travel.strut_mm) / 2.0
     turned_rad = 2.0 * np.pi * travel / np.where(period_mm == 0.0, np.inf, period_mm)
     return np.stack([np.sin(turned_rad), np.cos(turned_rad)], axis=-1), turned_rad

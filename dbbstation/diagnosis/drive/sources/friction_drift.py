@@ -50,7 +50,6 @@ class FrictionDrift(DriveSource):
 
 
 def _growth(signals: Signals, time_constant_s: float) -> NDArray[np.float64]:
-    """Return the drift normed to 1 at the end, less its mean, shape (n,)."""
     since = signals.t_s - signals.t_s[0]
     done = -np.expm1(-since / time_constant_s)
     return np.asarray(done / done[-1] - np.mean(done / done[-1]))

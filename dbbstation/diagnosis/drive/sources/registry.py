@@ -21,7 +21,7 @@ def known_drive_sources() -> Mapping[str, DriveSource]:
 
 
 def drive_sources_named(names: Iterable[str]) -> tuple[DriveSource, ...]:
-    """Causes by their names.
+    """Return causes by name.
 
     Raises:
         ModelError: an unknown name.

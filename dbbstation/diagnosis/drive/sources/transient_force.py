@@ -8,7 +8,7 @@ from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Scale, T
 class TransientForce(DriveSource):
     """Pulses and steps: F = sum of a_k over t_k to t_k + d_k.
 
-    The engine looks for stretches (`dbbstation/inference/stretches.py`), so it has no form.
+    It has no form: the engine searches for stretches (`dbbstation/inference/stretches.py`).
     """
 
     name = "transient-force"

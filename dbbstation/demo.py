@@ -91,10 +91,10 @@ def run_demo(
     machine_file = shipped_folder("fixtures") / "machines" / "reference.yaml"
     plan_file = shipped_folder("protocols") / "plans" / "table2.yaml"
     if tests is not None:
-        plan_file = _write_plan(folder / "plan.yaml", read_inline_plan(plan_file), tests)
-    _write_truth(folder / "truth.yaml", machine_file, seed)
+        plan_file = write_plan(folder / "plan.yaml", read_inline_plan(plan_file), tests)
+    write_truth(folder / "truth.yaml", machine_file, seed)
     write_text(folder / "dbbstation-settings.yaml", SETTINGS)
-    job = _Job(folder, ["--plan", str(plan_file.resolve()), "--machine", str(machine_file)], tell, progress)
+    job = DemoJob(folder, ["--plan", str(plan_file.resolve()), "--machine", str(machine_file)], tell, progress)
     # One virtual machine for both measurements: balls and bar stay, every holder is put up anew. It reads programs
     # when they are started, so that their folder may still be empty.
     (folder / "programs").mkdir()
@@ -122,7 +122,8 @@ def run_demo(
     )
 
 
-def _write_truth(path: Path, machine_file: Path, seed: int) -> None:
+def write_truth(path: Path, machine_file: Path, seed: int) -> None:
+    """Write the errors of a virtual machine: geometry drawn by the seed, and gravity."""
     machine = read_machine(machine_file)
     gravity = Fitted(known_sources()["gravity"], np.array([COMPLIANCE_UM_KN]))
     fitted = (*random_kinematics(machine, seed), gravity)
@@ -131,7 +132,8 @@ def _write_truth(path: Path, machine_file: Path, seed: int) -> None:
     write_model(path, IdentifiedModel(MachineModel(machine, fitted), rows, exact))
 
 
-def _write_plan(path: Path, whole: InlinePlan, names: Collection[str]) -> Path:
+def write_plan(path: Path, whole: InlinePlan, names: Collection[str]) -> Path:
+    """Write the plan of these tests alone; return its path."""
     tests = tuple(test for test in whole.plan.tests if test.name in names)
     write_text(path, plan_text(replace(whole, plan=whole.plan.model_copy(update={"tests": tests}))))
     return path
@@ -146,7 +148,7 @@ class _Place:
 
 
 @dataclass(frozen=True)
-class _Job:
+class DemoJob:
     """Runs commands in the demonstration's folder."""
 
     folder: Path

@@ -48,7 +48,7 @@ def test_the_whole_job_on_some_of_its_circles(tmp_path, monkeypatch, tests):
         assert outcome.code == 0, outcome.err
         return outcome.out
 
-    monkeypatch.setattr(demo._Job, "answer", answer)
+    monkeypatch.setattr(demo.DemoJob, "answer", answer)
     result = run_demo(tmp_path / "job", 3, told.append, lambda *_: None, tests)
     steps = [line.removeprefix("dbbstation ").split()[0] for line in told]
     assert steps == ["measure", "calibrate", "diagnose", "program", "measure", "evaluate", "evaluate", "report"]

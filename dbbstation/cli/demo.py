@@ -15,25 +15,32 @@ from dbbstation.cli.progress import COUNTED, ENDLESS, ProgressBar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.demo import DemoCircle, DemoResult
+    from dbbstation.results.demo import ControlWay, DemoCircle, DemoResult
 
 
 @click.command()
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="New folder for everything.")
 @click.option("--seed", default=3, show_default=True, type=click.IntRange(min=0), help="Seed of the machine's errors.")
 @click.option("--quick", is_flag=True, help="Three tests instead of fifteen, in both directions.")
+@click.option(
+    "--control", "in_control", type=click.Choice(["linuxcnc"]), help="Compare four corrections in this control."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
-def demo(*, out: Path | None, seed: int, quick: bool, as_json: bool) -> None:
+def demo(*, out: Path | None, seed: int, quick: bool, in_control: str | None, as_json: bool) -> None:
     r"""Measure, calibrate, diagnose, compensate and measure again, on a virtual machine over a real serial line.
 
     Takes one to two minutes and needs no hardware. Every step is a command that can be typed by hand. They are shown
     as they run, and the files they read and write stay in the folder.
+
+    With --control, LinuxCNC drives the machine: nominal, with compensated programs, with refitted parameters, and with a
+    kinematics of the model. An interrupted comparison goes on if the command is repeated with the same --out.
 
     \b
     Examples:
       dbbstation demo
       dbbstation demo --quick
       dbbstation demo --out try-it --seed 7
+      sudo dbbstation demo --quick --control linuxcnc   (needs LinuxCNC; fifteen minutes)
     """
     from dbbstation.cli.output import print_json
     from dbbstation.demo import QUICK, run_demo
@@ -41,11 +48,24 @@ def demo(*, out: Path | None, seed: int, quick: bool, as_json: bool) -> None:
     from dbbstation.files.places import unused_path
 
     folder = out or unused_path(Path(), "dbbstation-demo")
-    if folder.exists():
+    tests = QUICK if quick else None
+    if folder.exists() and in_control is None:
         raise OutputError("the folder exists already", where=str(folder), remedy="name another with --out")
     shown = DemoShown()
+    if in_control is not None:
+        from dbbstation.demo_in_control import run_ways
+
+        try:
+            ways = run_ways(folder, seed, shown.tell, shown.progress, tests)
+        finally:
+            shown.bar.end()
+        if as_json:
+            print_json({"folder": str(folder), "ways": [asdict(way) for way in ways]})
+        else:
+            _print_ways(ways)
+        return
     try:
-        result = run_demo(folder, seed, shown.tell, shown.progress, QUICK if quick else None)
+        result = run_demo(folder, seed, shown.tell, shown.progress, tests)
     finally:
         shown.bar.end()
     if as_json:
@@ -112,6 +132,25 @@ def _print(result: DemoResult) -> None:
     echo(f"everything is in {result.folder}:")
     for name, what in _CONTENTS:
         echo(f"  {name:<24} {what}")
+
+
+def _print_ways(ways: Sequence[ControlWay]) -> None:
+    from dbbstation.cli.figures import G_LOW_PASSED
+    from dbbstation.cli.output import print_table
+
+    echo("\nmeans over the circles [µm, measured], and LinuxCNC's time for them:")
+    rows: list[list[object]] = []
+    for way in ways:
+        of = [run.measured for run in way.runs]
+        sizes = (
+            [one.centre_deviation_um for one in of],
+            [abs(one.mean_radial_error_um) for one in of],
+            [run.circularity_30_upr_um.measured for run in way.runs],
+        )
+        rows.append([way.way, *(f"{sum(each) / len(each):.2f}" for each in sizes), f"{way.seconds:.1f} s"])
+    print_table(["way", "centre", "mean radial error", "G", "time"], rows)
+    echo("faultless: a machine without errors, measured with the same bar, balls and holders")
+    echo(G_LOW_PASSED)
 
 
 _CONTENTS = (

@@ -73,14 +73,16 @@ static void look(const double q[6][3], const double p[6][3], const double *t, co
     }
 }
 
-/* Gauss elimination with exchanged rows: m x = b, b becomes x; not a number where m is singular. */
-static void solve(double m[6][6], double *b)
+/* Gauss elimination with exchanged rows: m x = b, b becomes x; not a number where m is singular. Returns the determinant. */
+static double solve(double m[6][6], double *b)
 {
+    double volume = 1.0;
     for (int k = 0; k < 6; k++) {
         int most = k;
         for (int i = k + 1; i < 6; i++) if (fabs(m[i][k]) > fabs(m[most][k])) most = i;
         for (int j = k; j < 6; j++) { double x = m[k][j]; m[k][j] = m[most][j], m[most][j] = x; }
         double y = b[k]; b[k] = b[most], b[most] = y;
+        volume *= most == k ? m[k][k] : -m[k][k];
         for (int i = k + 1; i < 6; i++) {
             double share = m[i][k] / m[k][k];
             for (int j = k + 1; j < 6; j++) m[i][j] -= share * m[k][j];
@@ -91,6 +93,25 @@ static void solve(double m[6][6], double *b)
         for (int j = k + 1; j < 6; j++) b[k] -= m[k][j] * b[j];
         b[k] /= m[k][k];
     }
+    return volume;
+}
+
+/* Struts' directions and moments about the tip: a row each. */
+static inline void jacobian(const seen_t *at, double m[6][6])
+{
+    EACH {
+        double turn[3];
+        cross(at->arm[i], at->unit[i], turn);
+        for (int k = 0; k < 3; k++) m[i][k] = at->unit[i][k], m[i][3 + k] = turn[k];
+    }
+}
+
+/* Whether the struts hold the platform; beyond, loads stretch them without end, and another pose has the same joints. */
+static int held(const seen_t *at)
+{
+    double m[6][6], none[6] = {0.0};
+    jacobian(at, m);
+    return solve(m, none) / HELD >= 1.0;
 }
 
 /* Axial forces under a load of force and moment about the tip: sum T u = F, sum T (arm x u) = M. */
@@ -150,12 +171,9 @@ static int rounds;
 /* One Newton step towards struts longer by `more`; Cayley's matrix keeps R a rotation. */
 static void step(const seen_t *at, const double *more, double *t, double r[3][3])
 {
-    double m[6][6], x[6], turn[3], new[3][3];
-    EACH {
-        cross(at->arm[i], at->unit[i], turn);
-        for (int k = 0; k < 3; k++) m[i][k] = at->unit[i][k], m[i][3 + k] = turn[k];
-        x[i] = more[i];
-    }
+    double m[6][6], x[6], new[3][3];
+    jacobian(at, m);
+    EACH x[i] = more[i];
     solve(m, x);
     const double *w = x + 3;
     double c = 1.0 / (1.0 + 0.25 * dot(w, w)), h = 0.5 * c;
@@ -239,7 +257,7 @@ int dbb_inverse(const double *pose, double *joint)
         if (most < AGREED_MM) wrong = FINE;
         else if (commanded(found, command_t, command_r, &command)) break;
     }
-    if (wrong) return wrong;
+    if (wrong || !held(&there)) return NOT_CONVERGED;
     if (!in_range(found)) return OUT_OF_RANGE;
     EACH joint[i] = found[i];
     return FINE;
@@ -254,7 +272,7 @@ static int forward_from(const double *joint, const double *near, double *pose)
     for (int k = 0; k < 3; k++) t[k] = near[k];
     if (commanded(joint, t, r, &command)) return NOT_CONVERGED;
     by_command(&command, &firm);
-    if (reach(joint, &firm, 1, t, r, &there)) return NOT_CONVERGED;
+    if (reach(joint, &firm, 1, t, r, &there) || !held(&there)) return NOT_CONVERGED;
     turned(r, firm.tip, tip);
     for (int k = 0; k < 3; k++) pose[k] = t[k] + tip[k];
     angles(r, pose + 3);

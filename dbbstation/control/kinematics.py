@@ -10,8 +10,10 @@ import numpy as np
 
 from dbbstation.errors import ModelError, StationError
 from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import inverse, strut_jacobian
 from dbbstation.machine.rotation import Rotation
 from dbbstation.machine.statics import GRAVITY_M_S2
+from dbbstation.machine.travel import middle
 from dbbstation.sources.c_form import c_constant
 from dbbstation.sources.contract import Need
 from dbbstation.sources.laws.weights import masses_for_c, strut_compliance
@@ -35,6 +37,10 @@ of 0.01 K changes each minute, one of 0.1 K changes in ten minutes unless the sh
 
 LARGEST_K = 30.0
 """A thermometer further from its zero than this is broken: a shop is between 10 and 40 degC."""
+
+LEAST_HELD = 0.02
+"""Least determinant of the Jacobian over that in the middle of the travel. Gravity's stretch is fifty times as large there, and
+joints still move evenly; at zero the machine folds, and a kinematics would jump."""
 
 HELD_BY_BACKLASH = "backlash"
 """Source with a history that a control has an entry for: `[JOINT_n]BACKLASH`."""
@@ -156,6 +162,7 @@ def _constants(machine: Machine, parts: Sequence[_Part], columns: Sequence[str])
         "HIGH": axes[:, 1],
         "MIDDLE": [0.0, 0.0, float(axes[2].mean()), 0.0, 0.0, 0.0],
         "ZYX": int(hexapod.rotation is Rotation.ZYX),
+        "HELD": LEAST_HELD * float(np.linalg.det(strut_jacobian(inverse(hexapod, middle(machine))))[0]),
         "BY_POSE": int(any(part.form.by_pose and not part.fitted.source.weighs for part in parts)),
         "GRAVITY": GRAVITY_M_S2,
         "WEIGHT": 0.0 if masses is None else GRAVITY_M_S2 * masses.platform_kg,
@@ -198,7 +205,7 @@ def _declared(name: str, machine: Machine, parts: Sequence[_Part], columns: Sequ
 description "Made by dbbstation from a model; do not edit. Model SHA-256 {digest}.";
 pin in bit enabled "connect to motion.motion-enabled: switches are taken while it is false";
 pin out u32 model "first 32 bits of the model's SHA-256";
-pin out u32 fault "0 none, 1 a strut leaves its range, 2 no convergence, 3 a thermometer stands still or is out of range";
+pin out u32 fault "the last one since the machine was switched on: 0 none, 1 a strut leaves its range, 2 no convergence or the machine is about to fold, 3 a thermometer stands still or is out of range";
 pin out u32 iterations "rounds of the last call";
 pin out float correction-#[6] "joint less that of the nominal machine [mm]";
 param rw float patience_s = {PATIENCE_S!r} "a thermometer that stands still for so long is a fault";
@@ -220,7 +227,8 @@ static int settled(struct __comp_state *__comp_inst);
 
 static int answered(struct __comp_state *__comp_inst, int wrong)
 {
-    fault = wrong, iterations = rounds;
+    if (wrong) fault = wrong; /* the way back to joints that are right must not hide it */
+    iterations = rounds;
     return wrong ? -1 : 0;
 }
 
@@ -273,7 +281,10 @@ def _pins(parts: Sequence[_Part], columns: Sequence[str], digest: str) -> str:
     return f"""{watching}
 static int settled(struct __comp_state *__comp_inst)
 {{
+    static int was_enabled;
     model = 0x{digest[:8]}u;
+    if (enabled && !was_enabled) fault = FINE;
+    was_enabled = enabled;
     if (!enabled) {{
 {switches}    }}
 {watched}    return FINE;

@@ -119,3 +119,16 @@ class DemoResult:
     diagnosis: DemoDiagnosis
     report: DemoReport
     printed: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class ControlWay:
+    """What a bar measures of a machine under one way of correction.
+
+    Attributes:
+        seconds: LinuxCNC's time for all programs [s].
+    """
+
+    way: str
+    runs: tuple[DemoRun, ...]
+    seconds: float

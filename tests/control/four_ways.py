@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.control.parameters import FITTED, TRIED, drawn_poses, refitted, tool_errors
+from dbbstation.demo_in_control import genhexkins, made_kins
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.shipped import shipped_folder
@@ -25,9 +26,9 @@ from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.tasks.compensate import compensate
-from tests.control.in_linuxcnc import circle_of, circle_program, genhexkins, installed, our_kins
+from dbbstation.virtual.linuxcnc import ControlKins, PlannerRun, run
+from tests.control.in_linuxcnc import NAME, circle_of, circle_program, installed
 from tests.control.test_parameters import HIGH, LOW, truth_of
-from tests.nc.planner.linuxcnc import Kins, Ran, run
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,7 +60,7 @@ def machine_model() -> MachineModel:
     return truth_of(of, "gravity", "screw-lead", "screw-cyclic")
 
 
-def part_um(model: MachineModel, ran: Ran, plain: Ran) -> float:
+def part_um(model: MachineModel, ran: PlannerRun, plain: PlannerRun) -> float:
     """Greatest distance of the tool from the path that LinuxCNC without kinematics goes [µm]."""
     at = Frames.from_poses(plain.poses, model.machine.hexapod.rotation)
     middle = Frames.from_poses(
@@ -88,7 +89,7 @@ def compensated_text(model: MachineModel, text: str, folder: Path) -> str:
     return compensate(folder / "part.ngc", folder / "model.yaml", chord_um=0.5).programs[0].text
 
 
-def measured(model: MachineModel, kins: Kins, *, program: bool, folder: Path) -> list[str]:
+def measured(model: MachineModel, kins: ControlKins, *, program: bool, folder: Path) -> list[str]:
     """Return cells of one way: per circle centre, roundness and tilt; the part; time over that without kinematics."""
     cells, took, plainly = [], 0.0, 0.0
     for tilt in CIRCLES.values():
@@ -114,16 +115,13 @@ def main() -> None:
     values = refitted(model, drawn_poses(LOW, HIGH, FITTED, 1), drawn_poses(LOW, HIGH, TRIED, 2)).values
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
-        module = installed(model, folder)
-        try:
+        with installed(model, folder):
             figures = {
                 "nominal": measured(model, genhexkins(of, None), program=False, folder=folder),
                 "program": measured(model, genhexkins(of, None), program=True, folder=folder),
                 "parameters": measured(model, genhexkins(of, values), program=False, folder=folder),
-                "kinematics": measured(model, our_kins(of), program=False, folder=folder),
+                "kinematics": measured(model, made_kins(of, NAME), program=False, folder=folder),
             }
-        finally:
-            module.unlink()
     kept = {
         "question": "How well do four ways correct one machine under LinuxCNC?",
         "data": "Circles of 75 mm at F1500, and a part of four lines with tilts; LinuxCNC drives the joints of a virtual machine with "

@@ -2,86 +2,35 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.control.kinematics import component
-from dbbstation.control.parameters import Values, hal_lines, home_mm, tables, tool_errors
+from dbbstation.control.parameters import tool_errors
 from dbbstation.files.shipped import package_text
-from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
-from dbbstation.model.machine_model import MachineModel
-from tests.nc.planner.linuxcnc import Kins, missing
+from dbbstation.virtual.linuxcnc import installed_component
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
-    from dbbstation.machine.geometry import Machine
-    from tests.nc.planner.linuxcnc import Ran
+    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.virtual.linuxcnc import PlannerRun
 
 NAME = "dbbtestkins"
 """A module that no shop has: it is installed for a test and taken away."""
 
 
-def lacking() -> str:
-    """Why LinuxCNC cannot be given a kinematics here; empty if it can."""
-    if shutil.which("halcompile") is None:
-        return "halcompile is not installed: package linuxcnc-uspace-dev"
-    return missing() or ("" if os.getuid() == 0 else "only root installs a module of LinuxCNC")
-
-
-def installed(model: MachineModel, folder: Path, digest: str = "0" * 64) -> Path:
-    """Build and install the component of a model; return the module, which the caller removes."""
+def installed(model: MachineModel, folder: Path, digest: str = "0" * 64) -> AbstractContextManager[None]:
+    """Build and install the component of a model; it is removed at the end."""
     made = component(model, package_text("control/kernel.c"), NAME, digest)
     (folder / f"{NAME}.comp").write_text(made.text)
-    done = subprocess.run(
-        ["halcompile", "--install", f"{NAME}.comp"],  # noqa: S607 - as LinuxCNC has it
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "warning" not in done.stderr
-    return Path(f"/usr/lib/linuxcnc/modules/{NAME}.so")
-
-
-def middle_mm(machine: Machine) -> float:
-    return sum(machine.travel.z_mm) / 2.0
-
-
-def home_of(machine: Machine) -> NDArray[np.float64]:
-    """Driven lengths in the middle of the travel, where the machine is switched on, shape (6,) [mm]."""
-    pose = np.array([[0.0, 0.0, sum(machine.travel.z_mm) / 2.0, 0.0, 0.0, 0.0]])
-    frames = Frames.from_poses(pose, machine.hexapod.rotation)
-    return (strut_lengths(machine.hexapod, frames) - machine.reference_length_error_mm)[0]
-
-
-def our_kins(machine: Machine) -> Kins:
-    return Kins(
-        NAME, home_of(machine), np.zeros(6), middle_mm(machine), (f"net on motion.motion-enabled => {NAME}.enabled",)
-    )
-
-
-def genhexkins(machine: Machine, values: Values | None) -> Kins:
-    """LinuxCNC's own, with nominal joints or refitted values."""
-    points = np.array(machine.travel.strut_mm)
-    none = np.zeros((6, 3))
-    nominal = Values(none, none, machine.reference_length_error_mm, points, np.zeros((6, 2)))
-    of = values or nominal
-    return Kins(
-        "genhexkins",
-        home_of(machine),
-        machine.reference_length_error_mm + home_mm(of, machine),
-        middle_mm(machine),
-        hal_lines(of, machine),
-        tables(of, np.zeros(6)),
-    )
+    return installed_component(folder / f"{NAME}.comp")
 
 
 @dataclass(frozen=True)
@@ -101,7 +50,7 @@ def circle_program(radius_mm: float, tilt_deg: tuple[float, float], feed: float,
     return f"G21 G90 G94\nG64 P0.001\nG0 {at}\nG3 {at} I-{radius_mm} J0 F{feed}\nM2\n"
 
 
-def circle_of(model: MachineModel, ran: Ran, wanted: NDArray[np.float64], radius_mm: float) -> Circle:
+def circle_of(model: MachineModel, ran: PlannerRun, wanted: NDArray[np.float64], radius_mm: float) -> Circle:
     """The circle that the machine of a model makes of driven joints, about wanted centre and tilt, shape (6,)."""
     machine = model.machine
     near = np.tile(wanted, (len(ran.poses), 1))

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from dbbstation.demo_in_control import made_kins
 from dbbstation.model.machine_model import MachineModel
-from tests.control.in_linuxcnc import circle_of, circle_program, installed, lacking, our_kins
+from dbbstation.virtual.linuxcnc import missing, run
+from tests.control.in_linuxcnc import NAME, circle_of, circle_program, installed
 from tests.control.machines import machine
 from tests.control.test_parameters import truth_of
-from tests.nc.planner.linuxcnc import run
 from tests.nc.planner.required import needs
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
 
-pytestmark = [needs(lacking()), pytest.mark.xdist_group("linuxcnc")]
+pytestmark = [needs(missing(kinematics=True)), pytest.mark.xdist_group("linuxcnc")]
 
 FASTER = 4
 RADIUS_MM, TILT_DEG, FEED, Z_MM = 150.0, (10.0, 10.0), 3000.0, -1000.0
@@ -34,11 +35,8 @@ def test_the_real_machine_makes_the_programmed_circle(reference: Machine, tmp_pa
     of = machine(reference, 0)
     truth = truth_of(of, "gravity", "screw-lead", "screw-cyclic")
     text = circle_program(RADIUS_MM, TILT_DEG, FEED, Z_MM)
-    module = installed(truth, tmp_path)
-    try:
-        ran = run(text, faster=FASTER, kins=our_kins(of))
-    finally:
-        module.unlink()
+    with installed(truth, tmp_path):
+        ran = run(text, faster=FASTER, kins=made_kins(of, NAME))
     found = circle_of(truth, ran, CENTRE, RADIUS_MM)
     assert np.abs(found.centre_um).max() < 0.1
     assert found.roundness_um < 1.0

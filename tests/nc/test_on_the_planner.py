@@ -1,7 +1,7 @@
 """Compensated programs on LinuxCNC's trajectory planner: they take the time of the nominal ones, and stay near the path.
 
 Needs LinuxCNC (package `linuxcnc-uspace`). Its clock runs ten times as fast as usual: with every speed ten times as large
-and every acceleration a hundred times it plans the same way in each servo cycle (`tests/nc/planner/linuxcnc.py`).
+and every acceleration a hundred times it plans the same way in each servo cycle (`dbbstation.virtual.linuxcnc.py`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dbbstation.nc.export import Inverse, circle_programs, compensated_program, 
 from dbbstation.nc.planner import cuts
 from dbbstation.nc.remarks import KEPT
 from dbbstation.plan.plan import Plan
-from tests.nc.planner.linuxcnc import PERIOD_NS, BehindError, Ran, missing, run, run_once
+from dbbstation.virtual.linuxcnc import PERIOD_NS, BehindError, PlannerRun, missing, run, run_once
 from tests.nc.planner.required import needs
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def accelerating(model: MachineModel, mm_s2: float) -> MachineModel:
     return MachineModel(replace(model.machine, acceleration_mm_s2=mm_s2), model.sources)
 
 
-def off_the_path_mm(ran: Ran, path: Toolpath) -> float:
+def off_the_path_mm(ran: PlannerRun, path: Toolpath) -> float:
     """Greatest distance of a servo cycle from the straight moves of a program, in position [mm].
 
     Args:
@@ -103,7 +103,7 @@ def allowed_mm(path: Toolpath, mm_s2: float) -> float:
 
 def judged(
     text: str, path: Toolpath, mm_s2: float, faster: int, more_mm: float = 0.0, at_most_s: float = math.inf
-) -> tuple[Ran, float]:
+) -> tuple[PlannerRun, float]:
     """Run a program; also how far it was from its moves at most [mm].
 
     `more_mm` may be added to what is allowed.
@@ -120,7 +120,7 @@ def judged(
         faster = max(faster // 2, 1)
 
 
-def on_its_path(linuxcnc, text: str, mm_s2: float, faster: int = FASTER) -> Ran:
+def on_its_path(linuxcnc, text: str, mm_s2: float, faster: int = FASTER) -> PlannerRun:
     """Run a program that was written here; it must stay near its moves and end where it should."""
     path = linuxcnc.read(text, "written.ngc")
     ran, off_mm = judged(text, path, mm_s2, faster)

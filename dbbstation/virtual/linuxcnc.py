@@ -1,0 +1,343 @@
+"""LinuxCNC without a screen as a function: a program in, what it commands in every servo cycle out.
+
+Needs the Debian packages `linuxcnc-uspace` and, for a kinematics, `linuxcnc-uspace-dev`. LinuxCNC refuses to run as root: root starts
+it as the user who called sudo, or as nobody.
+
+LinuxCNC runs in real time. With `faster` its clock runs that many times as fast: the servo period and all times are divided
+by it, speeds multiplied by it, accelerations by its square, so that every servo cycle calculates with the same way per
+cycle and the same change of it. Samples have the times that they would have at the usual clock. The interpreter
+is not part of that clock. If it falls behind the planner, the program runs again with a slower clock.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import StationError
+from dbbstation.files.gateway import content_of
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.machine.kinematics import forward
+from dbbstation.machine.rotation import Frames
+from dbbstation.system.children import end_tree, is_root
+from dbbstation.system.handles import open_to_change
+from dbbstation.system.locks import lock
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+NEEDED = ("linuxcnc", "halsampler", "rtapi_app", "setpriv")
+MODULES = Path("/usr/lib/linuxcnc/modules")
+"""Where the Debian package looks for modules; rtapi_app takes no other folder."""
+
+NOBODY = "65534"
+"""User and group without rights, on any Linux [Debian base-passwd]."""
+
+PERIOD_NS = 1_000_000
+"""Servo period at the usual clock."""
+
+GREATEST_MM_S, GREATEST_DEG_S, GREATEST_DEG_S2 = 500.0, 600.0, 10_000.0
+"""Speeds of axes, and the acceleration of the angles: no limit for any program here."""
+
+RAMP_HZ = 100.0
+"""What `ARC_BLEND_RAMP_FREQ` is if a file does not say: moves that end within its period change speed evenly. It has a clock of its own."""
+
+BEHIND = "the interpreter fell behind the planner"
+"""As `drive.py` has it."""
+
+PATIENCE_S = 600.0
+EVERY = 10
+"""Servo cycles between points of a driven path: at 25 mm/s chords of 0.25 mm, 0.05 µm from a circle of 150 mm."""
+
+
+class BehindError(RuntimeError):
+    """The planner's queue ran empty on the way: what it did then is not what the program asks for."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlannerRun:
+    """What the planner made of a program.
+
+    Attributes:
+        time_s: of each sample, from the first servo cycle that moves to the last, shape (n,) [s].
+        poses: commanded, shape (n, 6) [mm, deg]; with a kinematics driven lengths of the joints [mm].
+        line: of the program, shape (n,).
+    """
+
+    time_s: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    line: NDArray[np.int_]
+
+    @property
+    def duration_s(self) -> float:
+        """From the first motion to the last, dwells and stops included [s]."""
+        return float(self.time_s[-1] - self.time_s[0])
+
+    @property
+    def moving_s(self) -> float:
+        """Time in motion [s]: without dwells and stops, whose length depends on how busy the computer is."""
+        return float(np.diff(self.time_s)[np.any(np.diff(self.poses, axis=0) != 0.0, axis=1)].sum())
+
+
+@dataclass(frozen=True, eq=False)
+class ControlKins:
+    """A kinematics in place of none: joints are recorded then.
+
+    Attributes:
+        name: of the module.
+        home_mm: joints at which the machine is switched on, shape (6,).
+        offset_mm: added to HOME and HOME_OFFSET, shape (6,).
+        home_z_mm: height at which it is switched on, upright over the middle: where LinuxCNC begins to look for its pose.
+        hal: lines behind the module's loading.
+        tables: text of each joint's `COMP_FILE`; empty for none.
+    """
+
+    name: str
+    home_mm: NDArray[np.float64]
+    offset_mm: NDArray[np.float64]
+    home_z_mm: float
+    hal: tuple[str, ...] = ()
+    tables: tuple[str, ...] = ()
+
+
+def missing(*, kinematics: bool = False) -> str:
+    """Return why LinuxCNC cannot run here, or cannot be given a kinematics; empty if it can."""
+    lacking = [name for name in (*NEEDED, *(["halcompile"] if kinematics else [])) if shutil.which(name) is None]
+    if lacking:
+        return f"LinuxCNC is not installed here: no {', '.join(lacking)}"
+    return "only root installs a kinematics of LinuxCNC" if kinematics and not is_root() else ""
+
+
+@contextmanager
+def installed_component(file: Path) -> Iterator[None]:
+    """Build a `.comp` file and install it; remove the module afterwards.
+
+    Raises:
+        StationError: halcompile refuses it.
+    """
+    command = ["halcompile", "--install", file.name]
+    with _alone():
+        done = subprocess.run(command, cwd=file.parent, capture_output=True, text=True, check=False)  # noqa: S603 - LinuxCNC's own
+    if done.returncode or "warning" in done.stderr:
+        raise StationError((done.stdout + done.stderr).strip(), where=" ".join(command))
+    try:
+        yield
+    finally:
+        (MODULES / f"{file.stem}.so").unlink(missing_ok=True)
+
+
+def run(
+    text: str,
+    *,
+    mm_s2: float = 1000.0,
+    faster: int = 1,
+    patience_s: float = PATIENCE_S,
+    kins: ControlKins | None = None,
+) -> PlannerRun:
+    """Run a program on the planner, from its first point on.
+
+    Args:
+        text: the program; its first move names X, Y, Z, A, B and C.
+        mm_s2: acceleration of X, Y and Z [mm/s²].
+        faster: how many times as fast as usual the clock runs; halved as long as the interpreter falls behind.
+
+    Raises:
+        RuntimeError: LinuxCNC refuses the program or does not end.
+        BehindError: the interpreter falls behind at the usual clock too.
+    """
+    while True:
+        try:
+            return run_once(text, mm_s2, faster, patience_s, kins)
+        except BehindError:
+            if faster == 1:
+                raise
+            faster = max(faster // 2, 1)
+
+
+def run_once(
+    text: str, mm_s2: float, faster: int, patience_s: float = PATIENCE_S, kins: ControlKins | None = None
+) -> PlannerRun:
+    """Run a program with this clock, or raise; arguments as for `run`."""
+    with started(text, mm_s2, faster, kins, patience_s=patience_s) as (folder, printed):
+        ended = _text(folder / "ended.txt") if (folder / "ended.txt").exists() else ""
+        if ended == BEHIND:
+            raise BehindError(BEHIND)
+        if ended != "ended":
+            raise RuntimeError(ended or f"LinuxCNC did not start:\n{printed}")
+        ran = _read(folder / "samples.txt", PERIOD_NS / 1e9)
+        # `motor-pos-cmd` is the joint less its HOME_OFFSET.
+        return ran if kins is None else PlannerRun(ran.time_s, ran.poses + kins.home_mm, ran.line)
+
+
+@contextmanager
+def started(
+    text: str, mm_s2: float, faster: int, kins: ControlKins | None, *, patience_s: float, driver: Path | None = None
+) -> Iterator[tuple[Path, str]]:
+    """Run LinuxCNC to its end in a new folder; yield the folder and what was printed.
+
+    Args:
+        driver: takes the place of `drive.py`.
+    """
+    with tempfile.TemporaryDirectory(prefix="dbbstation-planner-") as made, _alone():
+        folder = Path(made)
+        _configure(folder, mm_s2, faster, kins)
+        if driver is not None:
+            shutil.copy(driver, folder / "drive.py")
+        (folder / "drive.py").chmod(0o755)
+        (folder / "program.ngc").write_text(_quickened(text, faster), encoding="utf-8")
+        (folder / "start.txt").write_text(_first_point(text), encoding="utf-8")
+        yield folder, _printed(folder, patience_s)
+
+
+def driven_program(machine: Machine, ran: PlannerRun) -> str:
+    """Return the program by which a nominal control would drive the struts as LinuxCNC drove them."""
+    rows = np.unique([*range(0, len(ran.poses), EVERY), len(ran.poses) - 1])
+    middle = np.array([[0.0, 0.0, sum(machine.travel.z_mm) / 2.0, 0.0, 0.0, 0.0]])
+    near = Frames.from_poses(np.repeat(middle, len(rows), axis=0), machine.hexapod.rotation)
+    frames = forward(machine.hexapod, ran.poses[rows] + machine.reference_length_error_mm, near)
+    poses, took = frames.to_poses(machine.hexapod.rotation), np.diff(ran.time_s[rows])
+    feeds = 60.0 * np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1) / took
+    words = [" ".join(f"{axis}{value:.6f}" for axis, value in zip("XYZABC", pose, strict=True)) for pose in poses]
+    moves = [f"G1 {to} F{feed:.6f}" for to, feed in zip(words[1:], feeds, strict=True) if feed > 0.0]
+    return "\n".join(["%", "G21 G90 G94", f"G0 {words[0]}", *moves, "M2", "%", ""])
+
+
+def _configure(folder: Path, mm_s2: float, faster: int, kins: ControlKins | None = None) -> None:
+    shipped = shipped_folder("fixtures") / "linuxcnc"
+    limits = {
+        "period_ns": PERIOD_NS // faster,
+        "mm_s": GREATEST_MM_S * faster,
+        "deg_s": GREATEST_DEG_S * faster,
+        "mm_s2": mm_s2 * faster**2,
+        "deg_s2": GREATEST_DEG_S2 * faster**2,
+        "ramp_hz": RAMP_HZ * faster,
+    }
+    ini = [_text(shipped / "planner.ini").format(**limits)]
+    if kins is not None:
+        ini[0] = ini[0].replace("trivkins coordinates=XYZABC", kins.name)
+        ini[0] = ini[0].replace("[TRAJ]\n", f"[TRAJ]\nHOME = 0 0 {kins.home_z_mm} 0 0 0\n")
+    for joint, axis in enumerate("XYZABC"):
+        kind, unit = ("LINEAR", "mm") if axis in "XYZ" else ("ANGULAR", "deg")
+        both = (
+            f"MIN_LIMIT = -9999\nMAX_LIMIT = 9999\nMAX_VELOCITY = {limits[unit + '_s']}\n"
+            f"MAX_ACCELERATION = {limits[unit + '_s2']}\n"
+        )
+        homed = (
+            "HOME = 0\nHOME_SEARCH_VEL = 0\nHOME_LATCH_VEL = 0\nHOME_SEQUENCE = 0\nFERROR = 9999\nMIN_FERROR = 9999\n"
+        )
+        if kins is not None:
+            homed = homed.replace("HOME = 0\n", f"HOME = {kins.home_mm[joint] + kins.offset_mm[joint]:.9f}\n")
+            homed += f"HOME_OFFSET = {kins.home_mm[joint] + kins.offset_mm[joint]:.9f}\n"
+            kind = "LINEAR"
+            if kins.tables:
+                (folder / f"joint-{joint}.comp").write_text(kins.tables[joint], encoding="utf-8")
+                homed += f"COMP_FILE = joint-{joint}.comp\nCOMP_FILE_TYPE = 1\n"
+        ini.append(f"[AXIS_{axis}]\n{both}[JOINT_{joint}]\nTYPE = {kind}\n{both}{homed}")
+    hal = [_text(shipped / "planner.hal"), *(() if kins is None else kins.hal), ""]
+    files = {
+        "planner.ini": "".join(ini),
+        "planner.tbl": "T1 P1 D0.1 Z0\n",
+        "planner.var": "",
+        "planner.hal": "\n".join(hal),
+        "drive.py": _text(shipped / "drive.py"),
+    }
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def _text(path: Path) -> str:
+    return content_of(path).decode()
+
+
+def _quickened(text: str, faster: int) -> str:
+    """Return the program with feeds multiplied and dwells divided; comments are left alone."""
+    if faster == 1:
+        return text
+
+    def one(line: str) -> str:
+        words, semicolon, comment = line.partition(";")
+        if words.lstrip().startswith("("):
+            return line
+        words = re.sub(r"\bF([\d.]+)", lambda found: f"F{float(found[1]) * faster:.9g}", words)
+        if re.search(r"\bG0?4\b", words):
+            words = re.sub(r"\bP([\d.]+)", lambda found: f"P{float(found[1]) / faster:.9f}", words)
+        return words + semicolon + comment
+
+    return "\n".join(one(line) for line in text.split("\n"))
+
+
+def _first_point(text: str) -> str:
+    for line in text.splitlines():
+        words = dict(re.findall(r"([XYZABC])(-?[\d.]+)", line.partition(";")[0]))
+        if len(words) == len("XYZABC"):
+            return " ".join(f"{axis}{value}" for axis, value in words.items())
+    raise RuntimeError("no move names all six axes")
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Wait until no other LinuxCNC runs: there is one on a computer at a time."""
+    handle = open_to_change(Path(tempfile.gettempdir()) / "dbbstation-planner.lock", create=True)
+    try:
+        while True:
+            try:
+                lock(handle)
+                break
+            except BlockingIOError:
+                time.sleep(0.1)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _printed(folder: Path, patience_s: float) -> str:
+    command: Sequence[str] = ["linuxcnc", "-r", "planner.ini"]
+    if is_root():
+        user, group = (os.environ.get(name, NOBODY) for name in ("SUDO_UID", "SUDO_GID"))
+        for path in (folder, *folder.iterdir()):
+            os.chown(path, int(user), int(group))
+        command = ["setpriv", f"--reuid={user}", f"--regid={group}", "--clear-groups", *command]
+    running = subprocess.Popen(  # noqa: S603 - LinuxCNC itself
+        command,
+        cwd=folder,
+        env={"PATH": os.environ["PATH"], "HOME": str(folder), "LANG": "C.UTF-8"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        printed, _ = running.communicate(timeout=patience_s)
+    except BaseException:
+        end_tree(running)
+        # What LinuxCNC started as daemons ends by its own means.
+        subprocess.run(["halrun", "-U"], stdin=subprocess.DEVNULL, capture_output=True, check=False)  # noqa: S607 - as LinuxCNC has it
+        raise
+    return printed
+
+
+def _read(samples: Path, period_s: float) -> PlannerRun:
+    table = np.loadtxt(samples, comments="o")
+    number, poses, line = table[:, 0], table[:, 1:7], table[:, 7].astype(int)
+    moving = np.flatnonzero(np.any(np.diff(poses, axis=0) != 0.0, axis=1))
+    if len(moving) == 0:
+        raise RuntimeError("the program moved nothing")
+    if np.any(np.diff(number[moving[0] : moving[-1] + 2]) != 1):
+        raise RuntimeError("servo cycles were lost in the recording")
+    kept = slice(moving[0], moving[-1] + 2)
+    return PlannerRun((number[kept] - number[kept][0]) * period_s, poses[kept], line[kept])

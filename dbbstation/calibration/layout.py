@@ -33,11 +33,7 @@ sources state of theirs is for a change from one session to another."""
 
 @dataclass(frozen=True, eq=False)
 class ParameterSet:
-    """One set of parameters of one source.
-
-    Attributes:
-        columns: places in x.
-    """
+    """One set of parameters of one source."""
 
     source: ErrorSource
     shared: str
@@ -70,7 +66,7 @@ class Layout:
 
     @property
     def names(self) -> tuple[tuple[str, str, str], ...]:
-        """Source, set and parameter of every column."""
+        """Return source, set and parameter of every column."""
         return tuple((term.source.name, term.shared, p.name) for term in self.terms for p in term.parameters)
 
     def columns_of(self, source: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -86,7 +82,7 @@ class Layout:
 
     @property
     def limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return limits of every column, shape (k,) each: shapes stay on their grid and one step beyond."""
+        """Return limits of every column, shape (k,) each: shapes keep to their grid and one step beyond."""
         each = [p.limits for term in self.terms for p in term.parameters]
         return np.array([low for low, _ in each]), np.array([high for _, high in each])
 
@@ -105,9 +101,6 @@ class Layout:
         """Return every column's variance by its formula's inaccuracy, shape (k,).
 
         It applies to amplitudes, not to random effects and nominal geometry.
-
-        Args:
-            x: shape (k,).
         """
         share = [
             0.0 if parameter.grid or term.source.name in GEOMETRY else term.source.form_uncertainty
@@ -163,10 +156,7 @@ _Stated: TypeAlias = "NDArray[np.float64] | ModelError | None"
 
 
 def _sets(sources: Sequence[ErrorSource], observations: Sequence[Observation]) -> list[dict[str, _Stated]]:
-    """Return each source's sets in run order, with the stated size of each.
-
-    One run at a time saves memory.
-    """
+    """Return each source's sets in run order, with stated sizes, one run at a time to save memory."""
     found: list[dict[str, _Stated]] = [{} for _ in sources]
     driven = [observation.raw.motor_current_a is not None for observation in observations]
     for motion, has_currents in zip(Motions(observations), driven, strict=True):

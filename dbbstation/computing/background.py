@@ -34,7 +34,7 @@ class Background(Generic[_Outcome]):
         return self._found[0]
 
     def wait(self, limit_s: float | None = None) -> None:
-        """Wait for any end, or so long at most."""
+        """Wait for the end, or for this time at most."""
         self._thread.join(limit_s)
 
     def _run(self) -> None:

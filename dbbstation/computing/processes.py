@@ -25,11 +25,6 @@ def each(work: Callable[[Item], Result], items: Sequence[Item], count: int) -> G
 
     If processes cannot start or are killed, this one does the rest.
 
-    Args:
-        work: can be pickled: a module's function, or a `functools.partial`.
-        items: can be pickled.
-        count: up to 1: this process does it all, in order.
-
     Raises:
         Exception: whatever `work` raises.
     """
@@ -68,7 +63,7 @@ def processes(count: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _end_with_parent() -> None:
-    """End a process with its parent, which cannot tell it when killed."""
+    """End a process when its parent ends, even if killed."""
     started()
     parent = multiprocessing.parent_process()
     if parent is not None:
@@ -81,7 +76,6 @@ def _end_after(sentinel: int) -> None:
 
 
 def _say_nothing_of(pool: ProcessPoolExecutor) -> None:
-    """Silence the thread of a pool whose processes were ended."""
     before, handing_out = threading.excepthook, getattr(pool, "_executor_manager_thread", None)
 
     def hook(fault: threading.ExceptHookArgs) -> None:

@@ -1,7 +1,7 @@
 """One thread of linear algebra for the program's own narrow matrices.
 
-More BLAS threads wait for each other between thousands of small products. Callers have other matrices, so the limit ends
-with the fit.
+More BLAS threads wait for each other between thousands of small products. Callers have other matrices, so the limit
+ends with the fit.
 """
 
 from __future__ import annotations

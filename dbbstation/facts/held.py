@@ -1,4 +1,4 @@
-"""What a report decides: its verdict, and the shop's tolerances held against circles."""
+"""The report's verdict and its tolerances."""
 
 from __future__ import annotations
 
@@ -9,13 +9,7 @@ from dbbstation.facts.run import OfRun
 
 @dataclass(frozen=True)
 class ReportVerdict:
-    """The report's first statement.
-
-    Attributes:
-        kind: `within`, `exceeded`, `cannot tell`, or `none` without tolerances.
-        reasons: a sentence for each broken tolerance.
-        to_do: in order.
-    """
+    """The report's first statement."""
 
     kind: str
     headline: str
@@ -28,9 +22,7 @@ class WorstCircle(OfRun):
     """The circle with the largest toleranced figure.
 
     Attributes:
-        direction: `ccw` or `cw`; `both` for both together.
         expanded_um: U = k u; None if unknown.
-        why_not: None if known.
     """
 
     um: float
@@ -43,14 +35,9 @@ class HeldTolerance:
     """A tolerance against circles [ISO 14253-1].
 
     Attributes:
-        filter: of the figure in words, or None.
-        tests: empty for all.
-        directions: empty for both.
         conformity: `exceeded` if one circle exceeds it, else `cannot tell` if one is within U; None without circles.
         within: whether no circle exceeds it or is undecided.
-        exceeded: number of circles.
         undecided: number of circles within U.
-        circles: number that it applies to.
         worst: circle with the largest figure, or None.
     """
 
@@ -69,11 +56,7 @@ class HeldTolerance:
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedTolerance(HeldTolerance):
-    """A tolerance held against circles now, and against those before.
-
-    Attributes:
-        before: None without applicable circles.
-    """
+    """A tolerance against circles now and before; None without applicable circles."""
 
     before: HeldTolerance | None
 

@@ -7,12 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class OfRun:
-    """A fact about one run.
-
-    Attributes:
-        direction: `ccw` or `cw`.
-        repeat: from 1.
-    """
+    """A fact about one run."""
 
     test: str
     direction: str

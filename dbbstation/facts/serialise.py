@@ -63,10 +63,6 @@ def plain(result: object) -> dict[str, Any]:
 def json_of(result: object, indent: int | None = 1, *, escaped: bool = False) -> str:
     """Return a result as JSON text.
 
-    Args:
-        indent: spaces a level; None: everything on one line.
-        escaped: escape characters beyond ASCII, for a database with file names that are not UTF-8.
-
     Raises:
         ValueError: a number is not finite.
     """

@@ -31,12 +31,12 @@ class Value:
 
     @property
     def is_known(self) -> bool:
-        """Whether its uncertainty is known."""
+        """Return whether its uncertainty is known."""
         return math.isfinite(self.uncertainty)
 
     @property
     def in_words(self) -> str:
-        """Value with its standard uncertainty and unit, as people read it."""
+        """Return the value with its standard uncertainty and unit, in words."""
         known = f"{self.value:.4g} ± {self.uncertainty:.2g}" if self.is_known else f"{self.value:.4g}"
         return f"{known} {self.unit}".rstrip()
 

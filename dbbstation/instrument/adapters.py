@@ -1,4 +1,4 @@
-"""Serial adapters by USB identity: a replugged cable may get another port name."""
+"""Serial adapters by USB identity, because a replugged cable may get another port name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ class Adapter:
     """The identity of a USB adapter.
 
     Attributes:
-        serial_number: empty if it has none.
         socket: USB socket, decisive only without serial number.
     """
 
@@ -35,7 +34,7 @@ class Adapter:
 
 
 def adapter_of(port: str) -> Adapter | None:
-    """Return the adapter of a port, or None if it is no USB port or gone."""
+    """Return the adapter of a port, or None if it is not USB or gone."""
     return next((adapter for name, adapter in _adapters(list_ports.comports()) if name == port), None)
 
 

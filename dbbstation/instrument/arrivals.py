@@ -6,12 +6,9 @@ from collections import deque
 
 
 class Arrivals:
-    """Remembers when bytes were seen, as far back as a frame reaches.
+    """Remembers when bytes were received, as far back as a frame reaches.
 
-    Bytes seen together arrived one after another.
-
-    Args:
-        reach: bytes behind the newest that can be asked for.
+    Bytes received together arrived one after another.
     """
 
     def __init__(self, character_s: float, reach: int) -> None:

@@ -49,8 +49,6 @@ class ByteLog:
 
     Args:
         path: must not exist.
-        instrument: protocol name.
-        force: overwrite the file.
 
     Raises:
         OutputError: the file exists, or cannot be written.
@@ -140,7 +138,6 @@ def read_byte_log(path: Path) -> Iterator[Chunk]:
 
 
 def _lines(path: Path) -> Generator[tuple[int, str]]:
-    """Yield complete lines below the first with numbers."""
     number = 0
     try:
         with opened(path) as source:

@@ -22,7 +22,7 @@ class Checksum(Schema):
 
     @property
     def width(self) -> int:
-        """Bytes."""
+        """Return the number of bytes."""
         return checksum_bytes(self.algorithm) * (1 if self.written == "binary" else 2)
 
     def pattern(self) -> bytes:

@@ -45,7 +45,7 @@ def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, sta
     """Return the bytes of one sample.
 
     Args:
-        length_mm: None: none, told as `fault` unless `status` says otherwise.
+        length_mm: None: none, reported as `fault` unless `status` says otherwise.
         counter: taken modulo the wire's modulus.
         status: a length that does not fit becomes `overrange`, or `fault` if the device has no such status.
 
@@ -94,11 +94,7 @@ def _decoded(protocol: Protocol, raw: bytes) -> tuple[Reading, Written | None]:
 
 
 class Decoder:
-    """Cuts a byte stream into frames and decodes them; chunks may end anywhere.
-
-    Args:
-        joining: the first line may be incomplete.
-    """
+    """Cuts a byte stream into frames and decodes them; chunks may end anywhere."""
 
     def __init__(self, protocol: Protocol, *, joining: bool) -> None:
         self._protocol = protocol
@@ -114,7 +110,7 @@ class Decoder:
         return self._pending
 
     def take_pending(self) -> bytes:
-        """Return and forget the pending bytes."""
+        """Return and clear the pending bytes."""
         raw, self._pending = self._pending, b""
         return raw
 

@@ -5,7 +5,7 @@ for a right FF, FF 00 00 for a break [IEEE Std 1003.1-2017, 11.2.2 Input Modes].
 (`serialposix.py`, `_reconfigure_port`), so they are set after it. Windows, sockets and RFC 2217 servers mark nothing.
 
 A wrong character gets its eighth bit set on a seven-bit line and becomes NUL on an eight-bit line. No instrument's text
-has either, so such a frame is rejected, and byte logs keep what came.
+contains either, so the frame is rejected, and byte logs keep the received bytes.
 """
 
 from __future__ import annotations
@@ -22,11 +22,7 @@ _SEVEN, _EIGHTH_BIT = 7, 0x80
 
 
 class Marks:
-    """Removes the system's marks from received bytes, cut anywhere.
-
-    Args:
-        data_bits: 7 or 8.
-    """
+    """Removes the system's marks from received bytes, cut anywhere."""
 
     def __init__(self, data_bits: int) -> None:
         self._seven = data_bits == _SEVEN

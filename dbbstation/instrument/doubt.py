@@ -97,12 +97,7 @@ class Doubts:
         self._others = 0
 
     def judged(self, piece: Piece, *, clean: bool = True) -> Reading:
-        """Return a reading, marked if doubtful.
-
-        Args:
-            piece: in wire order.
-            clean: nothing else answered the request.
-        """
+        """Return a reading, marked if doubtful."""
         reading, written = piece.reading, piece.written
         if self._proved:
             return reading

@@ -42,11 +42,10 @@ class Instrument:
     """A length instrument on a serial line; a `with` block starts and closes it.
 
     Args:
-        port: name, URL, or an open port, which stays open.
         baud: if not the usual rate.
         clock: monotonic, for readings [s]; scaled for virtual instruments, while patience is in real seconds.
-        log: of all bytes; the caller closes it.
-        timeout_s: patience with a silent line; None: the protocol's.
+        log: log of all bytes; the caller closes it.
+        timeout_s: real seconds until a silent line is an error; None: the protocol's.
         memory_s: how long a stream's quickest arrival counts, by `clock`: longer on a scaled clock, since delays are in real
             time.
         reconnect_s: real seconds to wait for an unplugged USB adapter, known by its identity.
@@ -85,7 +84,7 @@ class Instrument:
 
     @property
     def where(self) -> str:
-        """Name of the port."""
+        """Return the name of the port."""
         return self._port if isinstance(self._port, str) else str(getattr(self._port, "name", None) or "open port")
 
     @property
@@ -180,11 +179,7 @@ class Instrument:
         return {str(reason): count for reason, count in self.tally.rejected.items()}
 
     def drain(self) -> list[Reading]:
-        """Return unread readings without waiting.
-
-        Raises:
-            InstrumentError: as `read`, after all earlier readings.
-        """
+        """Return unread readings without waiting."""
         with self._arrived:
             readings = list(self._queue)
             self._queue.clear()
@@ -193,11 +188,7 @@ class Instrument:
             return readings
 
     def readings(self, count: int | None = None) -> Iterator[Reading]:
-        """Yield `count` readings, or without end.
-
-        Raises:
-            InstrumentError: as `read`.
-        """
+        """Yield `count` readings, or without end."""
         done = 0
         while count is None or done < count:
             yield self.read()
@@ -249,7 +240,6 @@ class Instrument:
             Listener(link, reception).run(after)
 
     def _plugged_in_again(self) -> tuple[Link, bytes] | None:
-        """Wait for the same adapter; return its line and bytes behind the start sequence."""
         if self._adapter is None:
             return None
         if self._link is not None:
@@ -287,11 +277,7 @@ class Instrument:
 
 
 def _command(link: Link, step: LineCommand, patience_s: float) -> bytes:
-    """Send a command, wait for its answer and return bytes behind it.
-
-    Raises:
-        InstrumentError: another answer, or none.
-    """
+    """Send a command, wait for its answer and return bytes behind it."""
     link.write(step.send)
     came = b""
     deadline_s = time.monotonic() + patience_s

@@ -67,7 +67,7 @@ Bytes: TypeAlias = Annotated[
 
 @dataclass(slots=True)
 class FrameParts:
-    """What the parts of one frame have said so far.
+    """Parsed parts of one frame so far.
 
     Attributes:
         value: in device units, without a `sign` part.
@@ -96,7 +96,7 @@ class FrameParts:
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """What a frame is to say.
+    """The content of a frame.
 
     Attributes:
         value: signed, in device units.
@@ -141,7 +141,7 @@ class Literally(Schema):
 
     @property
     def width(self) -> int:
-        """Bytes."""
+        """Return the number of bytes."""
         return len(self.value)
 
     def pattern(self) -> bytes:
@@ -171,7 +171,7 @@ class SignField(Schema):
 
     @property
     def width(self) -> int:
-        """Bytes."""
+        """Return the number of bytes."""
         return 1
 
     def pattern(self) -> bytes:
@@ -235,7 +235,7 @@ class Flags(Schema):
 
     @property
     def width(self) -> int:
-        """Bytes."""
+        """Return the number of bytes."""
         return 1
 
     def pattern(self) -> bytes:
@@ -263,7 +263,7 @@ class SkipField(Schema):
 
     @property
     def width(self) -> int:
-        """Bytes."""
+        """Return the number of bytes."""
         return len(self.written)
 
     def pattern(self) -> bytes:

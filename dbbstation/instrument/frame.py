@@ -31,7 +31,6 @@ class Optionally(Schema):
 
     Attributes:
         feature: written if in the protocol's `features`.
-        parts: in wire order.
     """
 
     kind: Literal["optional"]
@@ -113,12 +112,12 @@ class Frame(Schema):
 
     @property
     def number(self) -> Number | None:
-        """The part that carries the length."""
+        """Return the part with the length."""
         return self._number_of("length")
 
     @property
     def counter(self) -> Number | None:
-        """The part that carries the sample counter."""
+        """Return the part with the sample counter."""
         return self._number_of("counter")
 
     def _number_of(self, what: str) -> Number | None:

@@ -25,13 +25,10 @@ class Latch:
 def latch_of(protocol: Protocol, *, asked_s: float, first_byte_s: float, baud: int) -> Latch:
     """Return when the length of a reply was taken.
 
-    The moment is uniform between the device's bounds and before the reply: its middle, with the width over the root of 12
-    as standard uncertainty [JCGM 100:2008, 4.3.7]. A late reply was delayed by the computer, mostly on arrival, so the
-    estimate stays and the uncertainty includes a delayed request. A reply earlier than possible refutes the bounds: then
-    anywhere between request and first byte.
-
-    Args:
-        asked_s: handing over of the request.
+    The moment is uniform between the device's bounds and before the reply: its middle, with the width over the root of
+    12 as standard uncertainty [JCGM 100:2008, 4.3.7]. A late reply was delayed by the computer, mostly on arrival, so
+    the estimate is kept and the uncertainty includes a delayed request. A reply earlier than possible refutes the
+    bounds; then the moment is anywhere between request and first byte.
     """
     character_s = protocol.line.character_s(baud)
     sent_s = asked_s + len(protocol.ask.request) * character_s

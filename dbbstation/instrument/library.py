@@ -43,9 +43,6 @@ def _files() -> dict[str, Path]:
 def load_instrument(name_or_file: str | Path, profile: str | None = None) -> Protocol:
     """Return the protocol of a known instrument or a `.yaml` file.
 
-    Args:
-        profile: None: the usual one.
-
     Raises:
         InstrumentError: unknown instrument or profile.
         InputError: every fault of the file with line and column.
@@ -72,9 +69,6 @@ def _file_of(name_or_file: str | Path) -> Path:
 
 def with_zero(protocol: Protocol, zero_mm: float | None) -> Protocol:
     """Return a relative device's protocol with the length at its zero.
-
-    Args:
-        zero_mm: distance of ball centres at zero; None for a device with whole lengths.
 
     Raises:
         InstrumentError: a relative device without zero, or a zero for another device.
@@ -121,11 +115,7 @@ def read_protocol(path: Path, profile: str | None = None) -> Protocol:
 
 
 def _read(path: Path) -> dict[str, Protocol]:
-    """Return every checked variant by profile, the usual one first.
-
-    Raises:
-        InputError: every fault with line and column.
-    """
+    """Return every checked variant by profile, the usual one first."""
     faults: list[Problem] = []
     document = load_yaml(path, faults)
     file = validate(document, ProtocolFile, faults) if document is not None else None

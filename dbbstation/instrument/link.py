@@ -42,7 +42,7 @@ class Port(Protocol):
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that can be read at once."""
+        """Return the number of bytes that can be read at once."""
 
     def read(self, size: int = 1, /) -> bytes:
         """Return up to `size` bytes, fewer after the port's timeout."""
@@ -56,14 +56,7 @@ class LineClosedError(InstrumentError):
 
 
 class Link:
-    """An open line to an instrument.
-
-    Args:
-        name: for messages.
-        owned: close the port with the link.
-        log: of all bytes.
-        marks: removes marks of damaged characters; None without marks.
-    """
+    """An open line to an instrument."""
 
     def __init__(
         self,
@@ -111,7 +104,6 @@ class Link:
         return raw
 
     def _rest(self) -> bytes:
-        """Return further bytes without waiting."""
         with suppress(*_ERRORS):
             # What is wrong with the line comes up again with the next read; what was read is not thrown away for it.
             if isinstance(self._port, SocketPort):
@@ -166,8 +158,6 @@ def open_link(
 
     Args:
         port: name (`/dev/ttyUSB0`, `COM3`), pyserial URL (`socket://127.0.0.1:4001`), or open port.
-        baud: instead of the usual rate.
-        log: of all bytes.
         text: all input is text, so that damaged characters can be marked.
 
     Raises:

@@ -41,9 +41,6 @@ class Listener:
     def run(self, chunk: bytes) -> None:
         """Read until `stop` is set.
 
-        Args:
-            chunk: bytes received already.
-
         Raises:
             InstrumentError: the line is silent, closed or garbled, or the device restarted; OutputError: the byte log is full.
         """

@@ -1,7 +1,7 @@
 """Numeric parts of a frame: text, integers, IEEE floats.
 
-A number is the length in device units or the sample counter. `specials` are contents that mean a status, such as
-`+FFFFFFF`.
+A number is the length in device units or the sample counter. `specials` are contents with the meaning of a status, such
+as `+FFFFFFF`.
 """
 
 from __future__ import annotations
@@ -93,7 +93,6 @@ class Number(Schema):
         raise NotImplementedError
 
     def _places(self, raw: bytes) -> tuple[int, int] | None:  # noqa: ARG002 (numbers in text have digits)
-        """Return digits before and behind the point, or None if not decimal."""
         return None
 
     def _parsed(self, raw: bytes) -> float:
@@ -216,7 +215,7 @@ class Integer(Number):
 
     @property
     def width(self) -> int:
-        """Bytes on the wire."""
+        """Return the number of bytes."""
         return self.size * (2 if self.written in {"hex", "HEX"} else 1)
 
     @property
@@ -281,7 +280,7 @@ class Ieee(Number):
 
     @property
     def width(self) -> int:
-        """Bytes on the wire."""
+        """Return the number of bytes."""
         return self.size
 
     @property

@@ -93,7 +93,7 @@ class Poller:
                 pass
 
     def _seen_s(self, answer: PolledReply, asked_s: float) -> float:
-        """Return when the first byte of a reply came; where time is counted, as soon as it can have come."""
+        """Return the arrival of the reply's first byte; if time is counted, the earliest possible one."""
         if not isinstance(self._to.clock, MachineTime):
             return answer.first_s
         characters = len(self._protocol.ask.request) + 1
@@ -130,7 +130,7 @@ class Poller:
             raise self._to.symptom(telling.raw, telling.why)
 
     def _refuse_strangers(self) -> None:
-        """Fail if foreign bytes recur: then replies are only apparent."""
+        """Fail if foreign bytes recur, because replies are then only apparent."""
         noisy = [answer for answer in self._recent if answer.raw and not answer.clean]
         if len(noisy) >= MOST_NOISY:
             raw = b"".join(answer.raw for answer in self._recent)[-LONGEST_LINE:]
@@ -150,7 +150,7 @@ class Poller:
         return heard.reading.said if protocol.frames[0].pattern.fullmatch(heard.raw) else ""
 
     def _until_quiet(self) -> None:
-        """Discard replies to earlier requests until nothing comes for the time of a reply."""
+        """Discard replies to earlier requests until the line is quiet for the time of a reply."""
         quiet_s = self._protocol.timing.reply_latency_s + _MARGIN_S
         quiet_s += self._protocol.frame_characters * self._to.character_s
         now_s = heard_s = time.monotonic()

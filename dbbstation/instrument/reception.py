@@ -76,11 +76,7 @@ class Reception:
         return self.protocol.line.character_s(self.baud)
 
     def symptom(self, raw: bytes, why: str) -> InstrumentError:
-        """Return the error of a line without readings.
-
-        Args:
-            raw: received instead; may be empty.
-        """
+        """Return the error of a line without readings."""
         if not raw:
             heard_before = self.tally.readings > 0
             return symptoms.silence(self.protocol, self.where, self.timeout_s, self.baud, heard_before=heard_before)

@@ -17,7 +17,7 @@ understand different bytes."""
 
 
 def looks_like(raw: bytes, other_than: Protocol) -> list[Protocol]:
-    """Return known instruments and profiles that understand some bytes best, the likeliest first.
+    """Return known instruments and profiles that decode some bytes best, the likeliest first.
 
     At equal bytes, instruments with a fitting checksum come first.
     """
@@ -34,7 +34,6 @@ def looks_like(raw: bytes, other_than: Protocol) -> list[Protocol]:
 
 
 def _understood(protocol: Protocol, raw: bytes) -> float:
-    """Return the share of bytes that are readings with a length."""
     heard = (
         Decoder(protocol, joining=True).feed(raw) if protocol.by_width else Decoder(protocol, joining=False).feed(raw)
     )

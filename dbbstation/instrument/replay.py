@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What a byte log says in one place.
+    """Content of a byte log at one place.
 
     Attributes:
         t_s: last byte, since the log was opened.
@@ -46,7 +46,7 @@ def replayed(protocol: Protocol, chunks: Iterable[Chunk], *, where: str) -> Iter
 
 
 class _Decoding:
-    """What a log has said so far."""
+    """State of decoding a log."""
 
     def __init__(self, protocol: Protocol, where: str) -> None:
         self._protocol = protocol
@@ -71,7 +71,7 @@ class _Decoding:
         self._decoder = Decoder(told or self._protocol, joining=False)
 
     def came(self, chunk: Chunk) -> Iterator[Replayed]:
-        """Take bytes that came from the device."""
+        """Take bytes from the device."""
         self._last_s = chunk.t_s
         self._answer += chunk.raw if self._protocol.ask.asked else b""
         for heard in self._decoder.feed(chunk.raw):

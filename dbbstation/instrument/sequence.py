@@ -1,9 +1,9 @@
 """The device's sample counter: losses and counters out of order.
 
-Three causes are possible. After a damaged or doubled line, the sequence continues from before it. After a loss it
-continues ahead, after a restart behind. The line is therefore held until the next ones decide. A damaged counter
-continued by chance needs two faults in a row and one value in `modulus`: at one damaged line in a thousand and modulus
-256, one chance in 250 million.
+After a damaged or doubled line the sequence continues from before it; after a loss it continues ahead, after a restart
+behind. The line is therefore held until the next ones decide. A damaged counter is continued by chance only with two
+faults in a row and one value in `modulus`: at one damaged line in a thousand and modulus 256, one chance in 250
+million.
 """
 
 from __future__ import annotations
@@ -37,12 +37,7 @@ class Placed(Generic[Held]):
 
 
 class SampleOrder(Generic[Held]):
-    """Orders samples by counter and returns them in wire order, doubtful ones later.
-
-    Args:
-        modulus: None: no counter, nothing is held or counted.
-        where: port, for messages.
-    """
+    """Orders samples by counter and returns them in wire order, doubtful ones later."""
 
     def __init__(self, modulus: int | None, where: str) -> None:
         self._modulus = modulus
@@ -80,7 +75,6 @@ class SampleOrder(Generic[Held]):
         return self._decided()
 
     def _goes_on_from_before(self, counter: int) -> bool:
-        """Return whether a counter continues the sequence before the held lines."""
         last = self._last or 0
         if not self._ahead(last, counter):
             return False

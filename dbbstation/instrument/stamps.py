@@ -1,7 +1,8 @@
 """Sample times from the arrival of bytes.
 
-Bytes are seen late, never early: line, adapter buffer (16 ms on a common USB chip) and system add delay. A request bounds
-its moment. For a stream, sample number times period is a precise clock, whose offset is the smallest recent delay.
+Bytes are received late, never early: line, adapter buffer (16 ms on a common USB chip) and system add delay. A request
+bounds its moment. For a stream, sample number times period is a precise clock, whose offset is the smallest recent
+delay.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ class StreamStamps:
     """Sample times of a stream.
 
     Args:
-        memory_s: how long a small delay counts. A clock off by 100 ppm drifts 0.2 ms in 2 s.
+        memory_s: duration of a small delay's validity. A clock off by 100 ppm drifts 0.2 ms in 2 s.
     """
 
     def __init__(self, period_s: float, memory_s: float = 2.0) -> None:
@@ -42,11 +43,7 @@ class StreamStamps:
         self._last_s = float("-inf")
 
     def stamp(self, seen_s: float, lost: int = 0) -> float:
-        """Return the time of the next sample [s], strictly rising.
-
-        Args:
-            seen_s: latest leaving of its last byte.
-        """
+        """Return the time of the next sample [s], strictly rising."""
         self._number += 1 + lost
         offset_s = seen_s - self._number * self._period_s
         # A queue whose offsets rise from left to right: the smallest of the window is always the first.

@@ -55,11 +55,7 @@ def half_line(raw: bytes, where: str, waited_s: float) -> InstrumentError:
 def garbage(
     protocol: Protocol, where: str, raw: bytes, why: str, baud: int, *, marked: bool = False
 ) -> InstrumentError:
-    """Return the error of unreadable bytes with the likeliest cause.
-
-    Args:
-        marked: the eighth bit of a seven-bit character can only mark wrong parity.
-    """
+    """Return the error of unreadable bytes with the likeliest cause."""
     return InstrumentError(
         f"what comes is not {protocol.label}: {shown(raw)}" + (f" ({why})" if why else ""),
         where=where,

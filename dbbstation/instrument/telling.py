@@ -21,7 +21,6 @@ class Text(Schema):
 
     Attributes:
         width: characters; None: 1 to `max_width`.
-        written: by the virtual instrument.
     """
 
     kind: Literal["text"]
@@ -70,7 +69,7 @@ class ErrorTable(Schema):
 
     @property
     def width(self) -> int:
-        """Characters."""
+        """Return the number of characters."""
         return len(self.codes[0].code)
 
     def pattern(self) -> bytes:

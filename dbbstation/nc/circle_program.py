@@ -37,7 +37,7 @@ BAR_OFF = "stop recording, take the bar off, then continue"
 
 @dataclass(frozen=True)
 class Approach:
-    """Where the machine comes to the first point and leaves the last.
+    """Where the machine reaches the first point and leaves the last.
 
     Attributes:
         clear_mm: height of rapids above these points, clear of ball, holder and bar [mm].
@@ -61,7 +61,8 @@ def circle_toolpath(
     A nominal and a compensated program then differ only in their numbers.
 
     Args:
-        approach: where rapids go and the program waits for the bar; None: the bar stays on, and the program has feed moves only.
+        approach: where rapids end and the program waits for the bar; None: the bar stays on, and the program has only
+            feed moves.
     """
     first, last = circle.poses(_ends_deg(circle), circle.feed_in_mm)
     path = ToolpathBuilder(name)
@@ -102,7 +103,7 @@ def arc_phi_deg(circle: Circle, step_deg: float) -> NDArray[np.float64]:
 
 
 def chord_error_mm(circle: Circle, step_deg: float) -> float:
-    """Return how far the middle of a chord lies inside the circle, r (1 - cos(step / 2)) [mm]."""
+    """Return the distance of a chord's middle from the circle, r (1 - cos(step / 2)) [mm]."""
     return circle.radius_mm * float(1.0 - np.cos(np.radians(step_deg) / 2.0))
 
 

@@ -32,7 +32,7 @@ def commanded_poses(text: str, file: str, observation: Observation) -> NDArray[n
     """Return the commanded poses of the lead-in and the samples, shape (n, 6) [mm, deg].
 
     Args:
-        file: name whose extension tells the dialect.
+        file: name with the dialect's extension.
 
     Raises:
         InputError: the program cannot be read, or does not run this circle.
@@ -71,7 +71,6 @@ def poses_at_progress(toolpath: Toolpath, circle: Circle, phi_deg: NDArray[np.fl
 
 
 def _arc_s(toolpath: Toolpath) -> tuple[float, float]:
-    """Return begin and end of the longest stretch of feed moves [s]."""
     # Comments and functions take no time and end no stretch.
     stops = np.isin(toolpath.kind, [RowKind.RAPID, RowKind.DWELL, RowKind.PAUSE, RowKind.OPTIONAL_STOP])
     stretch = np.cumsum(stops)

@@ -1,4 +1,4 @@
-"""Compensation of any toolpath: the machine model inverted along the path, in pieces that keep chord and feed."""
+"""Compensation of any toolpath: the model inverted along the path, in pieces that keep chord error and feed."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ class Prefer(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Compensation:
-    """A compensated toolpath and what was done to it.
+    """A compensated toolpath with its largest corrections and errors.
 
     Attributes:
         greatest_um: largest shift of a programmed point, or of one `LEVER_MM` from the tip by the tilt [µm].
         chord_um: largest distance between a commanded move and its curve, at `DENSELY` places of each piece [µm].
-        chord_line: 0 if there is none.
-        tilt_um: largest correction of the tilt that was left out, felt at `LEVER_MM` [µm].
-        seconds: time in moves at feed, as the planner reckons it.
-        slowest_mm_min: F at which no piece is too short for it; infinite if all keep theirs.
-        slowest_line: of the piece that needs this F; 0 if there is none.
+        chord_line: 0 if none.
+        tilt_um: largest tilt correction left out, at `LEVER_MM` [µm].
+        seconds: time in moves at feed, as the planner computes it.
+        slowest_mm_min: F at which no piece is too short; infinite if all keep their feed.
+        slowest_line: line of the piece that needs this F; 0 if none.
     """
 
     toolpath: Toolpath
@@ -85,14 +85,14 @@ def compensate_toolpath(
 ) -> Compensation:
     """Return the toolpath that takes the actual machine along the given one.
 
-    The path is inverted from beginning to end, rapids included: sources with a history see the path that the machine
-    runs.
+    The path is inverted from beginning to end, rapids included, because sources with a history depend on the machine's
+    actual path.
 
     Args:
         model: calibrated; only sources of the machine are inverted.
         chord_mm: tolerance of the longest pieces; None: one move for each.
-        keep_arcs: keep the chords of arcs, which were chosen for the feed before.
-        started_s: start of the program on the time scale of the model's sessions; None: not known.
+        keep_arcs: keep the chords of arcs, chosen earlier for the feed.
+        started_s: start of the program on the time scale of the model's sessions; None: unknown.
         largest_mm: greatest correction of the tip, and of a point `LEVER_MM` from it by the tilt.
 
     Raises:
@@ -148,11 +148,10 @@ def compensate_toolpath(
 
 
 class _Part(NamedTuple):
-    """What is commanded along some rows of a toolpath.
+    """Commands along some rows of a toolpath.
 
     Attributes:
         begin: of each piece, as `Pieces`.
-        end: likewise.
         commanded: pose at the end of each, shape (k, 6) [mm, deg].
         shift_mm: correction there, shape (k,) [mm].
         off_mm: distance of the curve from pieces at feed, at `DENSELY` places, shape (k,).
@@ -178,7 +177,6 @@ def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: NDArray[np.
 
 
 def _needed_mm(toolpath: Toolpath, planner: Planner) -> NDArray[np.float64]:
-    """Return the length of a piece that keeps the feed of each row, shape (n,) [mm]; 0 if any does."""
     mm_s = np.where(cuts(toolpath), np.nan_to_num(toolpath.feed) / 60.0, 0.0)
     return np.where(cuts(toolpath), planner.needed_mm(mm_s), 0.0)
 
@@ -220,7 +218,6 @@ def _written(toolpath: Toolpath, pieces: Pieces) -> NDArray[np.bool_]:
 
 
 def _until(toolpath: Toolpath, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return way of the tool tip [mm] and time [s] from the begin of the program, shapes (k,)."""
     at = np.arange(len(toolpath) + 1)
     ways = (np.concatenate([[0.0], np.cumsum(each)]) for each in (toolpath.tip_mm, toolpath.duration_s))
     way_mm, time_s = (np.interp(places, at, way) for way in ways)
@@ -233,10 +230,10 @@ def _feeds(
     wanted_mm: NDArray[np.float64],
     wanted_s: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the feeds of a compensated path, shape (n,) [mm/min], or of angles if the tip stands still [deg/min].
+    """Return the feeds of a compensated path, shape (n,) [mm/min]; of angles if the tip does not move [deg/min].
 
-    F stays, because the compensated move has nearly the wanted length. A turn about a tip that hardly moves gets the feed
-    that takes the wanted time.
+    F is kept, because the compensated move has nearly the original length. A turn about a nearly stationary tip gets
+    the feed for the original time.
     """
     # Controls take F for a turning speed only where X, Y and Z stand still to the last digit.
     way = np.where(path.tip_mm > 0.0, path.tip_mm, path.turn_deg)

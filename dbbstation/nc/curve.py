@@ -31,11 +31,11 @@ HOLDING = 3
 
 @dataclass(frozen=True, eq=False)
 class SpanBehind:
-    """What a part of a toolpath leaves to the next one.
+    """State passed from one part of a toolpath to the next.
 
     Attributes:
         command: pose commanded last, shape (6,) [mm, deg].
-        passed: what the model remembers.
+        passed: memory of the model's sources.
     """
 
     command: NDArray[np.float64]
@@ -43,15 +43,15 @@ class SpanBehind:
 
 
 class CommandCurve:
-    """What to command along a toolpath.
+    """The commands along a toolpath.
 
-    A place is a number: row plus the share of it that is passed. A row ends at the number of the next one.
+    A place is a number: row plus the completed share of it. A row ends at the next row's number.
 
     Args:
         model: calibrated; only sources of the machine are inverted.
-        started_s: start of the program on the time scale of the model's sessions; None if not known.
+        started_s: start of the program on the time scale of the model's sessions; None if unknown.
         hold_tilt: correct the tool tip alone and command A, B and C as programmed.
-        before: from the preceding part; None: this is the first that moves.
+        before: from the preceding part; None: no earlier motion.
     """
 
     def __init__(
@@ -79,8 +79,8 @@ class CommandCurve:
     def at(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return poses to command at places in program order, shape (k, 6) [mm, deg].
 
-        Rows without motion take over the pose before them. If the model has a history, the
-        end of long stops is inverted as well and commanded for the move before.
+        Rows without motion repeat the pose before them. If the model has a history, the end of long stops is inverted
+        as well and commanded for the move before.
 
         Raises:
             KinematicsError: a pose that the machine cannot take.
@@ -111,11 +111,7 @@ class CommandCurve:
         return inverse[at_rest]
 
     def _inverted(self, wanted: Motion) -> NDArray[np.float64]:
-        """Invert stretch by stretch, handing the sources' memory on.
-
-        Returns:
-            Commands, those before the first that moves first, shape (1 + number of places that move, 6) [mm, deg].
-        """
+        """Invert stretch by stretch, handing the sources' memory on."""
         passed = None if self._before is None else self._before.passed
         parts = [] if self._before is None else [self._before.command[None]]
         for start in range(0, len(wanted), PLACES_AT_ONCE):
@@ -148,7 +144,7 @@ def row_and_share(places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArr
 
 
 def felt_mm(off: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the way at the tip, or of a point at the lever if larger, of pose differences (k, 6), shape (k,) [mm]."""
+    """Return the motion at the tip, or at the lever if larger, of pose differences (k, 6), shape (k,) [mm]."""
     lengths = in_mm(off)
     moved, tilted = np.linalg.norm(lengths[:, :3], axis=1), np.linalg.norm(lengths[:, 3:], axis=1)
     felt: NDArray[np.float64] = np.maximum(moved, tilted)
@@ -156,10 +152,10 @@ def felt_mm(off: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def rounding_mm(decimals: Sequence[int]) -> float:
-    """Return what rounding to these decimals of X to C costs at most, at the tip or at the lever [mm]."""
+    """Return the largest effect of rounding X to C to these decimals, at the tip or the lever [mm]."""
     return float(felt_mm(0.5 / 10.0 ** np.array([decimals]))[0])
 
 
 def in_mm(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return poses, shape (k, 6), with angles as the way of a point at the lever [mm]."""
+    """Return poses, shape (k, 6), with angles as the motion of a point at the lever [mm]."""
     return poses * np.repeat([1.0, np.radians(LEVER_MM)], 3)

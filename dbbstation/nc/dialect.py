@@ -1,4 +1,4 @@
-"""One control's way to write and read a toolpath."""
+"""How one control writes and reads a toolpath."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ class Dialect(ABC):
     def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
         """Return the program, with the header's lines as comments first.
 
-        The same toolpath and header give the same text. `numbers` go to the first line that is no comment. `toolpath.name` and
-        `toolpath.run` say which program it is, where a control wants a name or number in it.
+        The same toolpath and header give the same text. `numbers` are in the first line that is no comment.
+        `toolpath.name` and `toolpath.run` identify the program, if a control needs a name or number.
         """
 
     def file_name(self, stem: str, run: int) -> str:  # noqa: ARG002
@@ -69,8 +69,8 @@ class Dialect(ABC):
         """Return what a program commands.
 
         Args:
-            start: pose before the program, shape (6,) [mm, deg], NaN for unknown axes; None: all are.
-            setup: offsets and tool lengths of the control, given to a dialect that `takes_setup`; None: all are zero.
+            start: pose before the program, shape (6,) [mm, deg], NaN for unknown axes; None: all unknown.
+            setup: offsets and tool lengths of the control, for a dialect that `takes_setup`; None: all zero.
 
         Raises:
             InputError: faults with line and column.
@@ -79,7 +79,7 @@ class Dialect(ABC):
     def toolpath(
         self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: ControlSetup | None = None
     ) -> Toolpath:
-        """Return what `read` does of a program that moves something.
+        """Return the result of `read` for a program that moves something.
 
         Raises:
             InputError: as `read`, or nothing moves.

@@ -43,11 +43,10 @@ class Inverse:
     """The model to compensate with.
 
     Attributes:
-        origin: file or hash of the model, for the header.
         started_s: start of each program on the time scale of the model's sessions; None if not known.
         identified: the model with its covariance; None if not known.
         largest_mm: greatest correction that is applied [mm].
-        strict: refuse a program that misses the chord error, or in which the control would not keep a feed.
+        strict: refuse a program that exceeds the chord error, or in which the control would not keep a feed.
     """
 
     model: MachineModel
@@ -68,12 +67,12 @@ class Program:
         greatest_um: None in a nominal program.
         chord_um: largest distance between a move and its path; None in a nominal program.
         chord_asked_um: None in a nominal program.
-        uncertainty_um: greatest standard uncertainty of the tool tip along the path; None if not known.
-        uncertainty_by_axis_um: of X, Y and Z; None if not known, empty without a model.
-        why_unknown: empty if all are known.
-        tilt_left_um: correction of the tilt that was left out, felt 100 mm from the tip; None in a nominal program.
-        feed_s: time at feed as reckoned; None in a nominal program, or if the control's look-ahead is not known.
-        remarks: what is not as asked for, in words.
+        uncertainty_um: greatest standard uncertainty of the tool tip along the path; None if unknown.
+        uncertainty_by_axis_um: of X, Y and Z; None if unknown, empty without a model.
+        why_unknown: empty if known.
+        tilt_left_um: tilt correction left out, 100 mm from the tip; None in a nominal program.
+        feed_s: computed time at feed; None in a nominal program, or for an unknown look-ahead.
+        remarks: unmet requests, in words.
     """
 
     name: str
@@ -108,9 +107,7 @@ def circle_programs(
 
     Args:
         inverse: None for nominal programs.
-        origin: source of plan and machine, for the header.
-        tests: names; empty for all.
-        step_deg: angle between points; compensated programs take a larger one if the feed needs it.
+        step_deg: angle between points; compensated programs use a larger one if the feed needs it.
         chord_mm: greatest distance of a compensated move from the circle.
 
     Raises:
@@ -152,15 +149,7 @@ def dry_run(
     approach: Approach | None = USUAL_APPROACH,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[int, list[StationError]]:
-    """Try the nominal programs of all runs of a plan, and write none.
-
-    Args:
-        tests: names that the plan has; empty for all.
-
-    Returns:
-        Number of programs, and what `circle_programs` would refuse: for each program the first point outside the travel and
-        the first feed that the machine does not reach.
-    """
+    """Try the nominal programs of all runs of a plan, and write none."""
     runs = [(name, direction) for name in tests or plan.tests for direction in plan.tests[name].directions]
     faults: list[StationError] = []
     for done, (name, direction) in enumerate(runs):
@@ -279,7 +268,7 @@ def planner_of(machine: Machine, dialect: Dialect) -> Planner:
 
 
 def _step_deg(circle: Circle, step_deg: float, chord_mm: float, planner: Planner) -> float:
-    """Return the angle between points of a compensated circle [deg]: what the feed needs within the chord, at least `step_deg`."""
+    """Return the angle between points of a compensated circle [deg]: at least `step_deg`, or more if the feed needs it, within the chord error."""
     # The arc is divided evenly: its steps may be smaller by a part in its number of points.
     needed_mm = 1.01 * float(planner.needed_mm(np.array(circle.feed_mm_min / 60.0)))
     longest_mm = float(np.sqrt(8.0 * circle.radius_mm * chord_mm)) / 1.01
@@ -291,7 +280,6 @@ UNCERTAIN_AT = 2000
 
 
 def _uncertainty_um(path: Toolpath, inverse: Inverse) -> tuple[float | None, tuple[float | None, ...], str]:
-    """Return the greatest standard uncertainty of the tool tip along the path, in total and by axis [µm], and why one is None."""
     if inverse.identified is None:
         return None, (), ""
     row, share = path.subdivided(REACH_MM, REACH_DEG)
@@ -330,7 +318,7 @@ def _said(names: Mapping[str, str]) -> list[str]:
 
 
 def _holds_for(path: Toolpath) -> list[str]:
-    """Return what a program is right for, besides the model."""
+    """Return the conditions under which a program is valid, besides the model."""
     if path.holds is None:
         return []
     held = {name: offset_text(values) for name, values in path.holds.items()}

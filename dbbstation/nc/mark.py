@@ -1,8 +1,8 @@
 """The mark of a compensated program: last decimals of its poses.
 
-Each pose is moved by the last decimal of its angles (or of X, Y and Z if the angles stand still) until a hash of its six
-numbers begins with `BITS` zero bits. The mark survives edits of comments, line numbers and feeds, and added or deleted
-lines. Fewer decimals or another place destroy it.
+Each pose is moved by the last decimal of its angles, or of X, Y and Z if the angles are constant, until a hash of its
+six numbers begins with `BITS` zero bits. The mark survives edits of comments, line numbers and feeds, and added or
+deleted lines. Fewer decimals or another place destroy it.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
 
 
 def is_marked(toolpath: Toolpath) -> bool:
-    """Return whether more poses are marked than chance gives."""
+    """Return whether more poses are marked than chance explains."""
     poses = toolpath.numbers_written[toolpath.is_move & (toolpath.unknown == 0)]
     for decimals in decimals_of(poses):
         sums = np.unique(_sums(_numbers(poses, decimals)))
@@ -107,7 +107,7 @@ def is_marked(toolpath: Toolpath) -> bool:
 
 
 def decimals_of(poses: NDArray[np.float64]) -> Iterator[tuple[int, ...]]:
-    """Yield the decimals in which a dialect may have written poses, shape (n, 6): those of this program first.
+    """Yield the decimals in which a dialect may have written poses, shape (n, 6), this program's first.
 
     Fewer are possible only if no pose has more.
     """
@@ -121,7 +121,6 @@ def _off(numbers: NDArray[np.float64], decimals: int) -> float:
 
 
 def _mark_many(numbers: NDArray[np.int64], free: NDArray[np.bool_], missing: NDArray[np.int64]) -> None:
-    """Move rows of six by the least felt steps; rows that no step marks stay."""
     sums = _sums(numbers)
     missing = missing[~_has_mark(sums[missing], BITS[4])]
     steps = _steps(FARTHEST_ANGLE, 1)
@@ -159,7 +158,6 @@ def _numbers(poses: NDArray[np.float64], decimals: Sequence[int]) -> NDArray[np.
 
 
 def _sums(numbers: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """Return the weighted sum of each row of six; it is linear in the steps."""
     with np.errstate(over="ignore"):
         weighted: NDArray[np.uint64] = (numbers.astype(np.uint64) * _ODD).sum(axis=-1, dtype=np.uint64)
     return weighted
@@ -175,7 +173,6 @@ def _has_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.bool_]:
 
 
 def _free(toolpath: Toolpath, moves: NDArray[np.int64], decimals: Sequence[int]) -> NDArray[np.bool_]:
-    """Return which axes each move may shift by a few last decimals, shape (m, 6)."""
     poses = toolpath.poses[moves]
     way = np.abs(np.diff(poses, axis=0))
     tips = way[:, :3].max(axis=1) > 0.0

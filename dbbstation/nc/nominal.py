@@ -46,7 +46,7 @@ def checksum(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> int:
 def check_nominal(toolpath: Toolpath) -> None:
     """Refuse a compensated program.
 
-    Three signs show one: a comment, the mark in its poses, and the checksum as line number.
+    Three signs identify one: a comment, the mark in its poses, and the checksum as line number.
 
     Raises:
         StationError: it is compensated already.

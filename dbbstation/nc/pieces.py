@@ -18,18 +18,13 @@ def longest(
     may_end: NDArray[np.bool_],
     tolerance_mm: float,
 ) -> NDArray[np.int64]:
-    """Return where pieces end, each as far along as the tolerance allows: the fewest if parts of a good piece are good.
+    """Return the ends of pieces, each as far as the tolerance allows: the fewest if parts of a good piece are good.
 
     A piece to the next allowed end is always possible, even across a step.
 
     Args:
-        way: along the curve at each place, rising, shape (n,).
-        curve: points whose distance is that of the first three or the last three coordinates, the larger, shape (n, 6) [mm].
         may_end: where pieces may end, besides first and last place, shape (n,).
         tolerance_mm: from a place to the point of its piece at the same share of the way.
-
-    Returns:
-        Numbers of places, rising, the last one among them and the first one not.
     """
     ends = may_end.copy()
     ends[-1] = True

@@ -1,7 +1,8 @@
 """The feed that a control keeps in pieces of a length.
 
-LinuxCNC 2.9 (`src/emc/tp`) does not look ahead if A, B or C move (`tcRotaryMotionCheck`). It plans such a piece from standstill
-to standstill with half the acceleration and overlaps it with the next. A piece of length L then reaches v² = a·L/2.
+LinuxCNC 2.9 (`src/emc/tp`) does not look ahead if A, B or C move (`tcRotaryMotionCheck`). It plans such a piece from
+standstill to standstill with half the acceleration and overlaps it with the next. A piece of length L then reaches v² =
+a·L/2.
 """
 
 from __future__ import annotations
@@ -44,11 +45,7 @@ class LookAhead:
 
 @dataclass(frozen=True)
 class Planner:
-    """A control on a machine.
-
-    Attributes:
-        look_ahead: in moves of A, B or C; None: not known, and any feed counts as kept.
-    """
+    """A control on a machine."""
 
     acceleration_mm_s2: float
     look_ahead: LookAhead | None
@@ -77,7 +74,7 @@ class Planner:
         return np.where(cuts(toolpath), np.minimum(toolpath.feed / 60.0, reached), np.inf)
 
     def seconds(self, toolpath: Toolpath) -> float:
-        """Return the time of all rows at feed [s], without ramps at stops and corners."""
+        """Return the time of all rows at feed, without ramps at stops and corners [s]."""
         turns = (toolpath.kind == RowKind.FEED) & ~cuts(toolpath)
         cutting_s = toolpath.tip_mm / self.row_mm_s(toolpath)
         return float(np.where(turns, toolpath.duration_s, cutting_s).sum())
@@ -86,7 +83,7 @@ class Planner:
 def cuts(toolpath: Toolpath) -> NDArray[np.bool_]:
     """Return the rows at feed that move the tool tip, shape (n,).
 
-    Turns about a resting tip depend on the angles' acceleration, which is not known.
+    Turns about a stationary tip depend on the angles' acceleration, which is unknown.
     """
     return (toolpath.kind == RowKind.FEED) & (toolpath.tip_mm > LEAST_MM_PER_DEG * toolpath.turn_deg)
 

@@ -1,4 +1,4 @@
-"""What a compensated program does not keep: said beside it, or a reason to refuse it."""
+"""Unmet requests of a compensated program: reported, or a reason to refuse it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ KEPT = 1.01
 def remarks_on(
     done: Compensation, asked_um: float, machine: Machine, dialect: Dialect, prefer: Prefer
 ) -> tuple[str, ...]:
-    """Return sentences on a missed chord error, the time that short pieces cost, and a tilt that is left."""
+    """Return sentences on an exceeded chord error, time lost in short pieces, and an uncorrected tilt."""
     said = []
     if done.chord_um > asked_um:
         said.append(
@@ -42,7 +42,7 @@ def remarks_on(
 
 
 def check_kept(name: str, done: Compensation, asked_um: float, machine: Machine) -> None:
-    """Refuse a program that misses the chord error or a feed anywhere, with what keeps both everywhere.
+    """Refuse a program that exceeds the chord error or loses a feed, stating values that keep both.
 
     Raises:
         StationError: names the worst line.
@@ -71,7 +71,7 @@ def said_acceleration(machine: Machine) -> str:
 
 
 def up(value: float) -> str:
-    """A number with two digits, rounded up."""
+    """Return a number with two digits, rounded up."""
     if value <= 0.0:
         return "0"
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)

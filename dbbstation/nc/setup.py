@@ -1,4 +1,4 @@
-"""What a control knows and a program does not say: work offsets, tool lengths, reference points."""
+"""State of a control outside the program: work offsets, tool lengths, reference points."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ ZERO = (0.0,) * 6
 
 
 def offset_text(offset: Sequence[float]) -> str:
-    """Return an offset, shape (6,) [mm, deg], as its words that are not zero."""
+    """Return an offset's nonzero words, from shape (6,) [mm, deg]."""
     words = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", offset, strict=True) if value)
     return words or "zero"
 
 
 @dataclass(frozen=True)
 class ControlSetup:
-    """What was declared of a control, lengths in mm.
+    """Declared state of a control, lengths in mm.
 
     Attributes:
         places: work offsets, `G92` and the reference points `G28` and `G30`, each shape (6,) [mm, deg].
         lengths: offsets of tools by number, each shape (6,) [mm, deg].
-        parameters: all numbered parameters of the control's file; None: not known.
+        parameters: all numbered parameters of the control's file; None: unknown.
     """
 
     places: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
@@ -50,7 +50,7 @@ class ControlSetup:
     parameters: Mapping[int, float] | None = None
 
     def place(self, name: str) -> tuple[float, ...] | None:
-        """Return a work offset, G92 or a reference point; None if a reference point is not known."""
+        """Return a work offset, G92 or a reference point; None if unknown."""
         if name in self.places:
             return self.places[name]
         if self.parameters is None:
@@ -61,7 +61,7 @@ class ControlSetup:
         return tuple(self.parameters.get(first + axis, 0.0) for axis in range(6))
 
     def rotation_deg(self, name: str) -> float:
-        """Return by how much a work system is turned about Z."""
+        """Return a work system's rotation about Z."""
         if self.parameters is None or name in self.places:
             return 0.0
         return self.parameters.get(FIRST_PARAMETERS[name] + ROTATION_BEHIND, 0.0)

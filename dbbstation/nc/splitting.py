@@ -1,4 +1,4 @@
-"""Moves in pieces that follow the curve to command."""
+"""Moves in pieces that follow the commanded curve."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def parts_of(toolpath: Toolpath, runs: NDArray[np.int64]) -> list[slice]:
 def runs_of(toolpath: Toolpath, needed_mm: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the run of each row, shape (n,): a written move, or several shorter than their feed needs.
 
-    Such moves share one F and one work system, may round their corners, and keep nearly one direction.
+    Moves of a run share F and work system, may round their corners, and nearly keep one direction.
 
     Args:
         needed_mm: length of a piece that keeps the feed, shape (n,).
@@ -152,7 +152,7 @@ def split(
     """Return the longest pieces in which a toolpath keeps the tolerance.
 
     Args:
-        model: its shortest period decides how closely to look.
+        model: its shortest period determines the sampling.
         tolerance_mm: greatest distance of a piece from the curve.
         runs: run of each row, within which pieces may end anywhere, shape (n,).
         whole: rows of one piece each, shape (n,).
@@ -207,12 +207,7 @@ class _Nodes:
 
 
 def off_chord_mm(at: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far the curve leaves the chord of each piece, shape (k,) [mm].
-
-    Args:
-        at: poses at the begin of each piece and at shares of it, shape (k, 1 + len(shares), 6).
-        shares: the last is 1.
-    """
+    """Return the distance of the curve from each piece's chord, shape (k,) [mm]."""
     begin, end = at[:, 0], at[:, -1]
     off = [felt_mm(at[:, 1 + k] - (begin + share * (end - begin))) for k, share in enumerate(shares[:-1])]
     worst: NDArray[np.float64] = np.max(off, axis=0)
@@ -228,7 +223,6 @@ def looked_at(curve: CommandCurve, pieces: Pieces, shares: NDArray[np.float64]) 
 
 
 def _along(toolpath: Toolpath, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return places at shares of each piece's way, shape (k, len(shares))."""
     places = pieces.places(shares)
     across = np.flatnonzero(np.floor(pieces.begin) < pieces.row)
     if len(across):
@@ -276,7 +270,7 @@ def _in(toolpath: Toolpath, number: NDArray[np.float64]) -> Pieces:
 
 
 def _way_mm(toolpath: Toolpath, machine: Machine) -> NDArray[np.float64]:
-    """Return a bound of the way of tool tip and platform joints in each row, shape (n,) [mm].
+    """Return a bound of the motion of tool tip and platform joints in each row, shape (n,) [mm].
 
     The platform turns by at most the sum of the three angles: √3 times the root of their squares.
     """

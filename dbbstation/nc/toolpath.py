@@ -1,4 +1,4 @@
-"""A toolpath: what an NC program makes the machine do, free of any control's language."""
+"""A toolpath: the machine's actions in an NC program, independent of a control's language."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ RAPID_DEG_MIN = 2000.0
 
 
 class RowKind(IntEnum):
-    """What one row of a toolpath is."""
+    """Kind of a toolpath row."""
 
     RAPID = 0
     FEED = 1
@@ -80,7 +80,7 @@ class Toolpath:
     """Rows in order; every move is straight in X, Y, Z, A, B and C at once.
 
     Attributes:
-        name: for messages; the file if it was read from one.
+        name: for messages; the file if read from one.
         kind: `RowKind` of each row, shape (n,).
         poses: [X, Y, Z, A, B, C] after each row in machine coordinates, without tool length, shape (n, 6) [mm, deg].
         feed_mm_min: of `FEED` rows along the tip's path, shape (n,); NaN in other rows.
@@ -88,17 +88,18 @@ class Toolpath:
         dwell_s: of `DWELL` rows, shape (n,); zero in other rows.
         line: of the program, from 1, shape (n,); 0 if there is none.
         text: words of `PAUSE`, `COMMENT` and `FUNCTION` rows, by row.
-        start: pose before the first row, shape (6,), NaN for unknown axes; None: all are.
+        start: pose before the first row, shape (6,), NaN for unknown axes; None: all unknown.
         corners_mm: rounding allowed at the end of each row, shape (n,): 0 exact, `EXACT_STOP_MM`, infinite unlimited, NaN not stated.
         offset: row of `offsets` by which numbers of each row are less than its pose, shape (n,).
         offsets: work offset, G92 and tool length together, shape (k, 6) [mm, deg]; the first is zero.
-        unknown: axes of which the program does not know where they stand, a bit each, shape (n,): such a row must not name them.
+        unknown: axes whose position the program does not know, a bit each, shape (n,): such a row must not name them.
         in_machine: moves in machine coordinates (G53), shape (n,).
-        holds: offsets and tool lengths that the poses are right for, by `IN_FORCE`, `G54`, `G92`, `H1`, each shape (6,); a control
+        holds: offsets and tool lengths for which the poses are valid, by `IN_FORCE`, `G54`, `G92`, `H1`, each shape
+            (6,); a control may check them before it moves. None: not stated.
             that can checks them before it moves. None: not stated.
         units_said: whether the program states its unit of length.
         numbers: first and last line number; a compensated program carries its checksum in the first.
-        run: number of the program among those that are written together, from 1.
+        run: number of the program among those written together, from 1.
         arc: centre [mm] in the first and second axis of its plane, spanned angle of a chord [rad], counter-clockwise positive, plane
             as in `PLANES`, shape (n, 4); angle 0 in straight rows. None: no arcs.
     """
@@ -141,10 +142,6 @@ class Toolpath:
         """Return the toolpath with some rows in several pieces.
 
         Texts and exact stops go with a row's last piece. Pieces are not merged.
-
-        Args:
-            row: in which each piece ends, rising, shape (k,); rows inside a piece are missing and have no text.
-            poses: after each piece, shape (k, 6) [mm, deg].
         """
         last = np.append(row[1:] != row[:-1], True)[: len(row)]
         place = dict(zip(row[last].tolist(), np.flatnonzero(last).tolist(), strict=True))
@@ -182,18 +179,18 @@ class Toolpath:
 
     @property
     def is_move(self) -> NDArray[np.bool_]:
-        """Return which rows are moves, with or without way, shape (n,)."""
+        """Return which rows are moves, with or without distance, shape (n,)."""
         return (self.kind == RowKind.RAPID) | (self.kind == RowKind.FEED)
 
     @cached_property
     def before(self) -> NDArray[np.float64]:
-        """Return the pose before each row, shape (n, 6) [mm, deg]; the pose after it if the place is not known."""
+        """Return the pose before each row, shape (n, 6) [mm, deg]; the pose after it if unknown."""
         first = self.poses[:1] if self.start is None else np.where(np.isnan(self.start), self.poses[:1], self.start)
         return np.vstack([first, self.poses])[: len(self)]
 
     @property
     def numbers_written(self) -> NDArray[np.float64]:
-        """Return what is written for each pose, shape (n, 6): less work offsets and tool length."""
+        """Return the written numbers of each pose, shape (n, 6): without work offsets and tool length."""
         return self.poses - self.offsets[self.offset]
 
     def with_numbers(self, numbers: NDArray[np.float64]) -> Toolpath:
@@ -202,12 +199,12 @@ class Toolpath:
 
     @cached_property
     def tip_mm(self) -> NDArray[np.float64]:
-        """Return the way of the tool tip in each row, shape (n,) [mm]; zero if it is rounding."""
+        """Return the distance of the tool tip in each row, shape (n,) [mm]; zero if only rounding."""
         return _norm(self.poses[:, :3] - self.before[:, :3], LEAST_MM)
 
     @cached_property
     def turn_deg(self) -> NDArray[np.float64]:
-        """Return each row's root sum of squares of the three angles, shape (n,) [deg]; zero if it is rounding."""
+        """Return each row's root sum of squares of the three angles, shape (n,) [deg]; zero if only rounding."""
         return _norm(self.poses[:, 3:] - self.before[:, 3:], LEAST_DEG)
 
     @property
@@ -224,8 +221,8 @@ class Toolpath:
     def duration_s(self) -> NDArray[np.float64]:
         """Return the time of each row at its feed, without ramps, shape (n,) [s].
 
-        F holds for the way of X, Y and Z, and for the angles only if X, Y and Z rest [RS274/NGC 2.1.2.5; LinuxCNC does
-        the same].
+        F refers to X, Y and Z, and to the angles only if X, Y and Z do not move [RS274/NGC 2.1.2.5; LinuxCNC does the
+        same].
         """
         way = np.where(self.tip_mm > 0.0, self.tip_mm, self.turn_deg)
         feeding = np.divide(60.0 * way, self.feed, out=np.zeros(len(self)), where=self.kind == RowKind.FEED)
@@ -276,8 +273,6 @@ ALL_AXES = 0b111111
 
 
 class _Rows(NamedTuple):
-    """Rows that were added together; a single value holds for all. Lines rise by `step` from one to the next."""
-
     kind: RowKind
     poses: NDArray[np.float64]
     feed: tuple[float, float]
@@ -295,11 +290,11 @@ class ToolpathBuilder:
     """Collects the rows of a toolpath.
 
     Args:
-        start: pose before the first row, shape (6,) [mm, deg], NaN for unknown axes; None if all are.
+        start: pose before the first row, shape (6,) [mm, deg], NaN for unknown axes; None: all unknown.
 
     Attributes:
         corner_mm: rounding allowed in the moves that follow; None: not stated.
-        unknown: axes of which nobody knows where they stand, a bit each; a move that names or feeds them makes them known.
+        unknown: axes with unknown position, a bit each; a move that names or feeds them makes them known.
         fed: rows up to the last move at feed.
     """
 
@@ -320,7 +315,7 @@ class ToolpathBuilder:
         self._count = self.fed = 0
 
     def count_from(self, offset: Sequence[float]) -> None:
-        """Set by how much numbers of the moves that follow are less than their poses, shape (6,) [mm, deg]."""
+        """Set the offset of following moves' numbers from their poses, shape (6,) [mm, deg]."""
         self._offset = self._offsets.setdefault(tuple(float(each) for each in offset), len(self._offsets))
 
     def lines(self, poses: NDArray[np.float64], feed: tuple[float, float] | None, *, line: int) -> None:
@@ -330,13 +325,7 @@ class ToolpathBuilder:
         self.fed = self.fed if feed is None else self._count
 
     def rapid(self, pose: NDArray[np.float64], *, line: int = 0, in_machine: bool = False, unknown: int = 0) -> None:
-        """Add a move as fast as the machine can.
-
-        Args:
-            pose: to go to, shape (6,) [mm, deg]; NaN for axes that are not known.
-            in_machine: it is written in machine coordinates.
-            unknown: axes that it leaves unknown.
-        """
+        """Add a move as fast as the machine can."""
         self.unknown = unknown
         self._add(RowKind.RAPID, pose[None], line=line, in_machine=in_machine)
 
@@ -353,9 +342,7 @@ class ToolpathBuilder:
         """Add moves at a feed.
 
         Args:
-            poses: to go through, shape (k, 6) [mm, deg].
             deg_min: of moves that only turn; None: `mm_min`.
-            arc: as a row of `Toolpath.arc`.
         """
         self.unknown = 0
         feed = (mm_min, mm_min if deg_min is None else deg_min)
@@ -389,7 +376,7 @@ class ToolpathBuilder:
         return self._text.get(self._count - 1, "")
 
     def built(self) -> Toolpath:
-        """Return the toolpath of all rows so far; an axis stands where it is first named before that."""
+        """Return the toolpath of all rows so far; an axis begins where it is first named."""
         count = np.array([len(rows.poses) for rows in self._rows], dtype=np.int64)
 
         def each(values: list[Any], kind: type) -> NDArray[Any]:
@@ -472,7 +459,6 @@ def _on_arc(
     arc: NDArray[np.float64],
     share: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return X and Y at shares of chords, shape (k, 2) [mm]; the radius of a spiral changes evenly."""
     centre, turned = arc[:, :2], share * arc[:, 2]
     first, last = before - centre, after - centre
     radius = np.linalg.norm(first, axis=1)

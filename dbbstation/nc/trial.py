@@ -1,7 +1,7 @@
-"""The trial of a dialect: does it read what it wrote?
+"""The trial of a dialect: whether it reads its own programs.
 
-Everything that a toolpath can hold is written and read back, singly and together. Dropped, changed or moved rows are
-faults. An error for missing words is none.
+Every kind of row is written and read back, singly and together. Dropped, changed or moved rows are faults. An error for
+missing words is not.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SHARE_WITHIN = 1e-4
 
 
 def faults_of(dialect: Dialect) -> list[str]:
-    """Return what a dialect reads otherwise than written, a sentence each; empty if it may be used.
+    """Return differences between written and read rows, a sentence each; empty if the dialect is usable.
 
     Raises:
         Exception: whatever the dialect raises while it writes moves, or reads what it wrote.
@@ -68,7 +68,7 @@ def faults_of(dialect: Dialect) -> list[str]:
 
 
 def _faults_of_guard(dialect: Dialect, moves: Toolpath) -> list[str]:
-    """Return whether the check of offsets changes what is read, or is lost where the dialect has one."""
+    """Return whether the check of offsets changes the result, or is lost although the dialect has one."""
     guarded = replace(moves, holds={IN_FORCE: (0.0,) * 6})
     faults = _differences(moves, _read(dialect, guarded), "a check of offsets")
     checks = isinstance(dialect, WordDialect) and type(dialect).guard is not WordDialect.guard
@@ -78,7 +78,7 @@ def _faults_of_guard(dialect: Dialect, moves: Toolpath) -> list[str]:
 
 
 def _faults_of_mark(dialect: Dialect) -> list[str]:
-    """Return whether a compensated program is not known again once its header is gone."""
+    """Return whether a compensated program is not recognised without its header."""
     path = _built([_curve])
     if is_marked(_read(dialect, marked(path, dialect.decimals))):
         return []
@@ -88,7 +88,7 @@ def _faults_of_mark(dialect: Dialect) -> list[str]:
 
 
 def _curve(path: ToolpathBuilder) -> None:
-    """Forty moves of all axes, enough for a mark."""
+    """Return forty moves of all axes, enough for a mark."""
     turns = np.linspace(0.0, 6.0, 41)[:, None] + np.arange(3.0)
     poses = FIRST + np.hstack([20.0 * np.sin(turns), 3.0 * np.cos(turns)])
     path.rapid(poses[0])
@@ -167,8 +167,6 @@ THINGS: dict[str, Callable[[ToolpathBuilder], None]] = {
 
 
 class _Row(NamedTuple):
-    """One row for a sentence, with the numbers that rounding may change."""
-
     what: str
     numbers: tuple[float, ...] = ()
     within: tuple[float, ...] = ()
@@ -210,7 +208,7 @@ def _differences(wrote: Toolpath, read: Toolpath, tried: str) -> list[str]:
 
 
 def _with_messages(path: Toolpath) -> dict[int, str | None]:
-    """Return texts by row, a message before a stop as the stop's own: they may be one row or two; None: it is no row then."""
+    """Return texts by row, a message before a stop as the stop's own, since they may be one row or two; None: no row."""
     texts: dict[int, str | None] = dict(path.text)
     told = np.flatnonzero(path.kind != RowKind.COMMENT)
     for row, after in pairwise(told.tolist()):

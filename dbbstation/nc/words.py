@@ -1,7 +1,7 @@
 """Write a toolpath as lines of words, with one method for each kind of row.
 
-An own dialect derives from `WordDialect` and leaves out what its control cannot do. A row without a method is refused by
-name and line.
+A dialect derives from `WordDialect` and omits what its control lacks. A row without a method is refused by name and
+line.
 """
 
 from __future__ import annotations
@@ -73,11 +73,7 @@ class WordDialect(Dialect):
         return "\n".join(self.lines(toolpath, header)) + "\n"
 
     def lines(self, toolpath: Toolpath, header: Sequence[str] = ()) -> Iterator[str]:
-        """Yield lines of the program, made some thousand at a time.
-
-        Raises:
-            CannotSayError: the dialect has no words for something in it.
-        """
+        """Yield lines of the program, made some thousand at a time."""
         # What does not move by the decimals that are written does not move.
         toolpath = toolpath.with_numbers(rounded(toolpath.numbers_written, self.decimals))
         yield from self.before_header(toolpath)
@@ -142,11 +138,11 @@ class WordDialect(Dialect):
         raise self.cannot_say("a comment")
 
     def message(self, text: str) -> str:  # noqa: ARG002
-        """Return what the control shows or logs: keyword, comma, text, as in `MSG, hello`."""
+        """Return text that the control shows or logs: keyword, comma, text, as in `MSG, hello`."""
         raise self.cannot_say("a message without a stop")
 
     def function(self, words: str) -> str:
-        """Return words of spindle and coolant that every control knows: `S800 M3`."""
+        """Return words of spindle and coolant that every control has: `S800 M3`."""
         raise self.cannot_say(words)
 
     def system(self, text: str) -> str:
@@ -154,15 +150,15 @@ class WordDialect(Dialect):
         raise self.cannot_say(text)
 
     def guard(self, holds: Mapping[str, Sequence[float]]) -> Iterable[str]:  # noqa: ARG002
-        """Return lines that end the program if offsets are not as `Toolpath.holds` says; none if the control cannot."""
+        """Return lines that end the program if offsets differ from `Toolpath.holds`; none if the control cannot."""
         return ()
 
     def length_guard(self, text: str, holds: Mapping[str, Sequence[float]], row: int) -> Iterable[str]:  # noqa: ARG002
-        """Return the same for a tool length that `text` brings in force."""
+        """Return the same for a tool length that `text` activates."""
         return ()
 
     def cannot_say(self, what: str) -> CannotSayError:
-        """Return the error for something that this dialect has no words for."""
+        """Return the error for a row without words in this dialect."""
         return CannotSayError(self.name, what)
 
     def _body(self, toolpath: Toolpath) -> Iterator[str]:
@@ -229,7 +225,7 @@ class WordDialect(Dialect):
 
 
 class _Modal:
-    """What holds until it changes."""
+    """Modal values."""
 
     def __init__(self, feed: float, corner_mm: float) -> None:
         self.feed, self.corner_mm = feed, corner_mm

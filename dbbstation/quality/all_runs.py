@@ -1,8 +1,8 @@
 """Faults common to all runs: programs mirrored, turned or reversed, and another bar.
 
 Such a session agrees with itself, but mirrored forms of several tests fit no hexapod, and a uniformly oversized machine
-errs in other ways too. Ways to have run the session are compared by likelihood. Sound runs favour another way by f or
-more with a chance of at most 1 / f [Markov's inequality].
+also errs in other ways. Ways to have run the session are compared by likelihood. Sound runs favour another way by f or
+more with a probability of at most 1 / f [Markov's inequality].
 """
 
 from __future__ import annotations
@@ -45,7 +45,6 @@ class Way:
     """A way in which all programs may have run.
 
     Attributes:
-        label: in the shop's words.
         reverses: whether the machine turned against its programs.
         begin_deg: angle from +X where a circle began instead of a given one.
     """
@@ -75,7 +74,7 @@ class AllForms:
     """Forms of all runs of a session.
 
     Attributes:
-        planned: as planned, a column each for the plan and the ways of KEEPING, and one of what a longer bar reads.
+        planned: as planned, a column each for the plan and the ways of KEEPING, and one for a longer bar.
         turned: each as if it had run as the other direction of its test, a column for each way of REVERSING.
     """
 
@@ -88,24 +87,23 @@ def _as_planned(runs: tuple[Seen, ...]) -> RunForm:
 
 
 def _as_turned(runs: tuple[Seen, ...]) -> RunForm:
-    """The form of the first run as it would be judged if it were of the direction of the second."""
+    """Return the form of the first run judged as if it had the second's direction."""
     one, other = runs
     as_other = replace(one, run=replace(one.run, circle=other.run.circle, expected=other.run.expected))
     return form_of(as_other, _off(one, as_other, REVERSING))
 
 
 def _off(one: Seen, judged_as: Seen, ways: Sequence[Way]) -> NDArray[np.float64]:
-    """Columns of a form less what is expected, one for each way, shape (7, k) [µm]."""
+    """Return a form's difference from expectation, one column per way, shape (7, k) [µm]."""
     read, run = read_um(one), judged_as.run
     return np.column_stack([_begun(read, run.circle, way) - expected_um(run) for way in ways])
 
 
 def programs_of_all(runs: Sequence[Seen], forms: AllForms | None = None) -> Finding:
-    """Return whether all runs together are likelier those of programs that ran in another way than the plan's.
+    """Return whether all runs together fit programs run in another way better than the plan.
 
     Args:
-        runs: all that count. Those of which the other direction was measured on the same mounting are used, from two tests on.
-        forms: of runs of this session, as far as they are worked out.
+        runs: all that count. Those with the other direction on the same mounting are used, if there are two tests.
     """
     pairs = _pairs(runs)
     if len({one.run.test for one, _ in pairs}) < FEWEST_TESTS:
@@ -143,13 +141,9 @@ def programs_of_all(runs: Sequence[Seen], forms: AllForms | None = None) -> Find
 
 
 def bar_of_all(runs: Sequence[Seen], forms: AllForms | None = None, *, by_model: bool) -> Finding:
-    """Return whether all runs together are likelier those of a bar of another length.
+    """Return whether all runs together fit a bar of another length better.
 
-    Without a model, an oversized machine explains the same readings, and it is undecided.
-
-    Args:
-        forms: of runs of this session, as far as they are worked out.
-        by_model: whether a model says where circles lie.
+    Without a model this is undecided, because an oversized machine explains the same readings.
     """
     known = [one for one in runs if one.run.expected is not None and one.run.bar_stated]
     if not known:
@@ -179,7 +173,7 @@ def _known(runs: Sequence[Seen]) -> list[tuple[Seen]]:
 
 
 def _pairs(runs: Sequence[Seen]) -> list[tuple[Seen, Seen]]:
-    """Return each run with the first of its test and mounting in the other direction, in the order in which both were there."""
+    """Return each run with the first of its test and mounting in the other direction."""
     first: dict[tuple[str, str, float], int] = {}
     for k, one in enumerate(runs):
         if one.run.expected is not None:
@@ -193,7 +187,6 @@ def _pairs(runs: Sequence[Seen]) -> list[tuple[Seen, Seen]]:
 
 
 def _begun(read: NDArray[np.float64], circle: Circle, way: Way) -> NDArray[np.float64]:
-    """Return coefficients along the travel if the circle began by a way, shape (7,) [µm]."""
     ahead = np.radians(circle.direction.sign * (way.begin_deg(circle.start_deg) - circle.start_deg))
     angles = ahead * np.arange(1, HIGHEST_HARMONIC + 1)
     mean, cosines, sines = np.split(read, [1, HIGHEST_HARMONIC + 1])
@@ -203,10 +196,6 @@ def _begun(read: NDArray[np.float64], circle: Circle, way: Way) -> NDArray[np.fl
 
 class _Likelihood:
     """Likelihood of readings by ways, for any size of machine errors.
-
-    Args:
-        part: forms of runs, a column for each way.
-        dimensions: numbers of them.
 
     Attributes:
         logarithms: by way, shape (k,).
@@ -218,11 +207,7 @@ class _Likelihood:
         self.logarithms = logsumexp(self._by_size, axis=0)
 
     def fits(self, way: int, longer_um: float = 0.0) -> bool:
-        """Return whether readings fit a machine with the known causes.
-
-        Args:
-            longer_um: by how much the bar reads too long, which the last column is for [µm].
-        """
+        """Return whether readings fit a machine with the known causes."""
         white = self._part.white
         off = white[:, :, way] - (longer_um * white[:, :, -1] if longer_um else 0.0)
         distances = np.sum(off**2, axis=1)
@@ -230,7 +215,7 @@ class _Likelihood:
         return float(distances[likeliest]) <= length_quantile(self._dimensions) ** 2
 
     def gained(self, sigma_um: float) -> tuple[float, float]:
-        """Return by how much a longer bar makes the readings likelier, as a logarithm, and how much longer it is [µm]."""
+        """Return the log likelihood gain of a longer bar, and its excess length [µm]."""
         off, column = self._part.white[:, :, 0], self._part.white[:, :, -1]
         # Matrix determinant lemma, and the conditional mean of one normal amount [Rasmussen and Williams, eq. A.9, A.10].
         weights = np.sum(column**2, axis=1) + sigma_um**-2

@@ -28,8 +28,8 @@ class RunAssessment:
     Attributes:
         causes: of REPEAT, the most explanatory first: finding and remedy, a sentence each.
         unseen: of CANNOT TELL, possible faults that no measurement of the plan shows.
-        settled_by: of CANNOT TELL, what would show them.
-        later: possible faults that later circles show; they lead back to this one.
+        settled_by: of CANNOT TELL, measurements that would show them.
+        later: possible faults that later circles will show.
     """
 
     word: Advice
@@ -42,11 +42,10 @@ class RunAssessment:
 def answer(findings: Sequence[Finding], problem: str = "", to_come: int = 0) -> RunAssessment:
     """Return the word on a run.
 
-    REPEAT for any fault. CANNOT TELL without fault, if some fault of `SHOWN_BY` would not have shown and no later circle
-    shows it, or without findings. Else GOOD.
+    REPEAT for any fault. CANNOT TELL without findings, or if some fault of `SHOWN_BY` is invisible here and in later
+    circles. Else GOOD.
 
     Args:
-        problem: why there is no circle; may be empty.
         to_come: circles of the plan that are still to be measured.
     """
     wrong = [one for one in findings if one.wrong]
@@ -66,7 +65,7 @@ def answer(findings: Sequence[Finding], problem: str = "", to_come: int = 0) -> 
 
 
 def _doubted(finding: Finding) -> bool:
-    """Return whether a fault that one sound sitting in a thousand has is likelier than not, and not decided."""
+    """Return whether a fault with prior probability 0.001 is undecided and likelier than not."""
     return (finding.value or 0.0) > LOG_ODDS_LIMIT and finding.verdict is FindingVerdict.CANNOT_TELL
 
 

@@ -1,8 +1,8 @@
-"""Which circle of the plan each run shows: all runs of a sitting together.
+"""Which circle of the plan each run shows: all runs of a session together.
 
-A run that was taken for another circle makes right runs look wrong. Assignments of runs to circles are compared by their
-marginal likelihood over the machine's errors, each mistake at its prior probability. A sound sitting favours another
-assignment by f with a chance of at most 1 / f [Markov's inequality].
+A run filed under another circle makes right runs look wrong. Assignments of runs to circles are compared by their
+marginal likelihood over the machine's errors, each mistake at its prior probability. A sound session favours another
+assignment by f with a probability of at most 1 / f [Markov's inequality].
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class FormerSitting:
     read_um: Mapping[tuple[str, str], NDArray[np.float64]]
 
     def moved(self, circles: Sequence[Planned]) -> tuple[Planned, ...]:
-        """Return circles that are expected as this session read them."""
+        """Return circles expected as this session read them."""
         found = []
         for one in circles:
             more = along_travel(one.circle) * (self.read_um[_key(one)] - expected_um(one))
@@ -69,13 +69,7 @@ class FormerSitting:
 
 
 class Assigned:
-    """Runs of a sitting and the circles that they may show.
-
-    Args:
-        circles: of the plan, as the nominal machine or a model expects them.
-        runs: that count, and the present one.
-        reference: None: no session before.
-    """
+    """Runs of a session and the circles that they may show."""
 
     def __init__(
         self, circles: Sequence[Planned], runs: Sequence[Seen], reference: FormerSitting | None = None
@@ -98,7 +92,7 @@ class Assigned:
         return max(others, default=-np.inf) - own
 
     def finding(self, one: Seen, undecided: Finding) -> Finding:
-        """Return a finding on which circle a run shows, decided where all runs together decide it."""
+        """Return a finding on the circle that a run shows, decided by all runs together."""
         against = self.odds(one) + self._cost
         if against > self._cost - 2.0 * LOG_ODDS_LIMIT:
             return undecided
@@ -106,7 +100,7 @@ class Assigned:
         return Finding(undecided.name, max(against, 0.0), limit, "", FindingVerdict.GOOD, text)
 
     def suspects(self) -> dict[Seen, Finding]:
-        """Return the runs that contradict the others, each with what it shows instead."""
+        """Return the runs that contradict the others, each with the circle that it shows instead."""
         known = self._looked_up
         floor = known[tuple(self._planned)]
         top = max(known.values())
@@ -136,12 +130,11 @@ class Assigned:
 
     @property
     def _cost(self) -> float:
-        """What one mistake costs."""
+        """Return the cost of one mistake."""
         return MISTAKE + float(np.log(len(self.circles)))
 
     @cached_property
     def _looked_up(self) -> Mapping[tuple[int, ...], float]:
-        """Return assignments with their scores: mistake by mistake about the likeliest so far."""
         followed: set[tuple[int, ...]] = set()
         best = [tuple(self._planned)]
         least = self.score(best[0]) - self._cost
@@ -155,7 +148,6 @@ class Assigned:
         return self._known
 
     def _follow(self, labels: tuple[int, ...]) -> None:
-        """Score all assignments that differ by one change."""
         whole = self._sum(labels, range(len(labels)))
         for runs, instead in self._changes():
             others = whole - self._sum(labels, runs)
@@ -164,7 +156,7 @@ class Assigned:
                 self._known.setdefault(changed, float(log) - self._mistakes(changed))
 
     def _changes(self) -> Iterator[tuple[Sequence[int], Sequence[Sequence[int]]]]:
-        """Yield runs with their other labels: one run, all runs of a mounting, or two mountings that change places."""
+        """Yield runs with other labels: one run, all runs of a mounting, or two exchanged mountings."""
         yield from (([run], [[label] for label in self._everything]) for run in range(len(self.runs)))
         groups = self._groups
         for group in groups:
@@ -178,7 +170,6 @@ class Assigned:
 
     @cached_property
     def _everything(self) -> tuple[int, ...]:
-        """Return a run's labels, in the order in which they index arrays."""
         return (*range(len(self.circles)), LARGER, BESIDE, ELSEWHERE)
 
     @cached_property
@@ -202,7 +193,7 @@ class Assigned:
         return self._known[labels]
 
     def _mistakes(self, labels: Sequence[int]) -> float:
-        """Return what mistakes cost: all runs of a mounting under another test are one, so are two that changed places."""
+        """Return the cost of mistakes; all runs of a mounting under another test count once, as do two exchanged mountings."""
         whole: set[frozenset[str]] = set()
         single = 0
         for group in self._groups:
@@ -262,7 +253,7 @@ class Assigned:
 
     @cached_property
     def _read(self) -> list[NDArray[np.float64]]:
-        """Return effects of shared causes, and last the reading less expectation, by label, shape (l + 3, 7, p + 1) each [µm]."""
+        """Return effects of shared causes, and last the reading minus expectation, by label, shape (l + 3, 7, p + 1) each [µm]."""
         columns = np.concatenate([self._of_machine, self._of_session], axis=2)
         columns = np.concatenate([columns, np.zeros_like(columns[:1])])
         expected, every, found = np.array([expected_um(one) for one in self.circles]), range(len(self.circles)), []
@@ -273,7 +264,7 @@ class Assigned:
 
     @cached_property
     def _scatter(self) -> list[NDArray[np.float64]]:
-        """Return the covariance of what a reading shares with no other by label, shape (l + 3, 7, 7) each [µm²]."""
+        """Return the covariance of each reading's own part by label, shape (l + 3, 7, 7) each [µm²]."""
         found = []
         for one, own in zip(self.runs, self._planned, strict=True):
             by_label = np.array([*self._own, *[self._own[own]] * 3]) + one.u_um**2 * np.eye(COEFFICIENTS)
@@ -291,7 +282,7 @@ class Assigned:
 
     @cached_property
     def _of_session(self) -> NDArray[np.float64]:
-        """Return the same of causes that all circles share: the bar, the tool's ball, the plate."""
+        """Return the same of causes common to all circles: the bar, the tool's ball, the plate."""
         return self._effects({key for key in self._shared if key[1]})
 
     @cached_property
@@ -320,7 +311,7 @@ class Assigned:
         return (u[:, kept] * sizes[kept]).reshape(len(self.circles), COEFFICIENTS, -1)
 
     def since(self, one: Seen) -> Finding | None:
-        """Return what has changed since the session before; None without it."""
+        """Return the change since the session before; None without it."""
         if self.reference is None:
             return None
         label = self._planned[self.runs.index(one)]
@@ -336,7 +327,7 @@ class Assigned:
 
     @cached_property
     def _own(self) -> list[NDArray[np.float64]]:
-        """Return the covariance of what a circle shares with no other: ball and mounting, shape (7, 7) each [µm²]."""
+        """Return the covariance of a circle's own part, ball and mounting, shape (7, 7) each [µm²]."""
         found = []
         for one in self.circles:
             effects = [e for key, e in one.expected.effects_um.items() if key[1] and key not in self._shared]
@@ -362,7 +353,7 @@ def _put(labels: tuple[int, ...], changed: Mapping[int, int]) -> tuple[int, ...]
 
 
 def _log_diagonal(roots: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return half the logarithm of the determinants whose Cholesky factors these are."""
+    """Return half the log determinants of matrices with these Cholesky factors."""
     return np.asarray(np.sum(np.log(np.diagonal(roots, axis1=-2, axis2=-1)), axis=-1))
 
 

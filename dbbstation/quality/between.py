@@ -22,13 +22,10 @@ if TYPE_CHECKING:
 def direction(one: Seen, others: Others, expected: Expected | None = None) -> Finding:
     """Judge whether the circle ran in its named direction.
 
-    A bar does not see the direction. A reversed circle shows its form mirrored about the axis through the start. It is
-    visible if the circle lies off that axis and the expected centre, the other direction or a repeat shows the side. Lag
-    and friction change sign with direction too, but repeat after half a turn: they have only even undulations [linear in
-    the speed, or in its sign]. Odd ones are compared.
-
-    Args:
-        expected: best knowledge of its circle; None if unknown.
+    A bar does not measure the direction. A reversed circle shows its form mirrored about the axis through the start. It
+    is visible if the circle is off that axis and the expected centre, the other direction or a repeat shows the side.
+    Lag and friction change sign with direction too, but repeat after half a turn: they have only even undulations
+    [linear in the speed, or in its sign]. Odd ones are compared.
     """
     by_place = _by_place(one, expected)
     if by_place is not None:
@@ -56,7 +53,6 @@ def direction(one: Seen, others: Others, expected: Expected | None = None) -> Fi
 def _across_limits(
     one: Seen, against: Seen, others: Others, off: NDArray[np.float64], mirrored: NDArray[np.float64]
 ) -> tuple[float, float] | None:
-    """Return a sound circle's greatest distance from another run and from its mirror image [µm], or None."""
     covariance = covariance_apart(one, against)
     rows = np.ix_(ACROSS, ACROSS)
     stated = None if covariance is None else [limit_along(covariance[rows], each) for each in (off, mirrored)]
@@ -71,7 +67,6 @@ def _across_limits(
 
 
 def _by_place(one: Seen, expected: Expected | None) -> Finding | None:
-    """Judge by the expected centre; None if undecided."""
     if expected is None or not expected.place_known or one.analysis is None:
         return None
     start = np.radians(one.run.circle.start_deg)
@@ -92,14 +87,14 @@ def _by_place(one: Seen, expected: Expected | None) -> Finding | None:
 
 
 def other_direction(one: Seen, others: Others) -> Finding:
-    """Form and place against the other direction."""
+    """Compare form and place with the other direction."""
     if others.opposite is None:
         return undecided(Name.OTHER_DIRECTION, "the other direction has not been measured", "µm")
     return _beside(Name.OTHER_DIRECTION, one, others.opposite, others.directions_um, others.directions_stated)
 
 
 def repeat(one: Seen, others: Others) -> Finding:
-    """Form and place against the repeat before."""
+    """Compare form and place with the repeat before."""
     if others.earlier is None:
         return undecided(Name.REPEAT, "there is no earlier run of this test and direction", "µm")
     return _beside(Name.REPEAT, one, others.earlier, others.repeats_um, others.repeats_stated)
@@ -110,9 +105,9 @@ def _beside(
 ) -> Finding:
     """Compare a run with another of its test.
 
-    With few other pairs the limit is what plan, machine file and usual causes allow along the difference. Enough pairs
-    limit by their scatter, and raise the limit if they scatter more than stated. The limit stays between what noise and
-    plan leave open and the largest stated allowance.
+    With few other pairs the limit is the difference allowed by plan, machine file and usual causes. Enough pairs limit
+    by their scatter, and raise the limit if they scatter more than stated. The limit is at least that of noise and
+    plan, and at most the largest stated allowance.
     """
     off = one.coefficients_um - other.coefficients_um
     value = float(np.linalg.norm(off))

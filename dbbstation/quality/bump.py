@@ -34,8 +34,6 @@ FEWEST = 3
 
 @dataclass(frozen=True)
 class _Peak:
-    """The most outstanding stretch, against its limit [µm, deg]."""
-
     height_um: float
     limit_um: float
     theta_deg: float
@@ -51,9 +49,6 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     """Judge the most outstanding stretch of the path.
 
     The limit follows from noise and the scatter of stretches, and at reversals from the turn's other reversals.
-
-    Args:
-        reversals_deg: angles at which struts reverse; may be empty.
     """
     rest = one.residual_um - gaussian(one.raw.phi_deg, one.residual_um, FORM_UPR)
     near = near_reversals(one.raw.theta_deg, reversals_deg)
@@ -77,11 +72,7 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
 def near_reversals(
     theta_deg: NDArray[np.float64], reversals_deg: Sequence[float], reach_deg: float = REVERSAL_DEG
 ) -> NDArray[np.int64]:
-    """Return the reversal near each sample, -1 for none, shape (n,).
-
-    Args:
-        theta_deg: 0 to 360, shape (n,).
-    """
+    """Return the reversal near each sample, -1 for none, shape (n,)."""
     near = np.full(len(theta_deg), -1, dtype=np.int64)
     for number, place in enumerate(reversals_deg):
         apart = np.abs(theta_deg - place % FULL_TURN_DEG)  # both within a turn: 0 to 360
@@ -90,7 +81,6 @@ def near_reversals(
 
 
 def _peaks(one: CircleAnalysis, rest: NDArray[np.float64], near: NDArray[np.int64], width_deg: float) -> list[_Peak]:
-    """Return the greatest mean of stretches of a width, away from reversals and at each."""
     samples = max(round(width_deg / FULL_TURN_DEG * len(rest)), 1)
     if samples < FEWEST and width_deg < WIDTHS_DEG[-1]:
         return []

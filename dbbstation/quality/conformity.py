@@ -32,7 +32,7 @@ class Size:
 
 
 def conformity(size: Size, largest_um: float, coverage_factor: float) -> Conformity:
-    """Hold a figure against a limit."""
+    """Compare a figure with a limit."""
     if size.u_um is None:
         return Conformity.UNDECIDED
     expanded = coverage_factor * size.u_um

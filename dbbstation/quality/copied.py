@@ -1,7 +1,7 @@
 """Readings that occur in two runs: a double file, a repeating player, a wrong name.
 
-A copy brings nothing new. Two runs of one circle share form, not noise. The next reading equals a given one with at most
-the probability of `quality.held`; k in a row at most that to the power k, times both numbers of places.
+Two runs of one circle share form, not noise. The next reading equals a given one with at most the probability of
+`quality.held`; k in a row at most that to the power k, times both numbers of places.
 """
 
 from __future__ import annotations
@@ -68,7 +68,6 @@ def copied(one: Seen, others: Sequence[Seen]) -> Finding:
 
 
 def _chance(analysis: CircleAnalysis) -> float:
-    """Return a bound of the probability that a sound reading equals a given number; one if unknown."""
     noise = analysis.noise
     if not noise.known or not np.ptp(analysis.raw.length_mm):
         return 1.0
@@ -84,7 +83,7 @@ def _chance(analysis: CircleAnalysis) -> float:
 def _may_share(begins: NDArray[np.uint64], other: Seen, length: int) -> bool:
     """Return whether two neighbouring blocks of a run begin with readings that follow one another in another run.
 
-    Otherwise `_shared` is zero. Stretches of the other run are sorted once for each length, which is a power of two.
+    Otherwise `_shared` is zero. Stretches of the other run are sorted once for each length, a power of two.
     """
     assert other.analysis is not None  # noqa: S101 - asked before
     if length not in other.stretches:
@@ -95,9 +94,9 @@ def _may_share(begins: NDArray[np.uint64], other: Seen, length: int) -> bool:
 
 
 def _shared(own_mm: NDArray[np.float64], other_mm: NDArray[np.float64], row: int) -> int:
-    """Return how many readings stand in common stretches.
+    """Return the number of readings in common stretches.
 
-    Blocks of half the length that chance allows suffice: a common stretch holds a whole one.
+    Blocks of half the length that chance allows suffice, because a common stretch contains a whole one.
     """
     block = (row + 1) // 2
     if min(len(own_mm), len(other_mm)) < row:
@@ -111,6 +110,5 @@ def _shared(own_mm: NDArray[np.float64], other_mm: NDArray[np.float64], row: int
 
 
 def _stretches(length_mm: NDArray[np.float64], block: int) -> NDArray[np.uint64]:
-    """Return one number for each stretch, shape (n - block + 1,)."""
     weights = np.array([pow(BASE, k, 2**64) for k in range(block)], dtype=np.uint64)
     return np.convolve(np.ascontiguousarray(length_mm).view(np.uint64), weights, mode="valid")

@@ -39,7 +39,7 @@ class Name(StrEnum):
 
 
 class FindingVerdict(StrEnum):
-    """What a finding says."""
+    """Verdict of a finding."""
 
     GOOD = "good"
     WRONG = "wrong"
@@ -48,12 +48,11 @@ class FindingVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked for in one run.
+    """Result of one check of a run.
 
     Attributes:
         limit: of a sound run, or None.
         text: finding, place and remedy; or why undecided.
-        short: may be empty if name, value and limit suffice.
     """
 
     name: Name
@@ -90,14 +89,10 @@ def against_limit(finding: Finding) -> str:
 
 
 def stricter(one: Finding, other: Finding) -> Finding:
-    """Return the finding by the knowledge that leaves less open.
+    """Return the finding with the stricter knowledge.
 
-    Wrong precedes good, which precedes undecided. Equal decisions rank by use of their limit. For better fitting circles,
-    the knowledge with more circles decides.
-
-    Args:
-        one: by more circles.
-        other: by fewer.
+    Wrong precedes good, which precedes undecided. Equal decisions rank by use of their limit. For better fitting
+    circles, the knowledge with more circles decides.
     """
     if one.wrong or other.wrong:
         return max((each for each in (one, other) if each.wrong), key=_share)

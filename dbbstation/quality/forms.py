@@ -1,9 +1,9 @@
-"""Forms of runs that share causes, as one normal variable: a run more costs its own rows, however many stand beside it.
+"""Forms of runs that share causes, as one normal variable; a further run adds only its own rows.
 
-The covariance of forms is that of the machine's causes, of what several runs share, and of what each has alone. For each size of the machine's
-errors a matrix is kept that makes all forms independent with a variance of one. A run more adds rows to it, as to a Cholesky factor [Golub and
-Van Loan, Matrix Computations, 4.2]. Runs are left out by a projection [Rasmussen and Williams, Gaussian Processes for Machine Learning
-(2006), section 5.4.2].
+The covariance of forms is the sum of machine causes, causes shared by several runs, and each run's own. For each size
+of machine errors, a matrix whitens all forms. A further run adds rows to it, as to a Cholesky factor [Golub and Van
+Loan, Matrix Computations, 4.2]. Runs are left out by a projection [Rasmussen and Williams, Gaussian Processes for
+Machine Learning (2006), section 5.4.2].
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ LEAST_UM2 = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class RunForm:
-    """The form of one run along its travel, and what causes do to it.
+    """The form of one run along its travel, and effects of causes on it.
 
     Attributes:
-        effects_um: what one standard deviation of each cause does, shape (7, p) each, by the cause and the set of values that it shares
-            with other runs, which is empty for causes of the machine [µm].
-        own_um: standard deviation of what it shares with no other run, shape (7,) [µm].
-        off_um: columns of forms less what is expected without other runs, shape (7, k) [µm].
+        effects_um: one standard deviation of each cause, shape (7, p) each, by cause and set of values shared with
+            other runs, empty for machine causes [µm].
+        own_um: standard deviation of its own part, shape (7,) [µm].
+        off_um: columns of forms minus expectation without other runs, shape (7, k) [µm].
         started_s: when its run began [s].
-        drift_um_s: how fast the reading of one place grew on its turn [µm/s].
+        drift_um_s: growth of one place's reading on its turn [µm/s].
     """
 
     effects_um: Mapping[tuple[str, str], NDArray[np.float64]]
@@ -59,7 +59,7 @@ class RunForm:
 
 
 def form_of(one: Seen, off_um: NDArray[np.float64]) -> RunForm:
-    """Return the form of a run of which it is known where it should lie; columns as of `RunForm.off_um`."""
+    """Return the form of a run with known expectation; columns as of `RunForm.off_um`."""
     signs = along_travel(one.run.circle)[:, None]
     effects = {} if one.run.expected is None else one.run.expected.effects_um
     along = {key: signs * effect for key, effect in effects.items()}
@@ -79,11 +79,7 @@ Held = tuple["Seen", ...]
 
 
 class Forms:
-    """Forms of the runs of a session; those that are held stay worked out, and a run more is added to them.
-
-    Args:
-        form: makes the form of what is held.
-    """
+    """Forms of a session's runs; held runs stay computed, and further runs are added."""
 
     def __init__(self, form: Callable[[Held], RunForm]) -> None:
         self._form = form
@@ -94,7 +90,7 @@ class Forms:
         self._log_determinants: list[NDArray[np.float64]] = []
 
     def hold(self, runs: Sequence[Held]) -> None:
-        """Hold these runs: what was held behind the first that differs is given up."""
+        """Hold these runs; those behind the first difference are discarded."""
         pairs = enumerate(zip(runs, self._held, strict=False))
         alike = next((k for k, (one, (held, _)) in pairs if _key(one) != _key(held)), min(len(runs), len(self._held)))
         del self._held[alike:], self._log_determinants[alike:]
@@ -102,7 +98,6 @@ class Forms:
             self._add(one, self._form(one))
 
     def _add(self, one: Held, form: RunForm) -> None:
-        """Add the rows of one form, in units of what its run has alone."""
         n = COEFFICIENTS * len(self._held)
         behind = n + COEFFICIENTS
         unit = 1.0 / form.own_um[:, None]
@@ -134,13 +129,12 @@ class Forms:
             self._whitening, self._white = wider, white
 
     def part(self, runs: Sequence[Held], beside: Held | None = None) -> FormsBesides:
-        """Return the forms of some of the runs that are held, and what they say of the others.
+        """Return the forms of some held runs, and their prediction of the others.
 
-        A drift that overlaps show may have gone on through the session: its usual size is that of all these runs.
+        A drift in overlaps may continue through the session: its usual size is that of all these runs.
 
         Args:
-            runs: which.
-            beside: run that is held against them, whose overlap counts, too.
+            beside: run compared with them, whose overlap counts too.
         """
         chosen = {_key(one) for one in runs}
         left_out = [k for k, (held, _) in enumerate(self._held) if _key(held) not in chosen]
@@ -149,33 +143,28 @@ class Forms:
         return FormsBesides(self, left_out, float(np.sqrt(np.mean(np.square(rates)))))
 
     def rows(self, runs: Sequence[Held]) -> NDArray[np.int64]:
-        """Return which rows are those of runs that are held."""
+        """Return the rows of held runs."""
         wanted = {_key(one) for one in runs}
         return rows_of([k for k, (held, _) in enumerate(self._held) if _key(held) in wanted])
 
     def all(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return what makes all forms independent, shape (9, n, n), their columns and that of a drift, so, (9, n, k + 1), and log-determinants."""
+        """Return whitening of all forms, shape (9, n, n), their whitened columns and drift, (9, n, k + 1), and log determinants."""
         n = COEFFICIENTS * len(self._held)
         return self._whitening[:, :n, :n], self._white[:, :n], np.sum(self._log_determinants, axis=0)
 
     def place(self, one: Held) -> tuple[int, NDArray[np.float64]]:
-        """Return the place of a run among all that are held, and what it has alone, shape (7,) [µm]."""
+        """Return the place of a run among all held runs, and its own part, shape (7,) [µm]."""
         return next((k, form.own_um) for k, (held, form) in enumerate(self._held) if _key(held) == _key(one))
 
 
 class FormsBesides:
-    """Forms of some of the runs that are held, for each of SIZES, and what they say of the runs left out.
+    """Forms of some held runs for each of SIZES, and their prediction of omitted runs.
 
-    A drift that overlaps show changes all runs together: a change of rank one [Golub and Van Loan, 2.1.4].
-
-    Args:
-        forms: of all runs.
-        left_out: places of those left out.
-        rate_um_s: standard deviation of the drift [µm/s].
+    A drift in overlaps changes all runs together: a change of rank one [Golub and Van Loan, 2.1.4].
 
     Attributes:
-        white: columns of the part as independent numbers with a variance of one, shape (9, n, k).
-        log_determinant: of its covariance, in units of what each run has alone, shape (9,).
+        white: whitened columns, shape (9, n, k).
+        log_determinant: of the covariance, in units of each run's own part, shape (9,).
     """
 
     def __init__(self, forms: Forms, left_out: Sequence[int], rate_um_s: float) -> None:
@@ -195,11 +184,11 @@ class FormsBesides:
         self.log_determinant = log_determinant + 2.0 * np.sum(np.log(sizes), axis=1) + np.log(grown)
 
     def log_likelihoods(self) -> NDArray[np.float64]:
-        """Return the logarithm of the density of each column, by each of SIZES, shape (9, k); without a constant."""
+        """Return each column's log density, by each of SIZES, shape (9, k), without a constant."""
         return -0.5 * (np.sum(self.white**2, axis=1) + self.log_determinant[:, None])
 
     def beside(self, one: Held) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return columns of a run left out less what the part says of it, shape (9, 7, k) [µm], and their covariance, (9, 7, 7) [µm²]."""
+        """Return an omitted run's columns minus prediction, shape (9, 7, k) [µm], and their covariance, (9, 7, 7) [µm²]."""
         place, own_um = self._forms.place(one)
         rows = rows_of([self._left_out.index(place)])
         # Of all runs left out: residual e = B^-1 p with covariance B^-1, where B is their block of the inverse and p its pull.
@@ -210,12 +199,7 @@ class FormsBesides:
         return own_um[:, None] * (off - drift @ self._amount), own_um[:, None] * covariance * own_um
 
     def length_without(self, size: int, rows: NDArray[np.int64]) -> float:
-        """Return how far runs of the part are from what its other runs say of them, in standard deviations.
-
-        Args:
-            size: which of SIZES.
-            rows: of these runs.
-        """
+        """Return distances of runs from their prediction by the others, in standard deviations."""
         basis, drift = self._basis[size], self._drift[size]
         seen = self._whitening[size][:, rows]
         seen = seen - basis @ (basis.T @ seen)
@@ -225,14 +209,14 @@ class FormsBesides:
 
 
 class _Columns:
-    """What causes do to forms, side by side, with room for more of both."""
+    """Columns of effects on forms, extensible."""
 
     def __init__(self) -> None:
         self._of: dict[tuple[str, str], slice] = {}
         self._effects = np.zeros((0, 0))
 
     def add(self, n: int, effects: Mapping[tuple[str, str], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Add the rows of one form behind n others; return its covariance with them and with itself, shape (7, n + 7)."""
+        """Add the rows of one form behind n others; return covariances with them and itself, shape (7, n + 7)."""
         wide = max((place.stop for place in self._of.values()), default=0)
         for cause, effect in effects.items():
             if cause not in self._of:

@@ -1,4 +1,4 @@
-"""A length that stands still: stuck plunger, stop, held display.
+"""A constant length: stuck plunger, stop, held display.
 
 With white noise sigma and step r, the next reading equals any value with at most r / (sigma sqrt(2 pi)), the greatest
 normal density times the step. So n equal readings have at most that to the power n - 1. A step coarser than the noise
@@ -39,7 +39,6 @@ def chance_equal(squares_mm2: float, count: int, step_mm: float) -> float:
 
     Args:
         squares_mm2: sum of squared second differences while moving [mm²].
-        step_mm: smallest difference of two readings.
     """
     if not count or not 0.0 < step_mm < inf:
         return 1.0
@@ -54,11 +53,7 @@ def chance_of(variance_mm2: float, step_mm: float) -> float:
 
 
 def moving_noise(raw: RawCircle) -> tuple[float, int, float]:
-    """Return the inputs of `chance_equal` from moving readings of a turn.
-
-    Returns:
-        Sum of the squares of second differences [mm²], how many they are, smallest difference of two readings [mm].
-    """
+    """Return the inputs of `chance_equal` from moving readings of a turn: squares [mm²], their number, step [mm]."""
     differs = np.abs(np.diff(raw.length_mm))
     ends = np.flatnonzero(differs)
     first, last = np.append(0, ends + 1), np.append(ends, len(raw) - 1)
@@ -68,22 +63,14 @@ def moving_noise(raw: RawCircle) -> tuple[float, int, float]:
 
 
 def equal_limit(squares_mm2: float, count: int, step_mm: float, readings: float) -> float:
-    """Return how many equal readings in a row a sound turn has with probability SHARE at most.
-
-    Args:
-        squares_mm2: sum of squared second differences while moving [mm²].
-        step_mm: smallest difference of two readings.
-
-    Returns:
-        Their number; infinite where the step is not finer than the noise, by the lower limit of what is known of it.
-    """
+    """Return the number of equal readings in a row that a sound turn has with probability SHARE at most; infinite for a coarse step."""
     chance = chance_equal(squares_mm2, count, step_mm)
     return 1.0 + ceil(log(max(readings, 1.0) / SHARE) / -log(chance)) if chance < 1.0 else inf
 
 
 @dataclass
 class HeldLength:
-    """Takes readings of a turn and reports a standstill longer than sound ones.
+    """Takes readings of a turn and reports an unusually long standstill.
 
     Attributes:
         since_s: first of the last equal readings.
@@ -105,7 +92,7 @@ class HeldLength:
         self.equal, self._last, self._before, self._pending = 0, None, None, 0.0
 
     def add(self, t_s: float, length_mm: float, *, noise: bool = True) -> None:
-        """Take a reading; noise is read at least once a second of motion.
+        """Take a reading; noise is measured at least once a second of motion.
 
         Args:
             noise: whether differences are noise; False during feed-out.
@@ -128,7 +115,7 @@ class HeldLength:
         return self._last_s - self.since_s if self.equal else 0.0
 
     def stands(self, readings: float) -> bool:
-        """Return whether the length stands still against sound readings.
+        """Return whether the length is constant, unlike sound readings.
 
         Args:
             readings: of a whole turn, approximately.

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """What was found of one run.
+    """Findings of one run.
 
     Attributes:
         analysis: without filter; None without circle.
@@ -49,11 +49,7 @@ class Judgement:
 
 @with_one_thread
 def judge(runs: Sequence[Run], progress: Callable[[int, int], None] = lambda _done, _of: None) -> tuple[Judgement, ...]:
-    """Judge a session's runs, each beside all others.
-
-    Args:
-        runs: in recording order.
-    """
+    """Judge a session's runs, each beside all others."""
     known = []
     for done, run in enumerate(runs):
         progress(done, len(runs))
@@ -76,12 +72,12 @@ class _Pair:
 
     @cached_property
     def apart_um(self) -> tuple[float, float]:
-        """As of `knowledge.apart_um`."""
+        """Return `knowledge.apart_um` of the pair."""
         return apart_um(self.one, self.other)
 
     @cached_property
     def sigmas(self) -> float | None:
-        """As of `stated.sigmas_apart`."""
+        """Return `stated.sigmas_apart` of the pair."""
         return sigmas_apart(self.one, self.other)
 
     @cached_property
@@ -95,8 +91,7 @@ class SessionRuns:
     """A session's analysed runs with pairs; judges any of them or a new one.
 
     Args:
-        runs: in the order in which they were recorded.
-        known: other runs of the same session, of which pairs and forms are known.
+        known: other runs of the same session with known pairs and forms.
     """
 
     def __init__(self, runs: Sequence[Seen], known: SessionRuns | None = None) -> None:
@@ -146,7 +141,7 @@ class SessionRuns:
         return self._without
 
     def _beside(self, one: Seen, analysis: CircleAnalysis, others: Others | None = None) -> list[Finding]:
-        """What is found of a run by what is known of its circle and by the other runs."""
+        """Return findings of a run by its expected circle and other runs."""
         others = others or self._others(one)
         both = together(one, self._runs if one in self._runs else [*self._runs, one], self._forms.planned)
         by_others = expected_beside(both)
@@ -193,7 +188,7 @@ class SessionRuns:
         )
 
     def _opposite(self, one: Seen) -> Seen | None:
-        """Return the other direction, by preference of the same mounting, then the same repeat."""
+        """Return the other direction, preferably of the same mounting, then of the same repeat."""
         found = [
             other
             for other in self._of_test.get(one.run.test, ())

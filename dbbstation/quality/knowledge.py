@@ -35,11 +35,7 @@ LOCAL_COEFFICIENTS = 2 * LOCAL_HARMONIC + 1
 
 
 def local_columns(theta_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return readings per orthonormal coefficient with `LOCAL_HARMONIC` undulations, shape (n, 59).
-
-    Args:
-        theta_rad: commanded, from +X towards +Y, shape (n,).
-    """
+    """Return readings per orthonormal coefficient with `LOCAL_HARMONIC` undulations, shape (n, 59)."""
     angles = np.outer(theta_rad, np.arange(1, LOCAL_HARMONIC + 1))
     return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
 
@@ -52,11 +48,7 @@ HIGHER = (2, 3, 5, 6)
 
 
 def form_columns(theta_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return readings per orthonormal coefficient of a form, shape (n, 7).
-
-    Args:
-        theta_rad: commanded, from the turn's start towards +Y, shape (n,).
-    """
+    """Return readings per orthonormal coefficient of a form, shape (n, 7)."""
     angles = np.outer(theta_rad, np.arange(1, HIGHEST_HARMONIC + 1))
     return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
 
@@ -71,10 +63,10 @@ class Expected:
     """An expected circle by nominal machine or model.
 
     Attributes:
-        centre_mm: X and Y less commanded, shape (2,).
+        centre_mm: X and Y minus commanded, shape (2,).
         radial_mm: mean reading less nominal bar length.
         covariance_mm2: of these three, with ball, mounting and bar, shape (3, 3).
-        place_known: False under the spindle, where centres mean nothing.
+        place_known: False under the spindle, where centres are meaningless.
         mounting_mm: standard deviation of remounting, in X and Y.
         reversals_deg: from +X, where a strut reverses.
         form_um: as `Seen.coefficients_um`, shape (7,).
@@ -112,7 +104,7 @@ class Planned:
 
     @property
     def label(self) -> str:
-        """Name in texts."""
+        """Return its name in texts."""
         return f"{self.test} {self.circle.direction}"
 
 
@@ -122,9 +114,7 @@ class Run:
 
     Attributes:
         mounting: its runs share the ball's place.
-        expected: None if unknown.
         largest_loss_percent: of samples.
-        planned: all circles of its plan by a model.
         started_s: on the session's clock; None if not noted.
         usual: expectation by usual causes if `expected` is by a model; else None.
         bar_stated: whether a calibrated bar length is stated.
@@ -144,7 +134,7 @@ class Run:
 
     @property
     def label(self) -> str:
-        """Name in texts."""
+        """Return its name in texts."""
         return f"{self.test} {self.circle.direction} {self.repeat}"
 
 
@@ -154,7 +144,6 @@ class Seen:
 
     Attributes:
         analysis: None without circle.
-        problem: why there is none; may be empty.
         lost: missing on the turn.
         unusable: recorded, but unusable, of these.
         feed_mm_min: by the overlap, with standard uncertainty; or None.
@@ -197,7 +186,7 @@ class Seen:
 
     @cached_property
     def drift_um(self) -> tuple[float, float] | None:
-        """Drift over the turn by the overlap and its standard uncertainty by noise; None where it has none [µm]."""
+        """Return the drift over the turn by the overlap, with standard uncertainty by noise; None without overlap [µm]."""
         if self.analysis is None or self.analysis.passes is None:
             return None
         return self.analysis.passes.mean_um, self.analysis.passes.u_mean_um(self.analysis.noise.sigma_um)
@@ -280,7 +269,6 @@ class Others:
         across_um: the same off the axis through the start.
         local_um: local rms difference of other circles' directions.
         opposite: same test, other direction, same mounting if possible; or None.
-        earlier: repeat before, or None.
     """
 
     noise_um: tuple[float, ...] = ()

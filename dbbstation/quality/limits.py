@@ -98,7 +98,6 @@ def length_limit(lengths: Sequence[float], dimensions: int) -> float:
 
     Args:
         lengths: of others; their median square counts.
-        dimensions: with equal scatter.
     """
     median = float(chdtri(dimensions, 0.5)) / dimensions
     variance = float(np.median(np.square(lengths))) / median

@@ -1,6 +1,6 @@
 """Local differences from another run of a test: dirt, contact, a push.
 
-A single run hides a wide bump in its form; two runs share the form. Against a repeat everything is compared. Against the
+A single run hides a wide bump in its form; two runs share the form. Repeats are compared in everything. Against the
 other direction only odd undulations are, since lag, play and friction nearly repeat after half a turn.
 """
 
@@ -85,7 +85,6 @@ def _compared(one: Seen, against: Seen) -> NDArray[np.bool_]:
 
 
 def _peak(differs_um: NDArray[np.float64]) -> tuple[float, float]:
-    """Angle from +X and height of the greatest difference [deg, µm]."""
     theta_deg = np.arange(0.0, 360.0, 1.0)
     path = local_columns(np.radians(theta_deg)) @ differs_um
     top = int(np.argmax(np.abs(path)))

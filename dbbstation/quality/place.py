@@ -24,11 +24,7 @@ BY_OTHERS = " by the other tests"
 def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
     """Judge the mean reading.
 
-    A larger circle at the programmed feed turns slower. An overlap that shows it decides without expectation.
-
-    Args:
-        expected: of its mean reading; None if unknown.
-        by_others: whether the expectation is by other tests.
+    A larger circle at the programmed feed turns slower. An overlap that shows this decides without expectation.
     """
     if (larger := _turns_slower(one)) is not None:
         return larger
@@ -48,7 +44,6 @@ def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = 
 
 
 def _turns_slower(one: CircleAnalysis) -> Finding | None:
-    """Return that the circle is as much larger as it turns slower, or None."""
     circle, mean_um = one.raw.circle, one.mean_radial_error_um
     if one.feed_mm_min is None:
         return None
@@ -91,11 +86,7 @@ def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = Fa
 def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Finding:
     """Judge mean, centre, ellipse and triangle together.
 
-    A wrong tilt, plane or radius in both directions changes all a little, each within its limit.
-
-    Args:
-        expected: of its form; None if unknown.
-        by_others: whether the expectation is by other tests.
+    A wrong tilt, plane or radius in both directions changes each a little, within its limit.
     """
     if expected is None:
         return undecided(Name.FORM, "no expected form is known", "µm")

@@ -19,12 +19,9 @@ if TYPE_CHECKING:
 def scale(one: Seen, others: Others) -> Finding:
     """Judge the gauge's excess along feed-in and feed-out.
 
-    Effects on the way follow from those on the circle: a cause by pose or time changes over a way w by w / R of itself; a
-    cause along a path acts only in motion, at the corner. Lag and play change sign with direction, so both directions
-    together have a limit in which these cancel. The lesser of both results counts.
-
-    Args:
-        others: names the other direction.
+    Effects along them follow from those on the circle: a cause by pose or time changes over a distance w by w / R of
+    itself; a cause along a path acts only in motion, at the corner. Lag and play change sign with direction, so both
+    directions together have a limit in which these cancel. The lesser of both results counts.
     """
     expected, feed_in_um = one.run.expected, 1e3 * one.run.circle.feed_in_mm
     if one.ways is None:
@@ -56,13 +53,11 @@ def scale(one: Seen, others: Others) -> Finding:
 
 
 def _excess_um(one: Seen) -> float:
-    """Return the mean excess of feed-in and feed-out [µm]."""
     assert one.ways is not None  # noqa: S101 - asked before
     return float(np.mean([way.way_um for way in one.ways])) - 1e3 * one.run.circle.feed_in_mm
 
 
 def _u_um(runs: list[tuple[Seen, Expected]]) -> float:
-    """Return the standard uncertainty of their mean, by noise and all causes at usual or stated size [µm]."""
     noise, effects = 0.0, dict[tuple[str, str], "NDArray[np.float64]"]()
     for one, expected in runs:
         assert one.ways is not None  # noqa: S101 - asked before

@@ -68,7 +68,7 @@ LARGEST_LOG = float(np.log(1e4))
 
 
 def closure(one: CircleAnalysis, others: Others, expected: Expected | None = None) -> Finding:
-    """Judge end of the turn less its beginning against noise and other runs."""
+    """Judge the end of the turn minus its beginning against noise and other runs."""
     if one.closure is None or not one.noise.known:
         return undecided(Name.CLOSURE, "too few samples, at the ends of the turn or to separate noise from form", "µm")
     u = one.closure.u_um
@@ -86,7 +86,7 @@ def closure(one: CircleAnalysis, others: Others, expected: Expected | None = Non
 
 
 def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None) -> Finding:
-    """Judge the overlap's second pass less the first against noise, feed and other runs."""
+    """Judge the overlap's second pass minus the first against noise, feed and other runs."""
     if one.passes is None:
         return undecided(Name.DRIFT, "the recording was cut to its turn: no place is passed twice", "µm")
     if not one.noise.known:
@@ -115,7 +115,6 @@ def _left_open_um(expected: Expected | None) -> float:
 
 
 def _by_feed_um(one: CircleAnalysis) -> float:
-    """Return the second pass's difference by a slightly wrong feed [µm]."""
     if one.feed_mm_min is None:
         return 0.0
     shown, u = one.feed_mm_min
@@ -128,7 +127,6 @@ def _by_feed_um(one: CircleAnalysis) -> float:
 
 
 def _beyond(u: float, freedom: float, others: Sequence[tuple[float, float]]) -> float:
-    """Return the limit of a value about zero, by its uncertainty and the excess scatter of others."""
     parts = [(u, freedom)]
     if len(others) >= FEWEST_OTHERS:
         scale, known = scale_of([value / own for value, own in others])
@@ -237,7 +235,7 @@ def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
 
 
 def _slower(one: Seen, others: Others) -> Finding | None:
-    """Return that a turn took longer by a lower feed, which closes it, and not by stops, which leave it open; or None."""
+    """Return that a turn took longer by a lower feed and not by stops, which would leave it open; or None."""
     circle, recording = one.run.circle, one.run.recording
     if one.feed_mm_min is not None or one.longer_s is None:
         return None

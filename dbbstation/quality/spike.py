@@ -41,12 +41,9 @@ UNEVEN = 1.5
 def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     """Judge the reading farthest from its neighbours against chance.
 
-    Each reading is compared with the median of two before and two behind. Their scatter is the larger of the whole turn's
-    and the local one; single spikes do not raise it. The reading step is added to the limit. Near reversals the limit
-    follows from the turn's other reversals. A sound normal run has a finding with probability `limits.SHARE`.
-
-    Args:
-        reversals_deg: angles at which struts reverse; may be empty.
+    Each reading is compared with the median of two before and two behind. Their scatter is the larger of the whole
+    turn's and the local one; single spikes do not raise it. The reading step is added to the limit. Near reversals the
+    limit follows from the turn's other reversals. A sound normal run has a finding with probability `limits.SHARE`.
     """
     apart, sound = _apart(one.residual_um, one.raw.phi_deg)
     if int(sound.sum()) < LARGEST_BLOCK:
@@ -88,7 +85,6 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
 def _apart(
     values_um: NDArray[np.float64], phi_deg: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return each reading's distance from its neighbours' median, and whether these lie evenly, shape (n,) each."""
     count = len(values_um)
     apart, sound = np.zeros(count), np.zeros(count, dtype=np.bool_)
     if count <= 2 * BESIDE:

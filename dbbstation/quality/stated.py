@@ -28,11 +28,7 @@ def apart_by_causes(one: Expected, other: Expected) -> NDArray[np.float64]:
 
 
 def apart_by(one_um: Effects, other_um: Effects, count: int) -> NDArray[np.float64]:
-    """Return the covariance of two forms' difference by causes, shape (n, n) [µm²].
-
-    Args:
-        one_um: effects of each cause, shape (n, p) each.
-    """
+    """Return the covariance of two forms' difference by causes, shape (n, n) [µm²]."""
     covariance = np.zeros((count, count))
     for key in dict.fromkeys([*one_um, *other_um]):
         mine, theirs = one_um.get(key), other_um.get(key)
@@ -46,12 +42,9 @@ def apart_by(one_um: Effects, other_um: Effects, count: int) -> NDArray[np.float
 
 
 def covariance_apart(one: Seen, other: Seen) -> NDArray[np.float64] | None:
-    """Return the covariance of the difference of two runs of one circle with noise, shape (7, 7) [µm²].
+    """Return the covariance of the difference of two runs of one circle with noise, shape (7, 7) [µm²]; None if one is unknown.
 
-    Smaller moves than the ball's stated uncertainty do not count.
-
-    Returns:
-        None where nothing is known of one of them.
+    Moves below the ball's stated uncertainty do not count.
     """
     if one.run.expected is None or other.run.expected is None:
         return None
@@ -87,12 +80,7 @@ def unseen_um2(one: Seen, other: Seen) -> float:
 
 
 def limit_along(covariance: NDArray[np.float64], off: NDArray[np.float64]) -> float:
-    """Return the limit of a sound vector in the direction of `off`: its ellipsoid with probability SHARE.
-
-    Args:
-        covariance: shape (n, n).
-        off: shape (n,).
-    """
+    """Return the limit of a sound vector in the direction of `off`: its ellipsoid with probability SHARE."""
     size = float(np.linalg.norm(off))
     along = off / size if size > 0.0 else np.eye(len(off))[0]
     return length_quantile(len(off)) / float(np.sqrt(along @ np.linalg.solve(covariance, along)))
@@ -102,9 +90,6 @@ def limit_of_length(covariance: NDArray[np.float64]) -> float:
     """Return the limit of a sound vector's length [Box, Ann. Math. Stat. 25 (1954) 290].
 
     Its square is taken as a scaled chi-square variable of equal mean and variance.
-
-    Args:
-        covariance: shape (n, n).
     """
     trace, squares = float(np.trace(covariance)), float(np.sum(covariance**2))
     return scaled_length_quantile(trace**2 / squares) * float(np.sqrt(squares / trace)) if trace > 0.0 else 0.0

@@ -1,8 +1,8 @@
 """Whether a run shows another test's circle: wrong bore, height, tilt, start or direction.
 
-A bar reads no place. Likelihoods compare two normal explanations: the own circle with all uncertainties, or another
-test's, by its run or a model. A sound run favours another by f with a chance of at most 1 / f [Markov's inequality], in
-any dimension and usually far less.
+A bar measures no place. Likelihoods compare two normal explanations: the own circle with all uncertainties, or another
+test's, by its run or a model. A sound run favours another by f with a probability of at most 1 / f [Markov's
+inequality], in any dimension and usually far less.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Explained:
-    """How much better another circle explains a run."""
+    """Likelihood gain of another circle for a run."""
 
     ratio: float
     fits: bool
@@ -67,7 +67,6 @@ def of_its_test(one: Seen, both: Together | None) -> Finding:
 
 
 def _measured(one: Seen, both: Together | None) -> Iterator[_Explained]:
-    """Judge by measured circles of other tests."""
     if both is None:
         return
     as_own, without = both.log_likelihoods()
@@ -120,7 +119,6 @@ def _near(square: float) -> bool:
 
 
 def _whole(expected: Expected, circle: Circle) -> NDArray[np.float64]:
-    """Return a form's covariance along its travel by all causes."""
     effects = np.hstack([np.zeros((COEFFICIENTS, 1)), *expected.effects_um.values()])
     effects = along_travel(circle)[:, None] * effects
     return effects @ effects.T

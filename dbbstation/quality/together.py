@@ -29,14 +29,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Runs of different tests beside one another; the first is the one that is judged.
+    """Runs of different tests; the first is judged.
 
     Attributes:
-        runs: n runs.
-        others: forms of all but the first.
-        rows: where the rows of each other test stand among those that are held.
-        apart_um: form of the first less what the others say of it, for each of SIZES, shape (9, 7) [µm].
-        covariance_um2: of that, shape (9, 7, 7) [µm²].
+        rows: rows of each other test among held ones.
+        apart_um: form of the first minus prediction by the others, for each of SIZES, shape (9, 7) [µm].
+        covariance_um2: of that difference, shape (9, 7, 7) [µm²].
     """
 
     runs: tuple[Seen, ...]
@@ -46,7 +44,7 @@ class Together:
     covariance_um2: NDArray[np.float64]
 
     def log_likelihoods(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return those of all runs, and of all but the first, for each of SIZES, shape (9,) each."""
+        """Return the log likelihoods of all runs, and of all but the first, for each of SIZES, shape (9,) each."""
         of_others = self.others.log_likelihoods()[:, 0]
         pulls = np.linalg.solve(self.covariance_um2, self.apart_um[:, :, None])[:, :, 0]
         squares = np.sum(self.apart_um * pulls, axis=1)
@@ -57,8 +55,6 @@ def together(one: Seen, runs: Sequence[Seen], forms: Forms) -> Together | None:
     """Return a run beside other tests; None without knowledge or others.
 
     Args:
-        one: the run.
-        runs: all that count, this one among them.
         forms: of runs of this session; the first column is that of forms as planned.
     """
     known = [other for other in runs if other.run.expected is not None]
@@ -98,9 +94,9 @@ def expected_beside(both: Together | None) -> Expected | None:
 
 
 def _tail(weights: NDArray[np.float64], covariances_um2: NDArray[np.float64]) -> float:
-    """Return the factor on the mean covariance by which a mixture of sizes has longer tails than a normal distribution.
+    """Return the factor on the mean covariance for the longer tails of a mixture of sizes.
 
-    Its square radius is exceeded with probability SHARE; covariances of different sizes are taken as alike in shape.
+    Its squared radius is exceeded with probability SHARE; covariances of different sizes are assumed alike in shape.
     """
     sizes = np.trace(covariances_um2, axis1=1, axis2=2)
     sizes /= weights @ sizes
@@ -111,7 +107,6 @@ def _tail(weights: NDArray[np.float64], covariances_um2: NDArray[np.float64]) ->
 
 
 def _straying(both: Together, size: int) -> float:
-    """Return the factor by which other tests disagree with the rest, at least one."""
     if len(both.rows) < FEWEST_OTHERS:
         return 1.0
     lengths = [both.others.length_without(size, rows) / median_length(len(rows)) for rows in both.rows.values()]
@@ -153,7 +148,7 @@ def read_along_um(circle: Circle, form_um: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def expected_um(one: Run | Planned) -> NDArray[np.float64]:
-    """Return the same expected without other runs."""
+    """Return the same expectation without other runs."""
     form = np.zeros(COEFFICIENTS) if one.expected is None else one.expected.form_um
     return along_travel(one.circle) * form + _length_um(one.circle)
 

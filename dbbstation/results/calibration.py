@@ -22,9 +22,7 @@ class CalibrationResult(Framed, CalibrationFigures):
 
     Attributes:
         method: of ball positions: `jig`, `conv-a` or `conv-b`.
-        covariance: of the machine's parameters.
         model: for prediction or compensation; `save` writes it.
-        recorded: what was fitted, for another task.
     """
 
     method: str
@@ -34,11 +32,11 @@ class CalibrationResult(Framed, CalibrationFigures):
 
     @property
     def parameters(self) -> dict[str, Value]:
-        """Return the machine's parameters as `source.parameter`, with their standard uncertainties."""
+        """Return the machine's parameters as `source.parameter`, with standard uncertainties."""
         return {f"{one.name}.{name}": value for one in self.sources for name, value in one.parameters.items()}
 
     def headline(self) -> str:
-        """Return the number of parameters and what the model leaves."""
+        """Return the number of parameters and the residual."""
         left = f"leaves {self.residual_rms_um:.2f} of {self.nominal_rms_um:.2f} µm rms"
         return f"{self.parameters_identified} parameters, {left}"
 

@@ -24,7 +24,6 @@ class CheckedFile:
     """A file, or a session.
 
     Attributes:
-        ok: whether it has no fault.
         runs: judged ones of a session; else absent.
     """
 
@@ -48,7 +47,7 @@ class DryRunResult:
 
 @dataclass(frozen=True)
 class SampledPlanResult:
-    """What an instrument sees of a plan."""
+    """The readings of an instrument on a plan's circles."""
 
     plan: str
     circles: tuple[SampledCircle, ...]

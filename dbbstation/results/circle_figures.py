@@ -43,8 +43,6 @@ class NoiseFigures:
     """Noise of a recording [µm].
 
     Attributes:
-        of_slow_figures: standard deviation of a turn's figures; None if unknown.
-        of_a_reading: standard deviation; None if unknown.
         step_of_readings: least difference of two readings.
     """
 
@@ -55,11 +53,7 @@ class NoiseFigures:
 
 @dataclass(frozen=True)
 class RunWithoutCircle(OfRunInSession):
-    """A run without circle.
-
-    Attributes:
-        findings: absent if not asked for.
-    """
+    """A run without circle."""
 
     problem: str | None
     findings: Annotated[tuple[Finding, ...] | None, Absent] = None
@@ -78,12 +72,8 @@ class CircleFiguresResult:
         g_um: circular deviation G, minimum zone.
         g_least_squares_um: circular deviation about the least-squares centre.
         f_um: radial deviations F about the least-squares centre.
-        mean_radial_error_um: mean less commanded length.
         centre_um: least-squares less commanded centre.
-        closure: end of the turn to its beginning; None if unknown.
         drift_um_per_turn: None without a second pass.
-        feed_shown_mm_min: by the recording; None if unknown.
-        findings: absent if not asked for.
     """
 
     session: str
@@ -161,12 +151,7 @@ class PairFigures:
 
 @dataclass(frozen=True, kw_only=True)
 class QuickLookResult:
-    """Signatures of serial axes in one circle.
-
-    Attributes:
-        symptoms: empty for too few samples.
-        left_rms_um: beyond signatures; None for too few samples.
-    """
+    """Signatures of serial axes in one circle; None for too few samples."""
 
     session: str
     test: str

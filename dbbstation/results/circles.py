@@ -41,9 +41,7 @@ class MeasuredCircle:
 
     Attributes:
         analysis: None without a circle.
-        problem: why there is none; else empty.
         known: stated facts of bar and ball.
-        judgement: None if not asked for.
     """
 
     session: str
@@ -65,12 +63,7 @@ class MeasuredPair:
 
 @dataclass(frozen=True)
 class Circled:
-    """Circles of one or more sessions.
-
-    Attributes:
-        circles: in order of measurement.
-        pairs: directions of one test, repeat and mounting.
-    """
+    """Circles of one or more sessions."""
 
     circles: tuple[MeasuredCircle, ...]
     pairs: tuple[MeasuredPair, ...]
@@ -86,10 +79,6 @@ class CirclesResult(Framed):
         filter: of G, F and H, in words.
         false_alarms_per_run: basis of the findings' limits.
         runs: figures with budgets; lengths in µm.
-        pairs: of both directions together.
-        quick_look: signatures of serial axes; None if not asked for.
-        csv: absent if none was written.
-        circles: with analyses.
     """
 
     edition: str
@@ -117,11 +106,7 @@ class CirclesResult(Framed):
 
 
 def circles_result(found: Circled, chosen: Filter, *, quick_look: bool = False) -> CirclesResult:
-    """Return the figures of circles.
-
-    Args:
-        quick_look: include signatures of serial axes.
-    """
+    """Return the figures of circles."""
     return CirclesResult(
         edition=EDITION,
         filter=chosen.words,

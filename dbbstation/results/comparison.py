@@ -19,13 +19,11 @@ from dbbstation.results.levels_text import level_sentences
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedRun:
-    """A run of B less that of A.
+    """A run of B minus that of A.
 
     Attributes:
         number: in this test and direction.
         differs: whether the found effects are certain in this run.
-        rms_um: whole smooth difference.
-        centre_shift_um: x and y.
         circularity_um: range of the difference about its centre.
         peak_um: with sign.
         by_angle_um: means over ten degrees from +X.
@@ -65,7 +63,7 @@ class DirectionHalves:
 
 @dataclass(frozen=True)
 class LargestEffect:
-    """Where a cause acts most."""
+    """The run and angle of a cause's largest effect."""
 
     test: str
     direction: str
@@ -76,7 +74,7 @@ class LargestEffect:
 
 @dataclass(frozen=True)
 class VariableSpan:
-    """Where along a variable a cause is large."""
+    """Range of a variable in which a cause is large."""
 
     variable: str
     low: Annotated[float, Field(serialization_alias="from")]
@@ -89,17 +87,14 @@ class ComparedCause:
     """What was found of one cause.
 
     Attributes:
-        form: strut, test or session, or empty.
         verdict: see docs/verdicts.md.
-        acts: `always` or `once`.
-        persists: a single event, confirmed by other tests.
+        persists: a single event that other tests confirm.
         recurs: a wave over time, predicted by other tests.
         gains: in tests that did not choose it; None if not tested.
         equivalent: causes indistinguishable by these sessions; `class` in JSON.
-        rms_um: None if absent.
-        taken_up: share that a new calibration would absorb; None if absent.
+        taken_up: share that a new calibration absorbs; None if absent.
         opposite: share that changes sign with direction; None if absent.
-        spans: large ranges along variables.
+        spans: ranges of variables with a large effect.
     """
 
     name: str
@@ -137,11 +132,7 @@ class CauseNotAsked:
 
 @dataclass(frozen=True)
 class ComparisonResidual:
-    """The residual beyond all findings.
-
-    Attributes:
-        probability: by noise alone.
-    """
+    """The residual beyond all findings, with its probability by noise alone."""
 
     beyond_noise: bool
     probability: float
@@ -158,16 +149,12 @@ class NotComparable:
 
 @dataclass(frozen=True, kw_only=True)
 class ComparisonResult(Framed):
-    """Differences of two sessions, B less A.
+    """Differences of two sessions, B minus A.
 
     Attributes:
-        text: summary.
         held_out_worse: whether predictions get worse; None if not tested.
         held_out_rms_um: errors of tests that took no part.
         runs: largest difference first.
-        directions: equal and opposite parts; None for one direction.
-        cancelling: None without such effects.
-        averaged: tests with averaged repeats.
         unlike: other differences; `notes` in JSON.
         levels: existence, variables and cause of a difference.
     """
@@ -200,7 +187,7 @@ class ComparisonResult(Framed):
     levels: Levels
 
     def sentences(self) -> list[str]:
-        """The answer in three levels, in words; a notebook shows it above the table."""
+        """Return the answer in three levels, in words; a notebook shows it above the table."""
         values = {one.name: one.parameters for one in self.causes if isinstance(one, ComparedCause)}
         return level_sentences(self.levels, "µm", values, rows="tests", what="The sessions")
 

@@ -14,11 +14,8 @@ class KinematicsResult:
         parts: sources that the component corrects.
         left_out: sources that it does not.
         thermometers: columns whose pins must be connected.
-        install: commands, in order.
-        ini: lines for the INI file.
-        hal: lines for the HAL file.
-        machine_file: machine file to use once the component is in use; it says what the control corrects.
-        way_back: what undoes it.
+        machine_file: machine file for use with the component; it states the control's corrections.
+        way_back: how to undo it.
     """
 
     file: str
@@ -37,7 +34,7 @@ class KinematicsResult:
 
 @dataclass(frozen=True, kw_only=True)
 class LeftByWay:
-    """Errors of the tool over the volume, by how the control is set up: position and tilt, rms and largest."""
+    """Errors of the tool over the volume by set-up of the control: position and tilt, rms and largest."""
 
     way: str
     rms_um: float
@@ -48,13 +45,7 @@ class LeftByWay:
 
 @dataclass(frozen=True, kw_only=True)
 class SourceLeftOver:
-    """Errors of the tool by one source alone, without and with parameters and tables.
-
-    Attributes:
-        rms_um: None if it depends on more than the pose.
-        left_rms_um: None likewise.
-        held_by: `parameters`, `table` or `nothing`.
-    """
+    """Errors of the tool by one source alone, without and with parameters and tables."""
 
     name: str
     rms_um: float | None
@@ -68,11 +59,8 @@ class ParametersResult:
 
     Attributes:
         low: of the volume, X, Y, Z [mm], A, B, C [deg].
-        high: likewise.
-        left: by way.
         home_mm: added to HOME and HOME_OFFSET of each joint.
-        ini: lines for the INI file.
-        way_back: what undoes it.
+        way_back: how to undo it.
     """
 
     folder: str

@@ -43,7 +43,6 @@ class MeasuredBeforeAfter:
     Attributes:
         centre_deviation_um: least-squares centre's offset.
         mean_radial_error_um: mean length less radius.
-        circularity_um: circular deviation with noise.
     """
 
     centre_deviation_um: float

@@ -47,10 +47,8 @@ class WorkspaceGain:
     """Distance of kinematic calibration and joint model over the workspace.
 
     Attributes:
-        error_rms_um: without common shift.
         uncertainty_rms_um: standard uncertainty of the joint model; None if unknown.
         common_shift_um: mean of X, Y and Z.
-        uncertainty_with_shift_rms_um: None if unknown.
     """
 
     error_rms_um: float
@@ -68,7 +66,6 @@ class MisfitLocation:
 
     Attributes:
         strut: 1 to 6; None if none stands out.
-        variable: None if it follows none.
     """
 
     test: str
@@ -89,15 +86,10 @@ class CauseResult:
         verdict: see docs/verdicts.md.
         ambiguous_with: causes of similar probability.
         concealed: R² of its effect on kinematic parameters.
-        signature_rms_um: its effect on readings.
         unconcealed_rms_um: part beyond kinematic parameters.
-        gain: log Bayes factor.
-        stability: selection frequency.
         equivalent: causes indistinguishable by these recordings; `class` in JSON.
         log_evidence: the gain under its older name.
-        acts: `always` or `once`.
         persists: a single event, confirmed by held-out tests.
-        gains: in held-out tests; None without any.
     """
 
     name: str
@@ -121,7 +113,7 @@ class CauseResult:
 
 @dataclass(frozen=True)
 class CurveFollows:
-    """What an unmodelled effect is a function of.
+    """The variable of an unmodelled effect.
 
     Attributes:
         kind: such as `wave`; empty for the usual one.
@@ -146,10 +138,7 @@ class UnexplainedCurve:
     """An unmodelled effect as a curve.
 
     Attributes:
-        variable: as printed.
-        period_mm: of a wave of strut length; else None.
         strut: 1 to 6; None for all struts or none.
-        form: kind in words; may be empty.
         period: of a wave, in the variable's unit; else None.
         direction: of the strongest motion; empty for a scalar.
         convention: part removed since fitted parameters can make it; may be empty.
@@ -173,13 +162,7 @@ class UnexplainedCurve:
 
 @dataclass(frozen=True)
 class UnexplainedResult:
-    """The unmodelled residual.
-
-    Attributes:
-        strut: 1 to 6, or None.
-        variable: None without a clear one.
-        curve: None if nothing organises it.
-    """
+    """The unmodelled residual."""
 
     rms_um: float
     strut: int | None
@@ -190,11 +173,7 @@ class UnexplainedResult:
 
 @dataclass(frozen=True)
 class ParameterShift:
-    """Bias of a kinematic parameter.
-
-    Attributes:
-        before_um: without the found causes.
-    """
+    """Bias of a kinematic parameter; `before_um` without the found causes."""
 
     parameter: str
     before_um: float
@@ -205,11 +184,7 @@ class ParameterShift:
 
 @dataclass(frozen=True, kw_only=True)
 class ProposedTest:
-    """A circle to measure next.
-
-    Attributes:
-        source: cause whose uncertainty it reduces.
-    """
+    """A circle to measure next."""
 
     text: str
     x_mm: float
@@ -233,13 +208,9 @@ class DiagnosisFigures(Framed):
     Attributes:
         mismatch: whether recordings contradict the kinematic model.
         probability: of that misfit by chance.
-        held_out_rms_um: prediction error of held-out tests.
         held_out: `tested`, or `not-tested` for too few tests.
         held_out_worse: whether predictions get worse; None if not tested.
-        workspace: distance of both models; None without findings.
-        cancelling: cancelling effects of named causes; None without any.
         second_start_agrees: whether a second search agrees; None without one.
-        next_test: None: no proposal.
         limits: search, parameters and joint fit that ended at a limit.
         levels: existence, variables and cause of a difference.
     """
@@ -268,7 +239,7 @@ class DiagnosisFigures(Framed):
     limits: tuple[LimitReached, ...] = ()
 
     def sentences(self) -> list[str]:
-        """The answer in three levels, in words; a notebook shows it above the table."""
+        """Return the answer in three levels, in words; a notebook shows it above the table."""
         values = {one.name: one.parameters for one in self.sources}
         what = "Measured circles and the kinematic model"
         return level_sentences(self.levels, "µm", values, rows="tests", what=what)
@@ -276,12 +247,12 @@ class DiagnosisFigures(Framed):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def said(self) -> tuple[str, ...]:
-        """Whether anything differs, and what it follows most, in two sentences for a report or a screen."""
+        """Return whether anything differs, and its main variable, in two sentences for a report or a screen."""
         return short_sentences(self.levels, "µm", "Measured circles and the kinematic model")
 
     @property
     def identified(self) -> tuple[CauseResult, ...]:
-        """Causes with the verdict `identified`."""
+        """Return causes with the verdict `identified`."""
         return tuple(one for one in self.sources if one.verdict == "identified")
 
     def headline(self) -> str:
@@ -307,13 +278,7 @@ class DiagnosisFigures(Framed):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DiagnosisResult(DiagnosisFigures):
-    """The result of a diagnosis.
-
-    Attributes:
-        effects: contributions to circles, the greatest first.
-        model: joint model, which `save` writes.
-        recorded: what was diagnosed, for another task.
-    """
+    """The result of a diagnosis."""
 
     effects: tuple[CauseContribution, ...]
     model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)

@@ -19,18 +19,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveResult(Framed, DriveFindings):
-    """Findings on one strut drive.
-
-    Attributes:
-        compared: absent if none was written.
-        figure: absent if none was written.
-    """
+    """Findings on one strut drive."""
 
     compared: Annotated[str | None, Absent] = None
     figure: Annotated[str | None, Absent] = None
 
     def sentences(self) -> list[str]:
-        """The answer in three levels, in words; a notebook shows it above the table."""
+        """Return the answer in three levels, in words; a notebook shows it above the table."""
         values = {one.name: one.parameters for one in self.sources}
         what = "Measured force and the law with mass and friction"
         return level_sentences(self.levels, "N", values, rows="samples", what=what)
@@ -45,5 +40,5 @@ class DriveResult(Framed, DriveFindings):
 
 
 def drive_result(found: DriveFindings, drawing: Callable[[object], bytes] | None = None) -> DriveResult:
-    """Return what was found as a result that can be shown."""
+    """Return the findings as a displayable result."""
     return DriveResult(**{one.name: getattr(found, one.name) for one in fields(found)}, drawing=drawing)

@@ -15,13 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CuredRun(OfRun):
-    """One run with and without a cause; G up to 30 undulations per revolution.
-
-    Attributes:
-        g_um: circular deviation of the cause alone.
-        centre_um: shift of the centre, X and Y.
-        measured_centre_um: less the commanded one, X and Y.
-    """
+    """One run with and without a cause; G up to 30 undulations per revolution."""
 
     g_um: float
     centre_um: tuple[float, ...]
@@ -39,12 +33,7 @@ class CauseContribution:
         cause: source, or `geometry` for all kinematic parameters.
         verdict: empty for geometry or without diagnosis.
         g_um: mean circular deviation of the cause alone.
-        g_u_um: standard uncertainty; None if unknown.
-        centre_um: mean shift of the centres.
-        centre_u_um: standard uncertainty; None if unknown.
         workspace_um: rms tool shift over the workspace about a common shift; None if it follows more than the pose.
-        workspace_u_um: standard uncertainty; None if unknown.
-        measured_g_um: mean circular deviation.
     """
 
     cause: str

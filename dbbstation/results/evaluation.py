@@ -13,15 +13,12 @@ from dbbstation.results.frame import Framed
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationResult(Framed):
-    """What a model leaves of recordings, and the uncompensated machine's accuracy.
+    """Residuals of a model, and the uncompensated machine's accuracy.
 
     Attributes:
         nominal_rms_um: measured less nominally predicted length over all runs.
         flatness_um: of X, Y = ±190 mm without compensation, by the model.
-        flatness_u_um: standard uncertainty; None if unknown.
         parallelism_um: of a move along X without compensation.
-        parallelism_u_um: standard uncertainty; None if unknown.
-        plane_uncertainty_not_known_because: None if known.
         plane_without: sources left out, since they need more than a pose.
         tolerances: None if another result holds them.
     """

@@ -21,8 +21,7 @@ class FleetValue:
     """One number of a machine.
 
     Attributes:
-        uncertainty: standard; None if unknown.
-        of: circle in words; may be empty.
+        uncertainty: standard uncertainty.
         logarithmic: whether ratios of a positive size are compared.
     """
 
@@ -40,7 +39,6 @@ class FleetCause:
     """A cause found by a diagnosis.
 
     Attributes:
-        verdict: see docs/verdicts.md.
         probability: given the catalogue of causes; None if not computed.
     """
 
@@ -68,9 +66,6 @@ class FleetSession:
         machine: serial number or name, with the session if it counts apart; empty if unreadable.
         started: first run, ISO 8601; None if not noted.
         state: `done`, `up-to-date` or `failed`.
-        problem: empty without failure.
-        files: within the results' folder.
-        headline: findings in a few words.
         compared: whether it is its machine's last session.
     """
 
@@ -91,8 +86,6 @@ class Scored:
     """One quantity of one machine against its sisters.
 
     Attributes:
-        of: circle in words; may be empty.
-        uncertainty: standard; None if unknown.
         usual: middle of the sisters; None if unknown.
         scatter: their standard deviation beyond uncertainties; None if unknown.
         score: standard normal for a like machine; None if unknown.
@@ -123,11 +116,7 @@ class Scored:
 
 @dataclass(frozen=True)
 class SharedCause:
-    """A cause of several machines.
-
-    Attributes:
-        false_claims: expected errors in `found_in` by probability.
-    """
+    """A cause of several machines."""
 
     name: str
     found_in: tuple[str, ...]
@@ -137,12 +126,10 @@ class SharedCause:
 
 @dataclass(frozen=True)
 class FleetComparison:
-    """Machines held against one another.
+    """Machines compared with one another.
 
     Attributes:
         false_alarms: probability that like machines have any marked value.
-        causes: of any machine.
-        notes: omissions with reasons.
     """
 
     false_alarms: float
@@ -165,8 +152,6 @@ class FleetResult(Framed):
 
     Attributes:
         task: `calibrate`, `circles`, `diagnose` or `report`.
-        page: with a row per machine.
-        notes: on sessions without serial number.
         comparison: None without comparable values.
     """
 

@@ -44,7 +44,7 @@ class Framed:
         raise NotImplementedError
 
     def sentences(self) -> list[str]:
-        """The answer in words, which a notebook shows above the table; none where the table is the answer."""
+        """Return the answer in words, shown above a notebook's table; none if the table is the answer."""
         return []
 
     def to_dict(self) -> dict[str, Any]:
@@ -73,9 +73,6 @@ class Framed:
         Args:
             ax: Axes for one panel; None: a figure of all.
             panel: its name, or the begin of it; None: the first.
-
-        Returns:
-            The Axes or the Figure, which a notebook shows.
 
         Raises:
             OutputError: it has no figure.
@@ -153,7 +150,6 @@ class Framed:
 
 
 def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:
-    """Return the names of all columns in the order of their first row."""
     return list(dict.fromkeys(name for row in rows for name in row))
 
 

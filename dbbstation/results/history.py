@@ -33,7 +33,7 @@ class HistorySession:
 
 @dataclass(frozen=True)
 class ChangedQuantity:
-    """By how much a quantity changed."""
+    """Change of a quantity."""
 
     quantity: str
     difference: float
@@ -46,7 +46,7 @@ class HistoryChange:
     """Changes of a machine from one session on.
 
     Attributes:
-        beside: other news of that session, in words.
+        beside: other changes of that session, in words.
     """
 
     verdict: str
@@ -62,7 +62,6 @@ class HistoryEvent:
 
     Attributes:
         verdict: `changed` or `stands out`.
-        since: first session.
         found: session that showed it.
         decided_by: `stated-uncertainty` or `control-chart`.
     """
@@ -80,9 +79,6 @@ class HistoryValue:
     """One quantity in one session, with the chart's values; None if not watched.
 
     Attributes:
-        started: ISO 8601.
-        value: mean over runs, in the quantity's unit.
-        u: standard uncertainty; None if unknown.
         z: standard normal without change.
     """
 
@@ -101,16 +97,12 @@ class QuantityHistory:
     """One quantity of one machine over its sessions.
 
     Attributes:
-        quantity: unique words within the machine.
         figure: such as `G`, or a parameter.
-        test: None for a parameter.
-        direction: None for a parameter.
         of: circle in words, or a parameter's error source.
         why_not: None if watched.
-        limit: greatest size by the shop's tolerances, or None.
+        limit: greatest size by the shop's tolerances.
         conformity: of the last value [ISO 14253-1].
         exceeded_sessions: beyond it by more than U.
-        level: of the last stretch.
         scatter_in_u: of the last stretch, in stated uncertainties.
         sessions_lacking: before the next comparison.
         decided_by: `stated-uncertainty` or `control-chart`, or None.
@@ -139,12 +131,7 @@ class QuantityHistory:
 
 @dataclass(frozen=True)
 class WatchLimits:
-    """Limits of every quantity, in standard deviations.
-
-    Attributes:
-        reference: subtracted from a cumulative sum with each session.
-        single_limit: size of an outstanding session.
-    """
+    """Limits of every quantity, in standard deviations."""
 
     reference: float
     decision_interval: float
@@ -181,12 +168,11 @@ class LeftOut:
 
 @dataclass(frozen=True, kw_only=True)
 class HistoryResult(Framed):
-    """Histories of the machines whose sessions lie in a folder.
+    """Histories of the machines with sessions in a folder.
 
     Attributes:
         false_alarms_per_session: over all quantities of a machine.
-        figures: meaning of the figures.
-        worked_out: sessions and models read now, not from the index.
+        worked_out: sessions and models computed now, not read from the index.
         model_warnings: of each session's model, by session; `remarks` begin with them.
     """
 

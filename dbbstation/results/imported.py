@@ -8,11 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class TakenRun:
-    """A run of the new session.
-
-    Attributes:
-        computed: values that no file has.
-    """
+    """A run of the new session."""
 
     file: str
     run: str
@@ -26,7 +22,6 @@ class ImportResult:
 
     Attributes:
         written: False for a dry run.
-        mapping: content of the mapping's file.
         statements: assumptions, computations and omissions, noted in the session.
     """
 

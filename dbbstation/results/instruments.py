@@ -16,13 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class InstrumentResult:
-    """An instrument.
-
-    Attributes:
-        profile: shown variant, or empty.
-        line: serial settings of its protocol file.
-        protocol: whole file; absent in the list.
-    """
+    """An instrument."""
 
     name: str
     profile: str
@@ -46,11 +40,7 @@ class InstrumentsResult:
 
 
 def instrument_result(protocol: Protocol, profiles: Iterable[str], *, whole: bool = False) -> InstrumentResult:
-    """Return an instrument.
-
-    Args:
-        whole: include the whole file.
-    """
+    """Return an instrument."""
     return InstrumentResult(
         name=protocol.name,
         profile=protocol.profile,

@@ -10,12 +10,7 @@ from dbbstation.plan.repeatability import HolderResult
 
 @dataclass(frozen=True)
 class MeasuredBall:
-    """A measured ball.
-
-    Attributes:
-        centre_mm: X, Y, Z in the jig's frame.
-        change_um: against the former jig, X, Y, Z; None for a new ball.
-    """
+    """A measured ball: centre in the jig's frame and change against the former jig, None for a new ball."""
 
     centre_mm: tuple[float, ...]
     change_um: tuple[float, ...] | None
@@ -32,11 +27,7 @@ class SheetResult:
 
 @dataclass(frozen=True)
 class HoldersResult:
-    """What `jig holders` found.
-
-    Attributes:
-        jig: written file, or None.
-    """
+    """What `jig holders` found."""
 
     holders: Mapping[str, HolderResult]
     jig: str | None

@@ -33,8 +33,6 @@ def level_sentences(
 
     Args:
         values: numbers of laws, by law and number.
-        rows: what took part, such as `tests`.
-        what: differs.
     """
     found = [*_difference(levels.differs, unit, what, rows)]
     for one in levels.follows:
@@ -46,7 +44,7 @@ def level_sentences(
 
 
 def short_sentences(levels: Levels, unit: str, what: str) -> tuple[str, ...]:
-    """Return what is said first: whether anything differs, and what it follows most, with the error in tests that took no part."""
+    """Return two sentences: whether anything differs, and its main variable with the error in held-out tests."""
     first = next(_difference(levels.differs, unit, what, "tests"))
     largest = max(levels.follows, key=lambda one: one.rms, default=None)
     if largest is None:
@@ -56,7 +54,7 @@ def short_sentences(levels: Levels, unit: str, what: str) -> tuple[str, ...]:
 
 
 def no_correction(levels: Levels) -> str:
-    """Why no correction is offered, as a sentence."""
+    """Return why no correction is offered, as a sentence."""
     if levels.differs.gain is None:
         return "No correction is offered: the corrected values leave more of these rows than the values as simulated."
     return "No correction is offered: the corrected values predict held-out rows no better than as simulated. The refit may be at fault."
@@ -82,7 +80,7 @@ def _difference(one: DifferenceFound, unit: str, what: str, rows: str) -> Iterat
 
 
 def _hidden(one: DifferenceFound, unit: str) -> Iterator[str]:
-    """What fitted parameters conceal of causes, and what would show it."""
+    """Return the hidden part of causes and measurements that would show it."""
     named = [d for d in one.detectable if d.size is not None and d.confirm is not None]
     for d in [d for d in named if d.concealed > LIKELY][:MOST_LISTED]:
         share = f"{100.0 * d.concealed:.0f} %"
@@ -135,7 +133,7 @@ def _law(form: LawForm, values: Mapping[str, Mapping[str, Value]], rows: str) ->
 
 
 def _numbers(values: Mapping[str, Value]) -> str:
-    """Numbers of a law, with unit and u; those of a curve say little by themselves."""
+    """Return numbers of a law, with unit and u; curves are omitted."""
     if not values or len(values) > MOST_LISTED:
         return ""
     return f", {', '.join(f'{name} {value.in_words}' for name, value in values.items())}"

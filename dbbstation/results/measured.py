@@ -12,11 +12,7 @@ from dbbstation.quality.finding import Finding
 
 @dataclass(frozen=True, kw_only=True)
 class RecordedRun(OfRun):
-    """A run of the session.
-
-    Attributes:
-        mounting: of the ball; None if not counted.
-    """
+    """A run of the session."""
 
     mounting: int | None
     state: str
@@ -25,14 +21,7 @@ class RecordedRun(OfRun):
 
 @dataclass(frozen=True, kw_only=True)
 class CompletedRun(RecordedRun):
-    """A newly measured run with its first figures.
-
-    Attributes:
-        lost: missing samples.
-        doubtful: samples marked by the instrument.
-        problem: None with a circle.
-        centre_deviation_um: absent without a circle.
-    """
+    """A newly measured run with its first figures."""
 
     samples: int
     lost: int
@@ -46,12 +35,7 @@ class CompletedRun(RecordedRun):
 
 @dataclass(frozen=True)
 class MeasuredSession:
-    """A session.
-
-    Attributes:
-        state: of the sequence at its end.
-        fault: that ended it, or None.
-    """
+    """A session."""
 
     session: str
     state: str

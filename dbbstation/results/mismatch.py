@@ -29,7 +29,6 @@ class VariableResult:
     """A column that the difference may follow.
 
     Attributes:
-        kind: such as `angle` or `time`.
         period: in that unit, or None.
     """
 
@@ -62,12 +61,9 @@ class NoiseResult:
     """Noise of one row.
 
     Attributes:
-        sigma: standard deviation, in the table's unit.
         rows_as_one: correlated neighbours that count as one row.
         measured_in_order: whether the row order is known.
-        order: of the autoregression.
         degrees_of_freedom: of Student's t; None for normal noise.
-        grows_with: variable of its variance, or None.
     """
 
     sigma: float
@@ -81,11 +77,7 @@ class NoiseResult:
 
 @dataclass(frozen=True)
 class ResidualRms:
-    """Rms of measured less simulated values, in the table's unit.
-
-    Attributes:
-        before: parameters refitted, no effects.
-    """
+    """Rms of measured less simulated values, in the table's unit."""
 
     before: float
     after: float
@@ -96,7 +88,6 @@ class HeldOutRms:
     """Errors of all held-out parts, in the table's unit.
 
     Attributes:
-        before: parameters refitted.
         worse: whether corrected values predict worse than simulated ones.
     """
 
@@ -113,10 +104,7 @@ class EffectResult:
 
     Attributes:
         verdict: see docs/verdicts.md.
-        acts: `always` or `once`.
-        persists: a single event, confirmed by other parts.
-        recurs: several events.
-        gains: in parts that did not choose it; None if not tested.
+        persists: a single event that other parts confirm.
         form: family; None for own physics.
         sigmas: norm over standard deviation.
         confounded: R² on the parameters.
@@ -161,20 +149,11 @@ class MismatchResult(Framed):
     """Findings in a table of measured and simulated values.
 
     Attributes:
-        unit: of these values; may be empty.
-        blocks: names of runs.
-        variables: that the difference may follow.
         levels: existence, variables and law of a difference.
         mismatch: whether it exceeds noise.
         offset: mean difference; None if not allowed.
-        held_out_rms: None if not tested.
-        cancelling: None without such effects.
-        parameters: refitted.
         left: whether anything exceeds noise.
         not_asked: own physics not tested, with reasons by name.
-        stopped: why the search ended early; may be empty.
-        corrected: file of the table; absent if none was written.
-        figure: absent if none was written.
         table: columns by name, with corrected simulation and residual.
     """
 
@@ -201,7 +180,7 @@ class MismatchResult(Framed):
     table: Annotated[Mapping[str, tuple[str | float, ...]], AsItIs, Kept]
 
     def sentences(self) -> list[str]:
-        """The answer in three levels, in words; a notebook shows it above the table."""
+        """Return the answer in three levels, in words; a notebook shows it above the table."""
         return level_sentences(self.levels, self.unit, {one.name: one.values for one in self.findings})
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:

@@ -14,11 +14,7 @@ LEAST_PRINTED = 1e-99
 
 
 def model_warnings(identified: IdentifiedModel) -> tuple[str, ...]:
-    """Return a model's warnings, a sentence each; may be empty.
-
-    Args:
-        identified: with its fit's numbers.
-    """
+    """Return a model's warnings, a sentence each; may be empty."""
     report = identified.report
     told = [*missing_physics_warnings(report), *_undecided(report), *unknown_cause_notes(identified.model)]
     return tuple(told)
@@ -44,11 +40,7 @@ def missing_physics_warnings(report: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def exceeds(rms_um: float, probability: float) -> str:
-    """Return how far a residual exceeds chance, in words.
-
-    Args:
-        rms_um: beyond noise and mountings.
-    """
+    """Return how far a residual exceeds chance, in words."""
     return f"the residual exceeds noise and mountings by {rms_um:.2f} µm rms (probability by chance {chance_in_words(probability)})"
 
 

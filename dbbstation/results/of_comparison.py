@@ -37,11 +37,7 @@ def comparison_result(
     drawing: Callable[[object], bytes] | None = None,
     notes: tuple[str, ...] = (),
 ) -> ComparisonResult:
-    """Return the result of a comparison; lengths in µm, largest runs first.
-
-    Args:
-        unlike: other differences.
-    """
+    """Return the result of a comparison; lengths in µm, largest runs first."""
     largest_first = sorted(found.runs, key=lambda run: (-run.differs, -float(np.sum(run.found_mm**2)), -run.rms_mm))
     pairs, halves, held_out = found.matching, found.halves_mm, found.trial.held_out
     before, after = found.held_out

@@ -37,11 +37,7 @@ if TYPE_CHECKING:
 
 
 def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> DiagnosisFigures:
-    """Return the figures of a diagnosis.
-
-    Args:
-        lacking: reasons against further sources, by name.
-    """
+    """Return the figures of a diagnosis."""
     rest = diagnosis.unexplained
     before, after = diagnosis.held_out
     return DiagnosisFigures(
@@ -105,7 +101,7 @@ def diagnosis_result(
 
 
 def kept_of(figures: DiagnosisFigures) -> dict[str, object]:
-    """Return what a model file keeps of its diagnosis: doubts about causes, and limits that it reached."""
+    """Return the part of a diagnosis kept in a model file: doubts about causes, and limits reached."""
     open_ones = (one for one in figures.sources if one.verdict == Verdict.AMBIGUOUS)
     groups = {frozenset((one.name, *one.ambiguous_with)): [one.name, *one.ambiguous_with] for one in open_ones}
     return {
@@ -118,7 +114,6 @@ def kept_of(figures: DiagnosisFigures) -> dict[str, object]:
 
 
 def _circularity(diagnosis: Diagnosis) -> tuple[CircularityLeft, ...]:
-    """Return every run's residual circularity under both models."""
     return tuple(
         CircularityLeft(
             run.test,
@@ -148,7 +143,6 @@ def _workspace(diagnosis: Diagnosis) -> WorkspaceGain | None:
 
 
 def _mountings(diagnosis: Diagnosis) -> list[CauseResult]:
-    """Return deviating balls and bars by source name."""
     causes = []
     for name in dict.fromkeys(SOURCE_OF.values()):
         of = [outlier for outlier in diagnosis.outliers if SOURCE_OF.get(outlier.kind) == name]

@@ -54,13 +54,7 @@ def history_result(
     worked_out: int = 0,
     model_warnings: Mapping[str, tuple[str, ...]] | None = None,
 ) -> HistoryResult:
-    """Return histories as a result.
-
-    Args:
-        left_out: unusable sessions and models with reasons, by name.
-        worked_out: sessions and models read now.
-        model_warnings: of each session's model, by session.
-    """
+    """Return histories as a result."""
     return HistoryResult(
         coverage_factor=asked.coverage_factor,
         false_alarms_per_session=asked.false_alarms,
@@ -115,7 +109,6 @@ def _changes(one: MachineHistory, sessions: Sequence[HistorySession]) -> Iterato
 
 
 def _beside(sessions: Sequence[SessionFigures], since: int) -> Iterator[str]:
-    """Yield other news of a session that may explain a change."""
     if not since:
         return
     before, after = sessions[since - 1], sessions[since]

@@ -33,11 +33,7 @@ def mismatch_result(
     drawing: Callable[[object], bytes] | None = None,
     notes: tuple[str, ...] = (),
 ) -> MismatchResult:
-    """Return the result of a table.
-
-    Args:
-        table: columns with the corrected simulation; None: none.
-    """
+    """Return the result of a table."""
     compared = found.table
     return MismatchResult(
         unit=compared.unit,

@@ -95,7 +95,6 @@ def _term(answer: SimulatorComparison, one: CauseFinding) -> PortTerm:
 
 
 def _why(one: CauseFinding) -> str:
-    """Return a sentence for a finding without one."""
     if one.verdict is not Verdict.IDENTIFIED:
         return ""
     hidden = f" The parameters had taken up {100.0 * one.confounded:.0f} % of it." if one.confounded > HIDDEN else ""

@@ -13,11 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class OnePanel:
-    """Axes that take one panel of a figure.
-
-    Attributes:
-        name: or its beginning; None: the first.
-    """
+    """Axes that take one panel of a figure."""
 
     axes: Any
     name: str | None

@@ -10,12 +10,7 @@ from dbbstation.results.circle_figures import PlaneVector
 
 @dataclass(frozen=True)
 class DrawnCircle(OfRunInSession):
-    """A drawn run.
-
-    Attributes:
-        u_g_um: standard uncertainty; None if unknown.
-        centre_um: least-squares less commanded centre.
-    """
+    """A drawn run."""
 
     g_um: float
     u_g_um: float | None

@@ -25,17 +25,11 @@ class PredictionResult(Framed):
     """Actual poses for commanded ones.
 
     Attributes:
-        file: None if none was written.
-        common_shift_um: mean of X, Y and Z, without effect on a part-set zero.
+        common_shift_um: mean of X, Y and Z, which a zero set on the part removes.
         error_about_mean_rms_um: without the common shift.
         greatest_uncertainty_um: standard, of a position; None if unknown.
         greatest_uncertainty_by_axis_um: the same of X, Y and Z each.
-        uncertainty_not_known_because: None if known.
         directions_lost: undetermined by the model's recordings.
-        unknown_causes: sources without a cause.
-        model_warnings: such as missing physics.
-        commanded: poses, shape (n, 6) [mm, deg].
-        actual: poses, shape (n, 6) [mm, deg].
         uncertainty_mm: standard, of X, Y and Z, shape (n, 3); NaN if unknown.
     """
 
@@ -76,13 +70,7 @@ def prediction_result(
     uncertainty_mm: NDArray[np.float64],
     file: str | None = None,
 ) -> PredictionResult:
-    """Return the result of a prediction.
-
-    Args:
-        commanded: shape (n, 6) [mm, deg].
-        actual: shape (n, 6) [mm, deg].
-        uncertainty_mm: shape (n, 3); NaN if unknown.
-    """
+    """Return the result of a prediction."""
     figures = pose_errors(commanded, actual, uncertainty_mm)
     unknown = None in figures.greatest_uncertainty_by_axis_um.values()
     return PredictionResult(

@@ -25,16 +25,13 @@ class WrittenProgram:
     """One program.
 
     Attributes:
-        file: or its name if not written.
         points: moves at feed.
         greatest_correction_um: None in a nominal program.
         chord_error_um: largest distance between a move and its path.
         model_uncertainty_um: greatest standard uncertainty of the tool tip along the path; None if unknown.
-        model_uncertainty_by_axis_um: of X, Y and Z; None in a nominal program.
-        model_uncertainty_not_known_because: None if known.
-        tilt_left_um: tilt correction left out, felt 100 mm from the tip.
-        feed_s: time at feed as reckoned; None if the control's look-ahead is not known.
-        remarks: what is not as asked for, in words.
+        tilt_left_um: tilt correction left out, 100 mm from the tip.
+        feed_s: computed time at feed; None for an unknown look-ahead.
+        remarks: unmet requests, in words.
     """
 
     file: str
@@ -58,11 +55,8 @@ class ProgramsResult(Framed):
     """Programs, nominal or compensated.
 
     Attributes:
-        model_sha256: of its file, or None.
-        acceleration_mm_s2: that pieces suit; None if the dialect states no look-ahead.
-        acceleration_known: whether the machine file states it.
+        acceleration_mm_s2: basis of the pieces' lengths; None if the dialect states no look-ahead.
         model_warnings: such as missing physics; empty for nominal programs.
-        acceleration_in_words: with its origin; may be empty.
     """
 
     dialect: str
@@ -110,11 +104,7 @@ def programs_result(
     notes: tuple[str, ...] = (),
     model_warnings: tuple[str, ...] = (),
 ) -> ProgramsResult:
-    """Return programs as a result.
-
-    Args:
-        machine: of compensated programs; else None.
-    """
+    """Return programs as a result."""
     planned = None if dialect.look_ahead is None else machine
     return ProgramsResult(
         notes=notes,

@@ -19,7 +19,7 @@ class Ranked:
 
     Attributes:
         verdicts: of the model's diagnosis, by cause.
-        why_not: why there are none; else empty.
+        why_not: reason if there are no verdicts; else empty.
         said: the model's diagnosis in two sentences; may be empty.
     """
 

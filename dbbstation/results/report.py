@@ -18,12 +18,7 @@ from dbbstation.results.frame import Framed
 
 @dataclass(frozen=True)
 class CertificateState:
-    """Whether a report is a certificate.
-
-    Attributes:
-        lacking: missing parts; empty for a certificate.
-        place: None if not stated.
-    """
+    """Whether a report is a certificate."""
 
     title: str
     lacking: tuple[str, ...]
@@ -32,11 +27,7 @@ class CertificateState:
 
 @dataclass(frozen=True)
 class MeasuredSize:
-    """A figure of one circle as measured.
-
-    Attributes:
-        u_um: standard uncertainty; None if a cause of unknown size counts.
-    """
+    """A figure of one circle as measured."""
 
     um: float
     u_um: float | None
@@ -60,12 +51,7 @@ class MeanAndLargest:
 
 @dataclass(frozen=True)
 class MeasuredMean:
-    """Mean and largest of a figure, over circles measured both times if there are earlier ones.
-
-    Attributes:
-        now: None without circles.
-        before: None without earlier circles.
-    """
+    """Mean and largest of a figure, over circles measured both times if there are earlier ones."""
 
     quantity: str
     circles: int
@@ -83,12 +69,9 @@ class ReportResult(Framed):
     """The numbers of a report, and where it was written.
 
     Attributes:
-        pdf: None if not printed.
-        verdict: by the shop's tolerances.
         circles: figures after ISO 230-4.
-        causes: contributions, the greatest first.
         causes_of: session of these circles, or None.
-        model: what it leaves; None without a model.
+        model: its residual; None without a model.
     """
 
     report: str

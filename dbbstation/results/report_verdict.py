@@ -29,13 +29,7 @@ def verdict_of(
     identified: IdentifiedModel | None = None,
     ranked: Ranked | None = None,
 ) -> ReportVerdict:
-    """Return the verdict of tolerances held against measured circles.
-
-    Args:
-        held: empty without tolerances.
-        identified: None without a model.
-        ranked: its causes, the greatest named first; or None.
-    """
+    """Return the verdict of tolerances held against measured circles."""
     said = {one.conformity for one in held}
     repeat = (*_to_repeat(found.circles), *_of_the_model(found, identified))
     if not said - {None}:
@@ -82,7 +76,7 @@ def _reason(held: Held, coverage_factor: float) -> str:
 
 
 def _to_repeat(circles: Iterable[MeasuredCircle]) -> list[str]:
-    """Return runs to repeat, which comes before repairing the machine."""
+    """Return runs to repeat before repairing the machine."""
     told = []
     for one in circles:
         wrong = () if one.judgement is None else one.judgement.wrong

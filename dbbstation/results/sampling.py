@@ -1,4 +1,4 @@
-"""What an instrument sees of a plan's circles."""
+"""The readings of an instrument on a plan's circles."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SampledCircle:
-    """What an instrument sees of one circle.
+    """The readings of an instrument on one circle.
 
     Attributes:
         spacing_deg: between readings.

@@ -16,13 +16,7 @@ from dbbstation.trace.recording import Recording
 
 @dataclass(frozen=True)
 class ListedRun:
-    """A run of a session.
-
-    Attributes:
-        mounting: of the ball; None if not counted.
-        started: ISO 8601; None if not noted.
-        file: in the session's folder.
-    """
+    """A run of a session."""
 
     run: str
     test: str
@@ -51,12 +45,7 @@ class ListedSession:
 
 @dataclass(frozen=True)
 class ListedEvent:
-    """An event of a session.
-
-    Attributes:
-        at: ISO 8601; None if unknown.
-        about: its runs or keys of the session file.
-    """
+    """An event of a session."""
 
     event: int
     at: str | None
@@ -70,7 +59,6 @@ class SessionEvents:
     """The event log of a session.
 
     Attributes:
-        events: in order.
         anchor: last link; None without a log.
     """
 
@@ -84,8 +72,6 @@ class SimulatedSession(Framed):
     """A simulated session.
 
     Attributes:
-        session: folder; None if not written.
-        recordings: by run, such as `a ccw 1`.
         writing: writes it to a new folder.
     """
 

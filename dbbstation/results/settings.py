@@ -14,7 +14,6 @@ class ShownSetting:
     """One setting.
 
     Attributes:
-        value: in the key's unit; None if not set.
         origin: file and line, or `dbbstation`; None if not set.
     """
 
@@ -24,13 +23,7 @@ class ShownSetting:
 
 @dataclass(frozen=True)
 class ShopTolerance:
-    """A tolerance of the shop.
-
-    Attributes:
-        filter: of the figure in words, or None.
-        tests: empty for all.
-        directions: empty for both.
-    """
+    """A tolerance of the shop."""
 
     quantity: str
     largest_um: float
@@ -41,12 +34,7 @@ class ShopTolerance:
 
 @dataclass(frozen=True)
 class SettingsResult:
-    """The shop's settings.
-
-    Attributes:
-        files: the first with a key decides.
-        tolerances_from: their file, or None.
-    """
+    """The shop's settings; the first file with a key decides."""
 
     files: tuple[str, ...]
     values: Mapping[str, ShownSetting]

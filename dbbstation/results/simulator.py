@@ -22,11 +22,7 @@ from dbbstation.results.levels_text import level_sentences
 
 @dataclass(frozen=True)
 class SimulatedOutput:
-    """An output of the simulator.
-
-    Attributes:
-        noise: standard deviation of one row, in its unit.
-    """
+    """An output of the simulator."""
 
     name: str
     unit: str
@@ -44,11 +40,7 @@ class SimulatedRun:
 
 @dataclass(frozen=True)
 class SimulationRms:
-    """Rms of measured less simulated values.
-
-    Attributes:
-        corrected: with missing terms.
-    """
+    """Rms of measured less simulated values."""
 
     as_simulated: float
     refitted: float
@@ -57,11 +49,7 @@ class SimulationRms:
 
 @dataclass(frozen=True)
 class SimulationNoise:
-    """Noise of one row.
-
-    Attributes:
-        degrees_of_freedom: of Student's t; None for normal noise.
-    """
+    """Noise of one row."""
 
     sigma: float
     rows_as_one: float
@@ -94,12 +82,10 @@ class PortTerm:
 
     Attributes:
         verdict: see docs/verdicts.md.
-        about: from the model file.
         form: how it follows its signals.
         sigmas: norm of its effect over the standard deviation.
         confounded: R² of its effect on the parameters.
         linear_and_true_differ_by: distance of linear and simulated answer; None if unknown.
-        gains: in parts that did not choose it; None if not tested.
         equivalent: terms indistinguishable by these recordings.
     """
 
@@ -124,11 +110,7 @@ class PortTerm:
 
 @dataclass(frozen=True)
 class SimulationsRun:
-    """Number of simulations.
-
-    Attributes:
-        most: allowed; None without limit.
-    """
+    """Number of simulations."""
 
     run: int
     most: int | None
@@ -143,13 +125,7 @@ class SimulatorResult(Framed):
     Attributes:
         levels: existence, signals and ports, and term of a difference.
         settled: whether the search ended at one set of terms.
-        stopped: reason of an early end; may be empty.
-        held_out_rms: None if not tested.
-        left: whether anything exceeds noise.
         not_asked: terms not compared, with reasons by name.
-        out: missing terms as code; absent if none was written.
-        corrected: absent if none was written.
-        figure: absent if none was written.
     """
 
     simulator: str
@@ -177,7 +153,7 @@ class SimulatorResult(Framed):
     rows_csv: Annotated[str, Kept] = ""
 
     def sentences(self) -> list[str]:
-        """The answer in three levels, in words; a notebook shows it above the table."""
+        """Return the answer in three levels, in words; a notebook shows it above the table."""
         return level_sentences(self.levels, self.unit, {one.name: one.values for one in self.findings})
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:  # noqa: ARG002 - code states none

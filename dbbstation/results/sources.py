@@ -23,14 +23,12 @@ class SourceParameter:
 
 @dataclass(frozen=True)
 class SourceDescription:
-    """A cause's own description.
+    """A cause's description.
 
     Attributes:
-        belongs_to: `machine`, `session`, `mounting` or `instrument`.
         role: always fitted, candidate of the diagnosis, or keeper of a curve.
         varies_with: variable of real machines' departure from its formula; None: the pose.
         form_uncertainty: share of that departure, one standard deviation.
-        parameters: None without a machine.
     """
 
     name: str

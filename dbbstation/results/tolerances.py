@@ -32,7 +32,6 @@ class ToleratedCircle(OfRunInSession):
     Attributes:
         direction: `ccw` or `cw`; `both` for both together.
         sizes: by figure; G about the least-squares circle, up to 30 undulations per revolution; empty for both directions.
-        others: further toleranced figures, by figure and filter cut-off.
     """
 
     sizes: Mapping[CircleFigure, Size]
@@ -57,10 +56,6 @@ class Held:
 
     Attributes:
         conformity: exceeded if one circle exceeds it, else undecided if one is; None without circles.
-        worst: circle with the largest figure, or None.
-        exceeded: number of circles.
-        undecided: number of circles within U of the limit.
-        circles: number that it applies to.
     """
 
     tolerance: Tolerance
@@ -75,11 +70,7 @@ class Held:
 def tolerated_circles(
     circles: Iterable[MeasuredCircle], tolerances: Sequence[Tolerance] = ()
 ) -> tuple[ToleratedCircle, ...]:
-    """Return the figures of circles that may have a tolerance.
-
-    Args:
-        tolerances: their figures and filters are computed too.
-    """
+    """Return the figures of circles that may have a tolerance."""
     wanted = [
         (one.figure, one.upr)
         for one in tolerances
@@ -117,7 +108,6 @@ def tolerated_pairs(pairs: Iterable[MeasuredPair], tolerances: Sequence[Toleranc
 
 
 def _size_of(one: CircleAnalysis, known: SetUpKnowledge, figure: CircleFigure, upr: int) -> Size:
-    """Return the size of G with another filter, or of the farther end of F."""
     filtered = refiltered(one, Filter(upr))
     quantities = (
         (BudgetQuantity.G_LS,)
@@ -158,7 +148,7 @@ def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, S
 
 
 def _off_centre(x: Budget, y: Budget) -> Size:
-    """Return a centre offset's length, less what its uncertainty adds; u along it from both axes."""
+    """Return a centre offset's length, minus its bias by uncertainty; u along it from both axes."""
     off, u = np.array([x.value_um, y.value_um]), np.array([x.known_um, y.known_um])
     length = float(np.hypot(*off))
     # A centre that is not off has no direction: either axis may be the one that counts.
@@ -176,7 +166,7 @@ def filter_words(tolerance: Tolerance) -> str | None:
 def held_against(
     tolerances: Sequence[Tolerance], circles: Sequence[ToleratedCircle], coverage_factor: float
 ) -> tuple[Held, ...]:
-    """Hold every tolerance against its circles; arguments as of `conformity`."""
+    """Compare every tolerance with its circles; arguments as of `conformity`."""
     return tuple(_held(tolerance, circles, coverage_factor) for tolerance in tolerances)
 
 

@@ -2,8 +2,8 @@
 
 Like machines scatter normally about a middle, plus own standard uncertainties. Weights and scatter follow [Paule and
 Mandel 1982, J. Res. NBS 87, 377; DerSimonian and Kacker 2007, Contemp. Clin. Trials 28, 105]. The farthest machine is
-removed repeatedly, up to a quarter, each tested against the rest; the last significant one gives the number [Rosner 1983,
-Technometrics 25, 165]. For one machine this is the test of Grubbs.
+removed repeatedly, up to a quarter, each tested against the rest; the last significant one gives the number [Rosner
+1983, Technometrics 25, 165]. For one machine this is the test of Grubbs.
 """
 
 from __future__ import annotations
@@ -59,12 +59,9 @@ class Sisters:
 def held_against_sisters(
     values: NDArray[np.float64], u: NDArray[np.float64], false_alarms: float = FALSE_ALARMS
 ) -> Sisters:
-    """Hold machines against their sisters.
+    """Compare machines with their sisters: values and standard uncertainties, shape (q, n), NaN if unknown.
 
-    Args:
-        values: shape (q, n); NaN for missing.
-        u: standard uncertainties, shape (q, n); NaN or 0 if unknown, covered by scatter.
-        false_alarms: probability of any unlike value over all, for like machines.
+    `false_alarms` is the probability of any unlike value over all like machines.
     """
     unlike = unlike_machines(values, u, false_alarms)
     return _scored(values, u, unlike, _share(values, false_alarms))

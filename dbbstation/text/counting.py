@@ -23,17 +23,17 @@ class Repeated(Protocol):
 
     @property
     def test(self) -> str:
-        """Name of the test."""
+        """Return the test's name."""
         ...
 
     @property
     def direction(self) -> str:
-        """Sense of travel."""
+        """Return the sense of travel."""
         ...
 
     @property
     def repeat(self) -> int:
-        """Counts the runs of this test and direction."""
+        """Return the number of the run of this test and direction."""
         ...
 
 

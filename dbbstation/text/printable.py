@@ -1,4 +1,4 @@
-r"""Text typed by others, made safe for a terminal: control characters are shown, not obeyed."""
+r"""Text typed by others, made safe for a terminal: control characters are shown, not executed."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def _counted(many: re.Match[str]) -> str:
 
 
 def printable(text: str) -> str:
-    r"""Return a text of any number of lines with `\x1b` in place of an escape character, and so on; `\n` and `\t` stay."""
+    r"""Return a text with `\x1b` in place of an escape character, and so on; `\n` and `\t` are kept."""
     return text if text.isascii() and text.isprintable() else _MANY.sub(_counted, text).translate(TEXT)
 
 
 def on_one_line(text: str) -> str:
-    r"""Return a text as `printable` does, with `\x0a` in place of an end of a line: a name, a cell of a table."""
+    r"""Return a name or cell as `printable` does, with `\x0a` in place of a line end."""
     return text if text.isascii() and text.isprintable() else _MANY.sub(_counted, text).translate(_ONE_LINE)

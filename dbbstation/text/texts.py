@@ -7,13 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Texts:
-    """Texts of a cause.
-
-    Attributes:
-        shows: symptoms in recordings.
-        confirm: test on the machine or the drive.
-        origin: where the equation comes from.
-    """
+    """Texts of a cause."""
 
     what: str
     shows: str

@@ -1,4 +1,4 @@
-"""Why tests lose directions, and which tests would show them."""
+"""Why tests lose directions, and which tests would determine them."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ TILTED_DEG = 2.0
 
 
 def gaps(calibration: Calibration) -> tuple[str, ...]:
-    """Return what is missing if directions are lost, in words; may be empty.
+    """Return the missing measurements behind lost directions, in words; may be empty.
 
-    The fifteen circles of [CAL Table II] lose only the common height, which raised bars show. One level loses three
-    directions, one orientation most of the rest.
+    The fifteen circles of [CAL Table II] lose only the common height, which raised bars determine. One level loses
+    three directions, one orientation most of the rest.
     """
     lost = len(calibration.directions_lost) + len(calibration.directions_regularised)
     if lost == 0:
@@ -52,5 +52,4 @@ def _spread(values: Sequence[float]) -> float:
 
 
 def _tilts(runs: Sequence[Observation]) -> float:
-    """Return the greatest difference of a tilt angle between tests [deg]."""
     return float(np.ptp([run.raw.circle.tilt_deg for run in runs], axis=0).max())

@@ -27,11 +27,7 @@ SECTORS = 720
 
 
 def misfit_of(calibration: Calibration, noise: Spectrum | None = None) -> Misfit:
-    """Return an F test of the residual's low harmonics, without ball positions in each mounting.
-
-    Args:
-        noise: measured elsewhere; None: from high harmonics of the residual.
-    """
+    """Return an F test of the residual's low harmonics, without ball positions in each mounting."""
     fitted = int(np.count_nonzero(~calibration.layout.known.random)) - len(calibration.solution.held)
     residuals, phases, mountings = _by_sector(calibration)
     return misfit(residuals, phases, mountings, fitted, noise)
@@ -45,7 +41,6 @@ def remainder_of(calibration: Calibration, noise: Spectrum) -> Remainder:
 def _by_sector(
     calibration: Calibration,
 ) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]], list[str]]:
-    """Return the residual by sectors, their angles [rad] and each run's mounting."""
     residuals, phases = [], []
     for observation, residual in zip(calibration.observations, calibration.residual_mm, strict=True):
         sector = sector_of(observation.raw, min(SECTORS, len(residual)))
@@ -56,17 +51,13 @@ def _by_sector(
 
 
 def is_missing_physics(found: Misfit) -> bool:
-    """Return whether chance fails to explain it."""
+    """Return whether chance does not explain it."""
     return found.probability < SIGNIFICANT
 
 
 @dataclass(frozen=True)
 class LeftByFit:
-    """The residual beyond noise and mountings, by an F test of low harmonics.
-
-    Attributes:
-        probability: by chance.
-    """
+    """The residual beyond noise and mountings, with its probability by an F test of low harmonics."""
 
     probability: float
     rms_um: float

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def fine_noise_mm(calibration: Calibration) -> float:
-    """Return the noise of a reading from above the smooth harmonics, which no misfit reaches [mm]."""
+    """Return the noise of a reading from above the smooth harmonics, without misfit [mm]."""
     square, count = 0.0, 0.0
     for observation, residual in zip(calibration.observations, calibration.residual_mm, strict=True):
         rough = residual - smooth(residual, np.radians(observation.raw.phi_deg))

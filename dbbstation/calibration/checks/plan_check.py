@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class PlanCheck:
     """Redundancy of the tests.
 
-    Directions determined by all single circles, less those used by the fit, can contradict the plan.
+    Directions determined by single circles, minus those used by the fit, can contradict the plan.
 
     Attributes:
         determined: by single tests, summed.
@@ -46,7 +46,8 @@ class PlanCheck:
     def enough(self) -> bool:
         """Return whether the tests can show a wrong plan.
 
-        The rest must be at least one whole circle's. Three circles leave 3 to 5, four leave 12, one shows 9.
+        The remainder must be at least one whole circle's. Three circles leave 3 to 5, four leave 12; one circle
+        determines 9.
         """
         return self.left >= self.of_one_test
 

@@ -33,7 +33,7 @@ LEAST_STATED_MM = 0.1
 
 @dataclass(frozen=True, eq=False)
 class MountingOffset:
-    """Where a ball stood in one mounting, mounting and CMM error together.
+    """A ball's place in one mounting, mounting and CMM error together.
 
     Attributes:
         stated_mm: standard deviation of each coordinate, shape (3,) [mm].
@@ -67,10 +67,9 @@ class ScatterCheck:
 
     Attributes:
         stated_um: standard deviation per axis, mounting and CMM together.
-        found_um: None if undetermined.
         interval_um: 95 % of that; None if undetermined.
         fits: whether they scatter no more than stated; None if undetermined.
-        finding: place of the stated size relative to the interval, or untold.
+        finding: stated size relative to the interval.
     """
 
     stated_um: float

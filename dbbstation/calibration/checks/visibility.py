@@ -1,4 +1,4 @@
-"""What runs see of the machine: singular values, weak directions, indices, leverage."""
+"""Information of runs on the machine: singular values, weak directions, indices, leverage."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ STRONGEST = 5
 class Indices:
     """Observability indices O1 to O5 of scaled parameters [Sun and Hollerbach, ICRA 2008, eqs 3 to 7].
 
-    With singular values s_1 >= ... >= s_L of the sensitivity of n readings: O1 = (s_1 ... s_L)^(1/L) / sqrt(n),
-    O2 = s_L / s_1, O3 = s_L, O4 = s_L^2 / s_1, O5 = 1 / (1/s_1 + ... + 1/s_L). All grow with what is seen.
+    With singular values s_1 >= ... >= s_L of the sensitivity of n readings: O1 = (s_1 ... s_L)^(1/L) / sqrt(n), O2 =
+    s_L / s_1, O3 = s_L, O4 = s_L^2 / s_1, O5 = 1 / (1/s_1 + ... + 1/s_L). All grow with information.
     """
 
     o1: float
@@ -42,7 +42,7 @@ class Indices:
 
 @dataclass(frozen=True)
 class WeakDirection:
-    """A direction seen least.
+    """A weakly determined direction.
 
     Attributes:
         uncertainty: of its largest parameter along it, one standard deviation.
@@ -68,7 +68,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Observability:
-    """What circles see of the machine's parameters.
+    """Information of circles on the machine's parameters.
 
     Attributes:
         singular_values_mm: of readings' sensitivity to parameters in usual sizes, falling, without lost ones.
@@ -118,7 +118,6 @@ def indices(singular: NDArray[np.float64], readings: int) -> Indices:
 
 
 def _weakest(calibration: Calibration) -> tuple[WeakDirection, ...]:
-    """Return directions of greatest uncertainty, from the covariance in parameter sizes."""
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
     scale = known.scale[fitted]
@@ -154,7 +153,8 @@ def _correlations(calibration: Calibration) -> tuple[Correlation, ...]:
 def _leverage(calibration: Calibration, fitted: NDArray[np.int64]) -> dict[str, float]:
     """Return the trace of covariance times a test's own information, averaged over its random effects.
 
-    It approximates the loss without the test, in parameters. Shared effects, such as the bar's length, count as unknowns.
+    It approximates the loss without the test, in parameters. Shared effects, such as the bar's length, count as
+    unknowns.
     """
     known, noise = calibration.layout.known, calibration.noise.effective
     tests: dict[str, list[Block]] = {}

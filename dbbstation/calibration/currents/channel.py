@@ -59,7 +59,6 @@ class CurrentChannel:
     Attributes:
         current_a: one array of shape (n, 6) per run.
         usable: samples that count: logged, unclipped, after friction reversed; shape (n, 6) per run.
-        notes: omissions and limits.
     """
 
     motions: tuple[Motion, ...]
@@ -95,7 +94,6 @@ def current_channel(layout: Layout, observations: Sequence[Observation]) -> Curr
 
 
 def _motion(run: Observation, current_a: NDArray[np.float64]) -> Motion:
-    """Return a run with cleaned currents; a long one as sector means."""
     raw = replace(run.raw, logged={**run.raw.logged, **currents(current_a)})
     if run.commanded is None and len(raw) > LONG * SECTORS:
         raw = averaged(raw, SECTORS)
@@ -182,14 +180,7 @@ def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, N
 def by_themselves(
     blocks: Sequence[Block], known: Columns, noise: float = 1.0, nominal: Sequence[Block] | None = None
 ) -> tuple[NDArray[np.int64], Solution]:
-    """Solve for columns that some blocks touch, by these alone.
-
-    Args:
-        nominal: blocks for lost directions, if others.
-
-    Returns:
-        The columns, shape (c,), and their solution.
-    """
+    """Solve for columns that some blocks touch, by these alone."""
     columns = np.unique(np.concatenate([block.columns for block in blocks]))
     part = Columns(known.prior[columns], known.scale[columns], known.random[columns])
 

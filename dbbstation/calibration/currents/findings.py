@@ -36,7 +36,7 @@ SURE = 5.0
 
 @dataclass(frozen=True, eq=False)
 class MotorFindings:
-    """What the motor currents say in a fit.
+    """Findings of the motor currents in a fit.
 
     Attributes:
         noise: of each motor's reading, or sector mean in long runs; None without readings.
@@ -46,7 +46,6 @@ class MotorFindings:
         held: undetermined parameters of the drives.
         alone: centre of gravity by channel (`circles`, `currents`) and parameter, with standard deviation [mm]; None if
             undetermined alone. Empty without cog-shift.
-        notes: omissions and limits.
     """
 
     noise: tuple[Noise | None, ...]
@@ -67,13 +66,7 @@ def motor_findings(
     nominal: Sequence[Block],
     noise: Noise,
 ) -> MotorFindings | None:
-    """Return residuals and each channel's own facts.
-
-    Args:
-        channel: None without currents.
-        x: found, shape (k,).
-        noise: of a bar reading.
-    """
+    """Return residuals and each channel's own facts."""
     if channel is None:
         return None
     own, left = linearised(layout, channel, x)
@@ -101,7 +94,6 @@ def motor_findings(
 
 
 def _rms(parts: Sequence[NDArray[np.float64]]) -> float:
-    """Return the rms of all parts; NaN of nothing."""
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else np.nan
 
 

@@ -25,13 +25,10 @@ steps the last step has two or three times as many readings as the one before; a
 def cleaned(
     labels: Sequence[str], current_a: Sequence[NDArray[np.float64]]
 ) -> tuple[list[NDArray[np.float64]], list[str]]:
-    """Find usable readings of drives.
+    """Return currents with NaN at unusable readings, and notes in words, by motor.
 
     Args:
         current_a: per run, shape (n, 6), NaN for a motor without log.
-
-    Returns:
-        The same currents, NaN where they cannot be used, and notes in words, by motor.
     """
     kept = [current.copy() for current in current_a]
     notes: list[str] = []
@@ -94,6 +91,5 @@ def _limits(values: NDArray[np.float64]) -> list[float]:
 
 
 def _listed(labels: Sequence[str]) -> str:
-    """Name the first runs, with a count."""
     most = 3
     return ", ".join(labels) if len(labels) <= most else f"{', '.join(labels[:most])} and {len(labels) - most} more"

@@ -77,22 +77,18 @@ AT_NODES = frozenset({Need.POSE, Need.TIME})
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What a fit found.
+    """The outcome of a fit.
 
     Attributes:
         x: all columns, shape (k,).
         solution: covariance, directions and held rows of all columns.
         noise: of a reading.
-        observations: fitted runs.
         machine_residual_mm: per run, beyond the machine's sources.
         residual_mm: per run, beyond the measurement's effects too.
         blocks: information about x: one per circle, then motor currents.
         directions_lost: invisible to the recordings, in words.
         directions_regularised: invisible, but bounded by the machine file's tolerances.
-        prescribed: parameters held in place of lost directions; may be empty.
-        currents: None without them.
         at_limit: columns held at an end of their range.
-        settled: False if the last step still moved.
     """
 
     layout: Layout
@@ -154,7 +150,6 @@ def calibrate(
     of steps, so that curvature moves nothing along them. Tolerances of the machine file are priors.
 
     Args:
-        observations: raw, all of that machine.
         sources: None: the default ones.
         start: values by source, for shape parameters that a zero amplitude hides.
         prescribe: parameters to hold in place of lost directions, equally many; empty: chosen among base joints; None: hold the
@@ -248,11 +243,8 @@ def _approached(
 ) -> tuple[NDArray[np.float64], list[Block]]:
     """Approach a machine that is millimetres off by Gauss-Newton steps with a usual bar's noise.
 
-    Early residuals are curvature. Taken for noise they would hide visible directions. The noise is therefore read only
-    when steps no longer halve the residual.
-
-    Returns:
-        Values of all columns, shape (k,), and blocks of the circles about them.
+    Early residuals are curvature, which taken for noise would hide visible directions. The noise is therefore measured
+    only when steps no longer halve the residual.
     """
     noise = Noise(FIRST_NOISE_MM, 1.0).effective
     held = lost_directions(nominal, layout.known, noise)
@@ -301,7 +293,6 @@ def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64
 def _near(
     layout: Layout, start: Mapping[str, NDArray[np.float64]], within: float | None, amplitudes_within: float
 ) -> Layout:
-    """Return the layout with shape parameters and amplitudes known about the start."""
     nominal, prior = layout.nominal.copy(), layout.known.prior.copy()
     for term in layout.terms:
         if term.source.name not in start:
@@ -365,10 +356,9 @@ def linearise(
     x: NDArray[np.float64],
     motion_of: MotionOf = Observation.motion,
 ) -> tuple[list[Block], list[NDArray[np.float64]]]:
-    """Compress every run about x, shape (k,); a solution of the blocks is x less its nominal.
+    """Compress every run about x, shape (k,), and return the blocks with measured minus predicted lengths, shape (n,) [mm].
 
-    Returns:
-        The blocks, and per run measured minus predicted length at x, shape (n,) [mm].
+    A solution of the blocks is x minus its nominal.
     """
     model = layout.model(x)
 
@@ -390,7 +380,6 @@ def linearise(
 def _predicted(
     layout: Layout, model: MachineModel, observation: Observation, motion: Motion, x: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the active columns, shape (k,), derivatives, shape (n, k), and reading, shape (n,) [mm]."""
     reading = model.bar(motion)
     terms = [term for term in layout.terms if term.acts_on(motion)]
     jacobian = np.hstack([np.zeros((len(observation.raw), 0))] + [reading.by_fitted(term.fitted(x)) for term in terms])
@@ -454,7 +443,6 @@ def _residual(model: MachineModel, motion_of: MotionOf, run: Observation | RunNo
 
 
 def _usual_length(runs: Sequence[Observation | RunNodes]) -> int:
-    """Return the mean number of poses per run."""
     poses = sum(len((run.coarse if isinstance(run, RunNodes) else run).raw) for run in runs)
     return poses // max(len(runs), 1)
 

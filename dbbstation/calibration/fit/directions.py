@@ -34,12 +34,7 @@ class RigidPattern:
 
 
 def patterns(base_joints_mm: NDArray[np.float64], axis_of_strut: NDArray[np.float64]) -> list[RigidPattern]:
-    """Return rigid motions of the base, common strut length and uniform size, in order of trial.
-
-    Args:
-        base_joints_mm: nominal, shape (6, 3).
-        axis_of_strut: unit vectors in the middle of the travel, shape (6, 3).
-    """
+    """Return rigid motions of the base, common strut length and uniform size, in order of trial."""
     none, still = np.zeros(STRUTS), np.zeros((STRUTS, 3))
     found = [
         RigidPattern(f"all six base joints together along {axis}", none, np.tile(np.eye(3)[k], (STRUTS, 1)))
@@ -63,11 +58,7 @@ def patterns(base_joints_mm: NDArray[np.float64], axis_of_strut: NDArray[np.floa
 
 
 def in_words(layout: Layout, held: NDArray[np.float64]) -> tuple[str, ...]:
-    """Return a text for every held direction.
-
-    Args:
-        held: orthonormal rows over fitted columns in scales, shape (h, f).
-    """
+    """Return a text for every held direction."""
     fitted = np.flatnonzero(~layout.known.random)
     names = [layout.names[column] for column in fitted]
     scale = layout.known.scale[fitted]
@@ -89,11 +80,7 @@ def in_words(layout: Layout, held: NDArray[np.float64]) -> tuple[str, ...]:
 
 
 def of_circles(layout: Layout, held: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return directions without parts in motor currents, shape (g, f); purely electrical ones go.
-
-    Args:
-        held: orthonormal rows over fitted columns in scales, shape (h, f).
-    """
+    """Return directions without parts in motor currents, shape (g, f); purely electrical ones go."""
     fitted = np.flatnonzero(~layout.known.random)
     drives = [np.r_[term.columns] for term in layout.terms if term.source.of_currents]
     if not drives or len(held) == 0:
@@ -103,7 +90,6 @@ def of_circles(layout: Layout, held: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _as_columns(pattern: RigidPattern, names: list[tuple[str, str, str]]) -> NDArray[np.float64] | None:
-    """Return the pattern over the fitted columns, or None."""
     parts = {"strut-reference-length": pattern.strut_mm, "base-joints": pattern.base_mm.ravel()}
     present = {name for name, _, _ in names}
     if any(np.any(part) and source not in present for source, part in parts.items()):
@@ -117,7 +103,6 @@ def _as_columns(pattern: RigidPattern, names: list[tuple[str, str, str]]) -> NDA
 
 
 def _strut_axes(layout: Layout) -> NDArray[np.float64]:
-    """Return struts' unit vectors in the middle of the travel, shape (6, 3)."""
     travel, hexapod = layout.machine.travel, layout.machine.hexapod
     middle = np.array([0.0, 0.0, sum(travel.z_mm) / 2.0])
     struts = hexapod.platform_joints_mm + middle - hexapod.base_joints_mm

@@ -44,7 +44,7 @@ free, such heights would only trade with the tilt of circles in second order [mm
 
 
 class Method(StrEnum):
-    """How the places of balls are known."""
+    """Source of the balls' places."""
 
     JIG = "jig"
     CONV_A = "conv-a"
@@ -56,9 +56,6 @@ def as_known(method: Method, machine: Machine, observations: Sequence[Observatio
 
     Args:
         observations: raw; conventional methods ignore known ball positions.
-
-    Returns:
-        The runs, their set-ups changed to what the method knows.
 
     Raises:
         CalibrationError: an unknown but needed ball position; centred circles.
@@ -77,7 +74,6 @@ def as_known(method: Method, machine: Machine, observations: Sequence[Observatio
 
 
 def _under_spindle(observation: Observation, machine: Machine) -> Observation:
-    """Return the run with its ball at the tool tip, as accurate as the set-up."""
     raised = observation.raw.circle.elevation_deg != 0.0
     unknown = np.array([BY_HAND_MM, BY_HAND_MM, BY_HAND_MM if raised else HEIGHT_MM])
     read = observation.setup.set_up_errors

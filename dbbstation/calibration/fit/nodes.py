@@ -1,9 +1,9 @@
-"""Long runs seen through a few hundred nodes, without loss.
+"""Long runs as a few hundred nodes, without loss.
 
 A reading that depends on pose and time is smooth along the circle. Within six degrees it and its derivatives are
 polynomials of degree five to parts in 1e8, given at six nodes. With W from nodes to samples, J = W Jn, and W = Q R by
-sector, J^T J and J^T residual of the samples are those of R Jn and Q^T residual. Estimates, covariance and sum of squares
-are the samples' own. See docs/decisions.md, 2.
+sector, J^T J and J^T residual of the samples are those of R Jn and Q^T residual. Estimates, covariance and sum of
+squares are exactly the samples'. See docs/decisions.md, 2.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class RunNodes:
     """A run and its nodes.
 
     Attributes:
-        coarse: the run with nodes as samples; its lengths mean nothing.
+        coarse: the run with nodes as samples; its lengths are meaningless.
         roots: R of each sector, shape (sectors, nodes, nodes).
         seen: Q^T of measured less nominal length, shape (sectors, nodes) [mm].
         unseen: norm of the residual beyond smooth readings [mm].
@@ -97,7 +97,6 @@ class RunNodes:
         Args:
             columns: shape (k,).
             jacobian: at the nodes, shape (m, k).
-            length_mm: at the nodes, shape (m,).
             shift: jacobian times this is added to measured less predicted length, shape (k,).
         """
         nominal = self.run.raw.circle.bar_mm
@@ -147,7 +146,6 @@ def nodes_of(run: Observation) -> RunNodes | None:
 
 
 def _in_sectors(phi_deg: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return each sample's sector and its place there from -1 to 1, shapes (n,)."""
     place = phi_deg * (SECTORS / FULL_TURN_DEG)
     sector = np.clip(place.astype(np.int64), 0, SECTORS - 1)
     return sector, 2.0 * (place - sector) - 1.0

@@ -1,6 +1,6 @@
 """Parameters held at nominal in place of lost directions, as in the standard circular test [CAL III-A-2].
 
-Six directions are lost there. Any six prescribed parameters define coordinates and explain the circles alike; the
+Six directions are lost there. Any six prescribed parameters define coordinates and explain the circles equally; the
 machine's place in space follows from them.
 """
 
@@ -39,9 +39,6 @@ def prescribed(layout: Layout, lost: NDArray[np.float64], wanted: Sequence[Name]
         lost: orthonormal rows in scales, shape (h, f).
         wanted: parameters, equally many; empty: the best base joints.
 
-    Returns:
-        Unit rows, shape (h, f).
-
     Raises:
         CalibrationError: a wrong number, a parameter not fitted, or a lost direction left free.
     """
@@ -71,7 +68,7 @@ def prescribed(layout: Layout, lost: NDArray[np.float64], wanted: Sequence[Name]
 
 
 def names_of(layout: Layout, held: NDArray[np.float64]) -> tuple[Name, ...]:
-    """Parameters of unit rows, shape (h, f)."""
+    """Return parameters of unit rows, shape (h, f)."""
     fitted = _fitted(layout)
     return tuple(fitted[int(np.argmax(np.abs(row)))] for row in held)
 
@@ -86,7 +83,6 @@ def _fitted(layout: Layout) -> list[Name]:
 
 
 def _best(fitted: Sequence[Name], lost: NDArray[np.float64]) -> list[int]:
-    """Return the parameters that hold lost directions most firmly, base joints first."""
     if not len(lost):
         return []
     unseen = np.linalg.norm(lost, axis=0) > 1.0 - ROUNDING

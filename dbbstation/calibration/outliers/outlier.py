@@ -51,14 +51,12 @@ class Outlier:
 
     Attributes:
         test: or session, for a bar.
-        runs: one label, or those of a mounting.
         size_um: rms of a run, displacement of a ball, error of a bar's length.
         uncertainty_um: standard; None for a run.
         shift_um: of a ball, machine axes; None for a run.
-        sure: False if one mounting cannot tell a bad seat from a wrong CMM row.
+        sure: False if one mounting cannot separate a bad seat from a wrong CMM row.
         alike: error sources of about equal explanation.
         freed: mountings with free ball, or session with free bar.
-        why: probable origin.
     """
 
     kind: OutlierKind

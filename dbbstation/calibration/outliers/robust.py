@@ -35,9 +35,6 @@ def calibrate_robust(
         balls: look for displaced balls too.
         begun: earlier result without balls, to continue.
 
-    Returns:
-        The last fit, and what was found, in the order in which it stood out.
-
     Raises:
         CalibrationError: as `fit`.
     """
@@ -53,7 +50,6 @@ def calibrate_robust(
 
 
 def _next(fit: Fit, calibration: Calibration, runs: Sequence[Observation], *, balls: bool) -> Step | None:
-    """Return the worst outlier, the freed runs and their fit, or None."""
     strange = strange_runs(calibration)
     if strange:
         return leave_out(fit, runs, strange)

@@ -30,7 +30,7 @@ def without_shift(observation: Observation, residual: NDArray[np.float64]) -> ND
 
 
 def rms_um(residual: NDArray[np.float64]) -> float:
-    """Root mean square [µm] of a residual [mm]."""
+    """Return the root mean square [µm] of a residual [mm]."""
     return 1e3 * float(np.sqrt(np.mean(residual**2)))
 
 

@@ -1,4 +1,4 @@
-"""Find runs that are no circle of this machine, and reinstate explained ones."""
+"""Find runs that are not circles of this machine, and reinstate explained ones."""
 
 from __future__ import annotations
 
@@ -75,12 +75,10 @@ def _strange_run(calibration: Calibration) -> list[int]:
 
 
 def _rests_um(calibration: Calibration) -> NDArray[np.float64]:
-    """Return every run's residual beside a shift of its ball, shape (r,) [µm]."""
     return np.array([rms_um(without_shift(run, left)) for run, left in left_of(calibration)])
 
 
 def _strange_from_um(rests_um: NDArray[np.float64]) -> float:
-    """Return the residual that marks a foreign run [µm]."""
     return max(STANDS_OUT * float(np.median(rests_um)), LEAST_UM)
 
 

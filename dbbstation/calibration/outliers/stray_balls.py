@@ -33,10 +33,7 @@ SAME_SIGMAS = 3.0
 
 
 def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
-    """Give a run whose ball moved within its mounting an own one.
-
-    Return None if none moved or the mounting has no other run.
-    """
+    """Give a run whose ball moved within its mounting its own mounting; None if none moved or it has no other run."""
     k = _moved_in(calibration)
     if k is None:
         return None
@@ -59,7 +56,7 @@ def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) 
 
 
 def _moved_in(calibration: Calibration) -> int | None:
-    """Return the run whose ball stands elsewhere than in its mounting's others."""
+    """Return the run whose ball is displaced from its mounting's others."""
     shifts = np.array([shift_of(o, r) for o, r in left_of(calibration)])
     away = np.hypot(*shifts.T)
     worst = int(np.argmax(away))
@@ -89,15 +86,7 @@ def free_ball(
     *,
     together: bool | None = None,
 ) -> Step:
-    """Free the ball of a mounting, with its other mountings if displaced alike.
-
-    Args:
-        seats: of a fit of these runs.
-        together: None: judged by the seats.
-
-    Returns:
-        What was found, the runs without its pull, and their fit.
-    """
+    """Free the ball of a mounting, with its other mountings if displaced alike."""
     worst = next(seat for seat in seats if seat.mounting == mounting)
     alike = [seat for seat in seats if seat.ball == worst.ball and seat is not worst]
     if together is None:
@@ -119,9 +108,7 @@ def set_free(fit: Fit, before: Calibration, source: str, of: str) -> Step | None
     """Free an outlier; None if the runs cannot be fitted then.
 
     Args:
-        before: last fit.
         source: `mounting`, `ball-coordinate` or `bar-offset`.
-        of: mounting, ball or session.
     """
     runs = before.observations
     try:
@@ -135,11 +122,7 @@ def set_free(fit: Fit, before: Calibration, source: str, of: str) -> Step | None
 
 
 def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
-    """Free the bar length of a session.
-
-    Returns:
-        What was found, the runs without its pull, and their fit.
-    """
+    """Free the bar length of a session."""
     of = [run for run in runs if run.setup.session == session]
     why = f", and ± {1e3 * of[0].setup.bar_uncertainty_mm:.2f} was stated: put it on its calibrator again"
     freed = [
@@ -161,7 +144,6 @@ def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
 
 
 def _ball(calibration: Calibration, kind: OutlierKind, freed: tuple[str, ...], why: str, *, sure: bool) -> Outlier:
-    """Return a freed ball by a fit, in its first mounting."""
     seat = next(seat for seat in seats_of(calibration) if seat.mounting == freed[0])
     of = [run for run in calibration.observations if run.setup.mounting in freed]
     which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {_tests(of)}"
@@ -223,6 +205,5 @@ def _um(shift_mm: NDArray[np.float64]) -> tuple[float, float, float]:
 
 
 def _towards(shift_mm: NDArray[np.float64]) -> str:
-    """Return length and direction of an in-plane shift, such as `31 µm towards 270°`."""
     angle = np.degrees(np.arctan2(shift_mm[1], shift_mm[0])) % 360.0
     return f"{1e3 * float(np.hypot(*shift_mm[:2])):.1f} µm towards {angle:.0f}°"

@@ -41,14 +41,7 @@ _ALONG = np.column_stack(
 
 @dataclass(frozen=True)
 class CircleDeviations:
-    """Figures of one circle [CAL Table III].
-
-    Attributes:
-        centre_deviation_um: least-squares centre's offset.
-        mean_radial_error_um: mean length less radius about the commanded centre.
-        circularity_um: range about the least-squares circle.
-        centre_deviation_from_first_um: from the first test's centre in this direction; None for readings.
-    """
+    """Figures of one circle [CAL Table III]: centre deviation, also from the first test's centre, mean radial error, circularity."""
 
     centre_deviation_um: float
     mean_radial_error_um: float
@@ -58,14 +51,7 @@ class CircleDeviations:
 
 @dataclass(frozen=True)
 class LowPassedCircularity:
-    """Circular deviation G, low-passed at 30 undulations per revolution [µm].
-
-    Attributes:
-        measured: of readings.
-        predicted: of predicted readings.
-        before: of the nominal residual.
-        after: of the model's residual.
-    """
+    """Circular deviation G, low-passed at 30 undulations per revolution [µm]."""
 
     measured: float
     predicted: float
@@ -75,14 +61,7 @@ class LowPassedCircularity:
 
 @dataclass(frozen=True)
 class EvaluatedRun(OfRun):
-    """One run under the nominal machine (before) and the model (after).
-
-    Attributes:
-        measured: of readings.
-        before: of the nominal residual.
-        after: of the model's residual.
-        circularity_30_upr_um: without the bar's noise; None if not asked for.
-    """
+    """One run under the nominal machine (before) and the model (after)."""
 
     measured: CircleDeviations
     before: CircleDeviations
@@ -92,11 +71,7 @@ class EvaluatedRun(OfRun):
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a model makes of recordings.
-
-    Attributes:
-        residual_rms_um: measured minus predicted length over all runs, machine's sources only.
-    """
+    """What a model makes of recordings."""
 
     runs: tuple[EvaluatedRun, ...]
     residual_rms_um: float
@@ -134,8 +109,6 @@ def _deviations(of: CircleFigures, first: CircleFigures | None = None) -> Circle
 
 
 def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[list[CircleFigures], float]:
-    """Return every run's figures under a model, and the rms of all residuals [µm]."""
-
     def of_run(observation: Observation, residual_mm: NDArray[np.float64]) -> tuple[CircleFigures, float, int]:
         return _figures_of(observation, residual_mm), float(residual_mm @ residual_mm), len(residual_mm)
 
@@ -145,7 +118,7 @@ def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[li
 
 
 def rms_um(residual_mm: Sequence[NDArray[np.float64]]) -> float:
-    """Root mean square over all runs [µm]."""
+    """Return the root mean square over all runs [µm]."""
     return 1e3 * float(np.sqrt(sum(float(one @ one) for one in residual_mm) / sum(map(len, residual_mm))))
 
 
@@ -200,7 +173,6 @@ def _level(xy_mm: NDArray[np.float64], height_mm: float) -> NDArray[np.float64]:
 def _error_mm(
     model: MachineModel, xy_mm: NDArray[np.float64], height_mm: float, corrected: MachineModel | None
 ) -> NDArray[np.float64]:
-    """Return actual minus wanted positions, shape (n, 3) [mm]."""
     poses = _level(xy_mm, height_mm)
     motion = Motion(poses)
     actual = model.anywhere().actual_poses(motion)
@@ -209,7 +181,6 @@ def _error_mm(
 
 
 def _figures_of(observation: Observation, residual_mm: NDArray[np.float64]) -> CircleFigures:
-    """Return figures of a circle of nominal bar length plus this residual."""
     return figures(observation.raw, observation.raw.circle.bar_mm + residual_mm)
 
 

@@ -39,11 +39,7 @@ ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lo
 
 @dataclass(frozen=True)
 class SourceValues:
-    """Parameters of one error source.
-
-    Attributes:
-        shared: session or mounting; None for the machine.
-    """
+    """Parameters of one error source."""
 
     name: str
     shared: Annotated[str | None, Absent]
@@ -78,17 +74,12 @@ class CalibrationFigures:
     """All figures of a fit, and its outliers.
 
     Attributes:
-        runs: nominal and under the model.
         nominal_rms_um: measured less nominally predicted length.
         noise_um: of a reading, from neighbours.
         misfit: beyond noise and mountings.
-        directions_lost: in words.
         gaps: remaining knowledge of them, in words.
         directions_regularised: known by tolerances only, in words.
         parameters_prescribed: held in place of directions, as `source.parameter`.
-        sources: of the machine.
-        measurement_effects: of session, mounting or instrument.
-        motor_currents: None for circles alone.
     """
 
     runs: tuple[EvaluatedRun, ...]
@@ -121,11 +112,7 @@ class CalibrationFigures:
 def calibration_figures(
     calibration: Calibration, evaluation: Evaluation, outliers: Sequence[Outlier] = ()
 ) -> CalibrationFigures:
-    """Return all figures of a fit.
-
-    Args:
-        evaluation: of its model.
-    """
+    """Return all figures of a fit."""
     u = _uncertainties(calibration)
     values = [(term, _values(calibration, term, u)) for term in calibration.layout.terms]
     return CalibrationFigures(
@@ -152,11 +139,7 @@ def calibration_figures(
 
 
 def report_of(figures: CalibrationFigures, **more: Any) -> dict[str, object]:  # noqa: ANN401 - what the file takes
-    """Return the numbers that a model file keeps.
-
-    Args:
-        more: further numbers, by name.
-    """
+    """Return the numbers that a model file keeps."""
     return {**more, **{key: value for key, value in plain(figures).items() if key not in ELSEWHERE_IN_MODEL}}
 
 
@@ -172,7 +155,6 @@ def covariance_of(identified: IdentifiedModel) -> Covariance:
 
 
 def _uncertainties(calibration: Calibration) -> NDArray[np.float64]:
-    """Return every column's standard uncertainty, shape (k,); NaN if unknown."""
     variance = np.maximum(calibration.solution.variance, 0.0)
     variance += calibration.layout.formula_variance(calibration.x)
     if calibration.prescribed:  # they define coordinates, and all parameters are known in these

@@ -32,8 +32,6 @@ class Motor:
         gain_a_kn: current per strut force.
         force_per_current: of the strut [N/A].
         torque_per_current: at the screw [Nm/A]; None without its lead.
-        residual_a: rms.
-        samples: used readings.
     """
 
     motor: int
@@ -57,7 +55,6 @@ class CurrentsFigures:
     Attributes:
         weight_taken_as_known_n: of the platform, the basis of forces.
         centre_of_gravity: by coordinate and channel, `circles`, `currents`, `both` [mm]; None if undetermined.
-        notes: omissions and limits.
     """
 
     weight_taken_as_known_n: float
@@ -117,7 +114,6 @@ def _motor(calibration: Calibration, found: MotorFindings, motor: int) -> Motor:
 
 
 def _centre_of_gravity(calibration: Calibration, found: MotorFindings) -> dict[str, dict[str, Value | None]]:
-    """Return each coordinate's shift by circles, by currents and by both."""
     together = _fitted(calibration, "cog-shift")
     shifts: dict[str, dict[str, Value | None]] = {}
     for name in next(iter(found.alone.values()), {}):

@@ -30,7 +30,6 @@ class CircleBeforeAfter:
     """One run, by rising angle, shape (s,) each.
 
     Attributes:
-        theta_deg: angle from +X towards +Y [deg].
         before_um: measured less nominally predicted length; less nominal bar length for plain circles.
         after_um: measured less the model's length; balls and bar as stated.
     """
@@ -59,13 +58,11 @@ class CircleTest:
 
 @dataclass(frozen=True, eq=False)
 class BallShift:
-    """Where the fit finds a ball.
+    """The fit's displacement of a ball.
 
     Attributes:
-        tests: in that mounting.
         stated_um: standard deviation per axis.
         shift_um: found less stated place in X and Y, shape (2,).
-        sigma_um: standard deviations, shape (2,).
     """
 
     tests: tuple[str, ...]

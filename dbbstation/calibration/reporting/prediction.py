@@ -32,8 +32,6 @@ class PredictedCircle:
     """One run.
 
     Attributes:
-        measured_um: up to 30 undulations per revolution.
-        predicted_um: of the machine's predicted readings.
         before_um: of the nominal residual; as measured for a plain circle.
     """
 
@@ -82,7 +80,7 @@ def smooth_circularities_um(raw: RawCircle, lengths_mm: Sequence[NDArray[np.floa
 
 
 def smooth_lengths_mm(raw: RawCircle, length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lengths up to 30 undulations per revolution, shape (n,) [mm]."""
+    """Return lengths up to 30 undulations per revolution, shape (n,) [mm]."""
     return _smooth_mm(raw, [length_mm])[0]
 
 

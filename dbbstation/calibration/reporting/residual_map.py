@@ -27,7 +27,6 @@ class ResidualMap:
     """Mean smooth residuals over test and angle.
 
     Attributes:
-        tests: in recording order.
         um: by direction, tests by angle from +X towards +Y, NaN for gaps, shape (tests, 36) each [µm].
     """
 
@@ -36,17 +35,13 @@ class ResidualMap:
 
     @property
     def reach_um(self) -> float:
-        """Greatest absolute value [µm]."""
+        """Return the greatest absolute value [µm]."""
         return float(np.nanmax(np.abs(np.concatenate(list(self.um.values())))))
 
 
 @with_one_thread
 def residual_map(observations: Sequence[Observation], residual_mm: Sequence[NDArray[np.float64]]) -> ResidualMap:
-    """Return residuals averaged over ten degrees, noise removed.
-
-    Args:
-        residual_mm: shape (n,) each.
-    """
+    """Return residuals averaged over ten degrees, noise removed."""
     names = names_of_tests(observations)
     rows = {name: k for k, name in enumerate(dict.fromkeys(names))}
     um = {direction: np.full((len(rows), SECTORS), np.nan) for direction in Direction}

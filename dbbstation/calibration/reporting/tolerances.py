@@ -1,4 +1,4 @@
-"""The shop's tolerances against a model's view of runs."""
+"""The shop's tolerances against a model's figures of runs."""
 
 from __future__ import annotations
 
@@ -16,11 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class WorstRun:
-    """The run with the largest toleranced figure.
-
-    Attributes:
-        run: test, direction and repeat.
-    """
+    """The run with the largest toleranced figure."""
 
     run: str
     worst_um: float
@@ -32,8 +28,6 @@ class EvaluatedTolerance:
     """A tolerance, and the worst run under the nominal machine and under the model.
 
     Attributes:
-        tests: empty for all.
-        directions: empty for both.
         before: nominal; None without applicable run.
         after: under the model; None without applicable run.
     """
@@ -49,11 +43,7 @@ class EvaluatedTolerance:
 def evaluated_tolerances(
     tolerances: Iterable[Tolerance], runs: Sequence[EvaluatedRun]
 ) -> tuple[EvaluatedTolerance, ...]:
-    """Apply tolerances to runs, nominal and under the model.
-
-    Args:
-        runs: with low-passed circular deviation.
-    """
+    """Apply tolerances to runs, nominal and under the model."""
     return tuple(
         EvaluatedTolerance(
             quantity=tolerance.figure.value,

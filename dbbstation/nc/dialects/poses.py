@@ -1,4 +1,4 @@
-"""Poses as a table, for a postprocessor of the shop's own: machine coordinates and F of each move, before and after."""
+"""Poses as a table for an external postprocessor: machine coordinates and F of each move, before and after."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ COLUMNS = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,feed"
 
 
 class Poses(Dialect):
-    """A row for each move. Dwells, stops, tools and spindle stay in the program that the postprocessor writes."""
+    """A row for each move. The postprocessor adds dwells, stops, tools and spindle."""
 
     name = "poses"
     extension = ".csv"

@@ -27,11 +27,9 @@ def arc_of(
     plane: int,
     absolute: bool,
 ) -> Arc:
-    """Return the arc from where the control stands, and take its words out of the block.
+    """Return the arc from the control's pose, and remove its words from the block.
 
     Args:
-        target: pose at its end, shape (6,) [mm, deg].
-        plane: as in `PLANES`.
         absolute: whether the centre counts from the origin (G90.1).
 
     Raises:

@@ -40,7 +40,6 @@ class Arc:
         centre_mm: in first and second axis of its plane.
         clockwise: seen from the positive end of the third axis.
         turns: each above 1 adds a full turn.
-        plane: as in `PLANES`.
     """
 
     start: NDArray[np.float64]
@@ -51,7 +50,7 @@ class Arc:
     plane: int = 0
 
     def radii_mm(self) -> tuple[float, float]:
-        """Distances of start and end from the centre [mm]."""
+        """Return distances of start and end from the centre [mm]."""
         (x, y), (first, second) = self.centre_mm, PLANES[self.plane]
         ends = (math.hypot(pose[first] - x, pose[second] - y) for pose in (self.start, self.end))
         return next(ends), next(ends)
@@ -86,13 +85,13 @@ class Arc:
 
     @property
     def length_mm(self) -> float:
-        """Return the way of the tip: the arc with its rise."""
+        """Return the tip's distance along the arc with its rise."""
         flat = self.swept_rad * sum(self.radii_mm()) / 2.0
         rise = 3 - int(PLANES[self.plane].sum())
         return math.hypot(flat, float(self.end[rise] - self.start[rise]))
 
     def poses(self) -> NDArray[np.float64]:
-        """End points of the chords, shape (k, 6) [mm, deg]."""
+        """Return end points of the chords, shape (k, 6) [mm, deg]."""
         (x, y), (first, last) = self.centre_mm, self.radii_mm()
         turned = -self.swept_rad if self.clockwise else self.swept_rad
         share = np.arange(1, self.chords + 1) / self.chords
@@ -119,7 +118,6 @@ def centre_by_radius(
 
     Args:
         radius_mm: positive for at most half a turn, negative for more.
-        clockwise: as in `Arc`.
     """
     dx, dy = float(end[0] - start[0]), float(end[1] - start[1])
     half = math.hypot(dx, dy) / 2.0

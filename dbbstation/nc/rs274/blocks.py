@@ -29,9 +29,7 @@ class ProgramBlock:
     """One line.
 
     Attributes:
-        words: other than codes, by letter.
         codes: G and M codes by group.
-        settings: of parameters, in order.
         comments: those without effect.
         message: a comment that LinuxCNC acts on; empty if none.
     """
@@ -83,11 +81,6 @@ def block_of(line: str, place: Place, value_of: Callable[[int | str], float | No
 
 
 def _checked(line: str, place: Place) -> str:
-    """Return the line without a CR at its end.
-
-    Raises:
-        BadLine: it is longer than LinuxCNC reads, or has a character in it that some programs take for the end of a line.
-    """
     line_bytes = len(line) if line.isascii() else len(line.encode("utf-8", "surrogatepass"))
     if line_bytes > LONGEST_BYTES:
         what = f"the line has {line_bytes} characters"
@@ -109,7 +102,6 @@ _PYTHON = re.compile(r"py,|pyrun,|pyreload", re.IGNORECASE)
 
 
 def _take_comment(block: ProgramBlock, comment: Comment) -> None:
-    """Add a comment. LinuxCNC obeys only the last of several in brackets [measured with rs274 2.9]."""
     text = comment.text.lstrip(BLANKS)
     if _PYTHON.match(text):
         what = "a comment that runs Python in the control, which may move it"

@@ -1,4 +1,4 @@
-"""G and M codes that the reader knows, their modal groups, and reasons to refuse others."""
+"""G and M codes that the reader accepts, their modal groups, and reasons to refuse others."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ _REMEDIES: dict[float, str] = {
 
 
 def remedy_of_letter(letter: str) -> str:
-    """Return what to do about a letter that is not read."""
+    """Return the remedy for an unsupported letter."""
     if letter == "D":
         return _TOOL
     return (
@@ -97,5 +97,5 @@ def name(letter: str, value: float) -> str:
 
 
 def remedy(letter: str, value: float) -> str:
-    """Return what to do about a code that is not read."""
+    """Return the remedy for an unsupported code."""
     return "post the program without it" if letter == "M" else _REMEDIES.get(value, "post the program without it")

@@ -53,7 +53,7 @@ class Depths(NamedTuple):
 
 
 class ModalCycle:
-    """What cycles keep from line to line.
+    """State of cycles from line to line.
 
     Attributes:
         numbers: Z, R and Q [mm] and P [s].
@@ -67,10 +67,9 @@ class ModalCycle:
         self.to_clear: bool | None = None
 
     def depths(self, code: float, block: ProgramBlock, state: ControlState, column: int, *, absolute: bool) -> Depths:
-        """Return the depths of a cycle, and take its words out of the block.
+        """Return the depths of a cycle, and remove its words from the block.
 
         Args:
-            column: of the block, for faults.
             absolute: whether Z and R count from the origin (G90).
 
         Raises:

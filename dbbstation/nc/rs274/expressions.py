@@ -75,8 +75,8 @@ class ValueReader:
     """Reads values in one line, from a position on.
 
     Args:
-        value_of: value of a parameter by number or lower-case name; None if it has none. NaN stands for values that are not
-            looked for.
+        value_of: value of a parameter by number or lower-case name; None if undefined. NaN stands for values that are
+            not needed.
     """
 
     def __init__(self, text: str, place: Place, value_of: Callable[[int | str], float | None]) -> None:

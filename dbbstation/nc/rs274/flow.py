@@ -1,4 +1,4 @@
-"""The lines of a program in the order in which a control runs them: O-words, subprograms, their parameters."""
+"""The lines of a program in execution order: O-words, subprograms, their parameters."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class OLine(NamedTuple):
 
 @dataclass(slots=True)
 class _Frame:
-    """A subprogram that runs: where it was called, how often it is to run again, and its own parameters."""
+    """A running subprogram: place of its call, remaining repetitions, and parameters."""
 
     back: int
     begin: int
@@ -65,7 +65,7 @@ class Flow:
     """Runs a program line by line.
 
     Args:
-        outer: value of a parameter that belongs to the control; None if it has none.
+        outer: value of a parameter of the control; None if undefined.
     """
 
     def __init__(self, text: str, file: str, outer: Callable[[int | str], float | None]) -> None:
@@ -86,7 +86,7 @@ class Flow:
         self._text, self._begins, self._ran = text, list[int](), 0
 
     def lines(self) -> Iterator[tuple[str, Place]]:
-        """Yield lines without O-words in the order in which they run.
+        """Yield lines without O-words in execution order.
 
         Raises:
             BadLine: an O-word that makes no sense, or the program does not end.
@@ -126,7 +126,7 @@ class Flow:
         return self._begins[index]
 
     def ended(self) -> None:
-        """Check behind M2 and M30 that nothing of the program is lacking.
+        """Check after M2 and M30 that the program is complete.
 
         Raises:
             BadLine: the percent sign that closes it.
@@ -135,7 +135,7 @@ class Flow:
             raise BadLine(self.cut_short())
 
     def all_lines(self) -> Iterator[tuple[str, Place]]:
-        """Yield all lines without O-words as they stand in the file, up to the percent sign that ends it."""
+        """Yield all lines without O-words in file order, up to the closing percent sign."""
         begin = self._opening()[1]
         for number, line in enumerate(self._lines[begin:], begin + 1):
             if self.percent and is_percent(line):
@@ -144,7 +144,7 @@ class Flow:
                 yield line, Place(self._file, number)
 
     def value_of(self, which: int | str) -> float | None:
-        """Return the value of a parameter, None if it has none."""
+        """Return the value of a parameter, None if undefined."""
         own = self._frames[-1].parameters if self._frames and _is_local(which) else self._globals
         if which in own:
             return own[which]
@@ -184,9 +184,9 @@ class Flow:
         return {which: value for which, value in own.items() if _is_local(which)}
 
     def _opening(self) -> tuple[bool, int]:
-        """Return whether the first line that is not empty is a percent sign, and the index of the first line to read.
+        """Return whether the first line with content is a percent sign, and the index of the first line to read.
 
-        Between percent signs a program needs no other end. Elsewhere a percent sign is a fault, as for LinuxCNC.
+        Between percent signs a program needs no other end. Elsewhere LinuxCNC treats a percent sign as a fault.
         """
         start = next((index for index, line in enumerate(self._lines) if line.strip(BLANKS)), 0)
         return (True, start + 1) if is_percent(self._lines[start]) else (False, 0)
@@ -211,7 +211,7 @@ class Flow:
         made(word, place)
 
     def _number(self, word: OLine, place: Place) -> None:
-        """The number of the program; one behind that begins a subprogram, which is called and not run into."""
+        """Handle the program's number; a later one begins a subprogram, which runs only when called."""
         if word.rest:
             raise place.fault(
                 word.column + 1, "something behind the number of a program", "write it in a line of its own"
@@ -267,7 +267,7 @@ class Flow:
     _return = _endsub
 
     def _if(self, word: OLine, place: Place) -> None:
-        """If; else and elseif are reached from the branch that ran."""
+        """Handle `if`; else and elseif are reached after the branch that ran."""
         if word.keyword in {"else", "elseif"}:
             self._next = self._find(word, place, ("endif",)).line
             return
@@ -289,7 +289,7 @@ class Flow:
         self._next = self._must_be_opened(word, place, ("while",)).line - 1
 
     def _do(self, _word: OLine, _place: Place) -> None:
-        """A loop begins; its `while` leads back."""
+        """Begin a loop; its `while` leads back."""
 
     def _repeat(self, word: OLine, place: Place) -> None:
         times = self._reader(word, place).value()
@@ -321,7 +321,7 @@ class Flow:
         raise place.fault(1, f"O{word.label} {word.keyword} has no {' or '.join(keywords)}", "add it")
 
     def _opened(self, word: OLine, keywords: tuple[str, ...]) -> OLine | None:
-        """Return the O-word before of this label, if it has one of the keywords; breaks and continues between do not count."""
+        """Return the preceding O-word of this label, if it has one of the keywords; breaks and continues are skipped."""
         before = [each for each in self._labels[word.label] if each.line < word.line]
         before = [each for each in before if each.keyword not in {"break", "continue"}]
         return before[-1] if before and before[-1].keyword in keywords else None

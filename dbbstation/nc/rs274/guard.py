@@ -1,8 +1,8 @@
-"""The guard of a program: O-words that stop it unless LinuxCNC's offsets are those that it was made for.
+"""The guard of a program: O-words that stop it unless LinuxCNC's offsets are as assumed.
 
-Parameters [LinuxCNC, G-code overview, Numbered Parameters]: #5220 is the number n of the work system in force, 1 to 9;
-#5201 + 20 n and the next eight are its offsets in X to W, #5210 + 20 n its rotation about Z; #5211 to #5219 are G92, #5401 to
-#5409 the tool length in force, #<_tool_offset> is 1 while there is one. All count in the machine's units.
+Parameters [LinuxCNC, G-code overview, Numbered Parameters]: #5220 is the number n of the active work system, 1 to 9;
+#5201 + 20 n and the next eight are its offsets in X to W, #5210 + 20 n its rotation about Z; #5211 to #5219 are G92,
+#5401 to #5409 the active tool length, #<_tool_offset> is 1 if there is one. All are in the machine's units.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _LENGTHS = "the length of tool {} is not {}. Compensate anew with it"
 
 
 def guard_lines(holds: Mapping[str, Sequence[float]]) -> list[str]:
-    """Return a guard for offsets by `IN_FORCE`, `G54` and so on, and `G92`; lengths such as `H1` are checked in their place."""
+    """Return a guard for offsets by `IN_FORCE`, `G54` and so on, and `G92`; lengths such as `H1` are checked later."""
     checks = []
     for name in (IN_FORCE, *SYSTEMS):
         if name in holds:
@@ -52,14 +52,14 @@ def guard_lines(holds: Mapping[str, Sequence[float]]) -> list[str]:
 
 
 def length_lines(tool: str, length: Sequence[float], row: int) -> Iterator[str]:
-    """Yield the same for the length of a tool, `H1`, that has come in force in a row of the toolpath."""
+    """Yield the same for a tool length, `H1`, that a row of the toolpath activates."""
     parameters = [f"#{LENGTH + k}" for k in range(_AXES)]
     check = parameters, length, _LENGTHS.format(tool[1:], offset_text(length))
     yield from _stops([check], FIRST_LENGTH_LABEL + 2 * row)
 
 
 def _stops(checks: Sequence[tuple[Sequence[str], Sequence[float], str]], label: int) -> Iterator[str]:
-    """Yield conditions that parameters are, in sum, off what is expected of them."""
+    """Yield conditions that parameters, in sum, differ from expected values."""
     for parameters, expected, message in checks:
         wanted = [*expected, *(0.0 for _ in parameters[len(expected) :])]
         off = [f"ABS[{one}{f'-[{value:.6f}]' if value else ''}]" for one, value in zip(parameters, wanted, strict=True)]

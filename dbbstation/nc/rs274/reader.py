@@ -73,8 +73,8 @@ def read_program(
     """Return what a program commands.
 
     Args:
-        start: pose before the program, shape (6,) [mm, deg], NaN for unknown axes; None: all are.
-        setup: offsets and tool lengths of the control; None: all are zero.
+        start: pose before the program, shape (6,) [mm, deg], NaN for unknown axes; None: all unknown.
+        setup: offsets and tool lengths of the control; None: all zero.
 
     Raises:
         InputError: faults with line and column; all unreadable words at once, or the first block that makes no sense.
@@ -94,7 +94,6 @@ def read_program(
 
 
 def _unreadable(flow: Flow) -> list[Problem]:
-    """Return the words that cannot be read in any line up to the program's end."""
     faults: list[Problem] = []
     for line, place in flow.all_lines():
         try:
@@ -110,7 +109,7 @@ def _unreadable(flow: Flow) -> list[Problem]:
 
 
 class Feed(NamedTuple):
-    """What F stands for: the tool tip, or the angles if only they move."""
+    """Meaning of F: speed of the tool tip, or of the angles if only they move."""
 
     mm_min: float
     deg_min: float
@@ -240,7 +239,7 @@ class _Interpreter:
             self.path.say(RowKind.MESSAGE, self._with_values(block.message), line=block.place.line)
 
     def _with_values(self, message: str) -> str:
-        """Return a message with the values of its parameters: what is written has none of them."""
+        """Return a message with the values of its parameters."""
         if not _SHOWS_VALUES.match(message):
             return message
 
@@ -309,7 +308,7 @@ class _Interpreter:
             self.path.unknown |= ALL_AXES & ~self._fixed
 
     def _shared_words(self, block: ProgramBlock) -> None:
-        """Refuse codes in one line that share a word or undo each other."""
+        """Refuse codes in one line that share a word or cancel each other."""
         if not block.codes:
             return
         users = [self._in_line(block, ModalGroup.ONCE, {DWELL, 10.0}), self._in_line(block, ModalGroup.PATH, {64.0})]
@@ -408,7 +407,6 @@ class _Interpreter:
         self.path.count_from(self._state.offset)
 
     def _hold(self, what: str, values: tuple[float, ...]) -> None:
-        """Note by which offset the program begins."""
         held = {} if self.path.holds is None else self.path.holds
         held.setdefault(what, values)
         self.path.holds = held
@@ -492,7 +490,7 @@ class _Interpreter:
         self._motion = motion
 
     def _goes_nowhere(self, block: ProgramBlock, motion: float | None, once: float | None) -> bool:
-        """Return whether a line without axes is a move: an arc by its centre; to LinuxCNC, a motion code alone as well."""
+        """Return whether a line without axes is a move: an arc by its centre; for LinuxCNC also a motion code alone."""
         if self._motion in ARCS and (motion is not None or any(each in block.words for each in CENTRES)):
             return True
         return motion in {RAPID, LINEAR} and not np.isnan(self._state.pose).any() and once not in TAKES_AXES
@@ -506,7 +504,6 @@ class _Interpreter:
         in_machine: bool = False,
         arc: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
-        """Add a move at feed of this way [mm] and turn [deg]."""
         self._check_feed(block, block.first_column)
         self._begin_move(block, poses[-1])
         speed = self._speed
@@ -589,7 +586,6 @@ class _Interpreter:
         return [radius * math.cos(angle) + offset[0], radius * math.sin(angle) + offset[1]]
 
     def _run_cycle(self, block: ProgramBlock, named: list[str]) -> None:
-        """Drill at the places of a block, along Z."""
         column, code = block.first_column, self._motion or 0.0
         times = block.words.pop("L", None)
         if self._plane != 0 or self._per_move or {"A", "B", "C"} & set(named):
@@ -627,7 +623,6 @@ class _Interpreter:
             self._go(block, depth=depth, feed=what == "feed")
 
     def _go(self, block: ProgramBlock, *, depth: float, feed: bool = False) -> None:
-        """Go up or down in Z, in machine coordinates [mm]."""
         target = self._state.pose.copy()
         target[2] = depth
         if feed:
@@ -684,7 +679,6 @@ def _named(block: ProgramBlock) -> list[str]:
 
 
 def _moved(block: ProgramBlock) -> int:
-    """Return the number of axis words."""
     return sum(letter in AXES for letter in block.words)
 
 

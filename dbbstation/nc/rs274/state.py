@@ -1,4 +1,4 @@
-"""Where a control stands and from where it counts: pose, work offsets, G92, tool lengths, their parameters."""
+"""Position and coordinates of a control: pose, work offsets, G92, tool lengths, their parameters."""
 
 from __future__ import annotations
 
@@ -24,10 +24,9 @@ POSITION, SYSTEM, TOOL, LENGTH = 5420, 5220, 5400, 5401
 
 
 class ControlState:
-    """Pose in machine coordinates, and what is added to numbers.
+    """Pose in machine coordinates, and offsets added to numbers.
 
     Attributes:
-        pose: shape (6,) [mm, deg], NaN for unknown axes.
         unit_mm: of lengths.
         system: number of the work system, from 1.
         g92: in force, shape (6,) [mm, deg].
@@ -65,7 +64,7 @@ class ControlState:
         self._counted()
 
     def set_system(self, block: ProgramBlock) -> tuple[str, str, tuple[float, ...]]:
-        """Run G10 L2 or L20; return what does the same, the system and its offset before."""
+        """Run G10 L2 or L20; return the equivalent, the system and its earlier offset."""
         word = block.codes[ModalGroup.ONCE]
         kind, which, turned = (block.words.pop(letter, None) for letter in "LPR")
         if kind is None or kind.value not in {2.0, 20.0} or which is None or which.value not in range(10):
@@ -123,7 +122,7 @@ class ControlState:
         return int(which)
 
     def parameter(self, which: int | str) -> float | None:
-        """Return a parameter of the control; None if it is not known."""
+        """Return a parameter of the control; None if unknown."""
         if isinstance(which, str):
             return self._named(which)
         if POSITION <= which < POSITION + 6:
@@ -134,7 +133,7 @@ class ControlState:
         return None if self.setup.parameters is None else self.setup.parameters.get(which, 0.0)
 
     def _rows(self) -> list[tuple[int, tuple[float, ...]]]:
-        """Return what is stored in successive parameters; behind C come U, V, W and a rotation, which are zero."""
+        """Return the values of successive parameters; U, V, W and a rotation follow as zero."""
         rows = [(FIRST_PARAMETERS[each], self.offset_of(number)) for number, each in enumerate(SYSTEMS, 1)]
         rows += [(FIRST_PARAMETERS["G92"], self.g92), (LENGTH, self.length)]
         known = ((FIRST_PARAMETERS[each], self.setup.place(each)) for each in ("G28", "G30"))
@@ -172,7 +171,7 @@ class ControlState:
 
 
 def unknown_place(block: ProgramBlock, axes: list[str], when: str = "before this move") -> BadLine:
-    """Return the fault of a block for which the place of axes must be known."""
+    """Return the fault of a block that needs a known place of axes."""
     what = f"nobody knows where {', '.join(axes)} stand{'s' if len(axes) == 1 else ''} {when}"
     remedy = (
         "--angles A,B,C states at which a program without them runs"

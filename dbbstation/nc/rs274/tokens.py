@@ -51,7 +51,7 @@ class Word(NamedTuple):
 
 
 class ParameterSetting(NamedTuple):
-    """A parameter by number or lower-case name, and the value that it takes once the line is read."""
+    """A parameter by number or lower-case name, and its value after the line."""
 
     parameter: int | str
     value: float
@@ -92,14 +92,14 @@ class Place:
 
 
 def unknown_value(_which: int | str) -> float:
-    """Stand for the value of any parameter while a line is only looked at."""
+    """Return a stand-in value for any parameter while a line is only inspected."""
     return math.nan
 
 
 def tokens(
     text: str, place: Place, value_of: Callable[[int | str], float | None] = unknown_value
 ) -> Iterator[Word | ParameterSetting | Comment]:
-    """Yield what stands in a line, in order.
+    """Yield the tokens of a line, in order.
 
     Raises:
         BadLine: something that is neither, or has no value.
